@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings, Watch
+from cellplan.cli.output import Result, json_failure, present
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
-    from cellplan.model.cell import Robot
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from cellplan.cli.progress import Listener
+    from cellplan.model.cell import Cell, Robot
     from cellplan.pipeline.check import CellCheck
 
 SCHEMA = "cellplan.check/1"
@@ -21,30 +26,49 @@ SCHEMA = "cellplan.check/1"
 def check(
     cell: CellFile,
     settings: Settings = None,
+    watch: Watch = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
     """Read and validate everything without solving: files, robots, paths, reach and collisions at the start.
 
-    Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error.
+    Exit status: 0 sound, 1 a collision at the start, 2 bad input, 3 no start posture found, 4 internal error, 130
+    interrupted.
     """
-    with json_failure(SCHEMA, desired=as_json):
-        from cellplan.io.cell.load import load_cell
-        from cellplan.pipeline.check import check as check_cell
-        from cellplan.pipeline.overrides import with_overrides
+    work = partial(_checked, cell, tuple(settings or ()), tuple(allow_dir or ()))
+    if watch:
+        from cellplan.cli.watch import watch as watch_cell
 
-        with progress_listener(quiet=quiet) as progress:
-            result = check_cell(
-                with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ()), progress=progress
-            )
+        watch_cell(work, cell, schema=SCHEMA, as_json=as_json, quiet=quiet)
+    with json_failure(SCHEMA, desired=as_json), progress_listener(quiet=quiet) as progress:
+        result = work(lambda _: None, progress)
+    present(result, as_json=as_json)
+    raise typer.Exit(result.status)
+
+
+def _checked(
+    path: Path,
+    settings: tuple[str, ...],
+    allow_dirs: tuple[Path, ...],
+    follow: Callable[[Cell], None],
+    progress: Listener,
+) -> Result:
+    """Read and check a cell; ``follow`` is called with the cell as soon as it is read."""
+    from cellplan.cli.next_steps import after_check
+    from cellplan.io.cell.load import load_cell
+    from cellplan.pipeline.check import check as check_cell
+    from cellplan.pipeline.overrides import with_overrides
+    from cellplan.report.text.check import check_lines
+
+    given = load_cell(path, allow_dirs=allow_dirs)
+    follow(given)
+    changed = with_overrides(given, settings)
+    result = check_cell(changed, progress=progress)
     status = ExitStatus.PASSED if result.passed else ExitStatus.CHECK_FAILED
     record = _record(result)
-    if as_json:
-        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **record})
-    else:
-        say("\n".join(_lines(record)))
-    raise typer.Exit(status)
+    lines = [*check_lines(record), *after_check(path, changed, passed=result.passed, allow_dirs=allow_dirs)]
+    return Result(status, lines, {"schema": SCHEMA, "status": record["status"], "exit": int(status), **record})
 
 
 def _record(result: CellCheck) -> dict[str, Any]:
@@ -83,22 +107,3 @@ def _start(robot: Robot) -> dict[str, float | None]:
         f"{joint.name}_{joint.display_unit.name}": number(joint.display_unit.scale * position)
         for joint, position in zip(robot.model.joints, robot.start, strict=True)
     }
-
-
-def _lines(record: dict[str, Any]) -> list[str]:
-    """The result as lines of text."""
-    from cellplan.report.record.tasks import direction_text
-    from cellplan.report.text.run import left_out_lines
-
-    lines = [f"{record['cell']}: {'passed' if record['status'] == 'passed' else 'failed'}"]
-    for robot, start in record["start"].items():
-        configuration = ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
-        lines.append(
-            f"  start of {robot} ({'searched' if robot in record['start_found'] else 'given'}): {configuration}"
-        )
-    lines += [f"  {record['start_choice']}"] if record["start_choice"] else []
-    for name, length in record["path_length_mm"].items():
-        lines.append(f"  task {name}: path of {length:.4g} mm, {direction_text(record['direction'][name])}")
-    lines += [f"  note: {remark}" for remark in record["remarks"]]
-    lines += [f"  {'' if each['passed'] else 'FAILED '}{each['message']}" for each in record["checks"]]
-    return lines + left_out_lines(record)

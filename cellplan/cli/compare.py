@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import cell_files
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.options import AllowDirs, AsJson, Quiet, Settings, TaskName
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
-from cellplan.cli.sweep import KeepRuns, Resume, TaskName, Workers
+from cellplan.cli.sweep import KeepRuns, Resume, Workers
 from cellplan.errors import ExitStatus
 
 SCHEMA = "cellplan.study/1"
@@ -21,6 +22,7 @@ Subjects = Annotated[
         metavar="CELL_OR_RUN",
         help="One cell file, to compare its modes; or several cell files and run folders.",
         show_default=False,
+        autocompletion=cell_files,
     ),
 ]
 Output = Annotated[
@@ -70,7 +72,7 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "study.html")}
         say_json({"schema": SCHEMA, "exit": int(status), **place, "study": record})
     else:
-        say("\n".join(comparison_lines(record, folder)))
+        show(comparison_lines(record, folder), passed=status == ExitStatus.PASSED)
     raise typer.Exit(status)
 
 

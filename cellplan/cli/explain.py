@@ -1,7 +1,7 @@
 """``cellplan explain``: structure of a cell: robots, joints, circuits, graph, matrix blocks, redundancy."""
 
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.errors import ExitStatus
 
 SCHEMA = "cellplan.explain/1"
@@ -25,4 +25,4 @@ def explain(cell: CellFile, settings: Settings = None, as_json: AsJson = False, 
     if as_json:
         say_json({"schema": SCHEMA, "status": "passed", "exit": int(ExitStatus.PASSED), **record})
     else:
-        say("\n".join(structure_lines(record)))
+        show(structure_lines(record))

@@ -5,14 +5,18 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import FORMATS, one_of
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 
 SCHEMA = "cellplan.exported/1"
 
-Format = Annotated[str, typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False)]
+Format = Annotated[
+    str,
+    typer.Option("--format", metavar="NAME", help="Format: csv.", show_default=False, autocompletion=one_of(FORMATS)),
+]
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
 ]
@@ -54,7 +58,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, **status, **about, "remarks": list(verified.remarks)})
         return
     lines = [f"{verified.cell.name}: exported", *(f"  note: {remark}" for remark in verified.remarks)]
-    say("\n".join([*lines, f"programs: {folder}"]))
+    show([*lines, f"programs: {folder}"], passed=True)
 
 
 def _require_choice(cell: Path | None, *, without_cell: bool) -> None:

@@ -7,8 +7,8 @@ import typer
 
 from cellplan.cli.fastest_free import read_words, search_free
 from cellplan.cli.layout import Budget, Distance, HowTimed, Margin, Resume, Seed, Trials
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Method, Mode, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Method, Mode, Quiet, Settings, TaskName
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -18,7 +18,6 @@ Output = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Write record, page, curve and a run folder per program."),
 ]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Work on this task only.")]
 Demand = Annotated[
     str | None,
     typer.Option("--demand", metavar="N/h", help="Parts per hour (or N/min): choose the calmest program for them."),
@@ -106,5 +105,5 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({**record, "exit": int(status), **where})
     else:
         written = [] if output is None else [f"report: {output / 'fastest.html'}", f"curve: {output / 'curve.csv'}"]
-        say("\n".join([*fastest_lines(record), *written]))
+        show([*fastest_lines(record), *written], passed=found.passed)
     raise typer.Exit(status)

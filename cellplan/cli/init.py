@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cellplan.cli.options import AsJson
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say, say_json, show
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def init(folder: Target = None, template: Named = None, show_list: Listed = Fals
         about = {"status": "written", "exit": int(ExitStatus.PASSED), "folder": str(folder), "template": chosen.name}
         say_json({"schema": SCHEMA, **about, "files": sorted(files), "next": _commands(folder), "page": _page(chosen)})
     else:
-        say("\n".join(_summary(folder, chosen, sorted(files, key=_rank))))
+        show(_summary(folder, chosen, sorted(files, key=_rank)))
 
 
 def _show_list(templates: tuple[Template, ...], *, as_json: bool) -> None:

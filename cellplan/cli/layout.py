@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import OBJECTIVES, TIMINGS, cell_files, one_of
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
 from cellplan.cli.output import json_failure, say
 
@@ -21,6 +22,7 @@ Goal = Annotated[
         metavar="NAME",
         help="conforming: the first layout that passes; cycle: the shortest cycle; clearance: the largest distances; "
         "change: the least change from the given layout. All but cycle are at the duration of the cell.",
+        autocompletion=one_of(OBJECTIVES),
     ),
 ]
 HowTimed = Annotated[
@@ -29,6 +31,7 @@ HowTimed = Annotated[
         "--timing",
         metavar="NAME",
         help="laws: by the time laws of the cell; retimed: as fast as the limits allow everywhere.",
+        autocompletion=one_of(TIMINGS),
     ),
 ]
 Duration = Annotated[
@@ -68,7 +71,11 @@ Fix = Annotated[
 Attempts = Annotated[
     list[Path] | None,
     typer.Option(
-        "--try", metavar="CELL2", help="A cell file whose layout is tried too; may be repeated.", show_default=False
+        "--try",
+        metavar="CELL2",
+        help="A cell file whose layout is tried too; may be repeated.",
+        show_default=False,
+        autocompletion=cell_files,
     ),
 ]
 Budget = Annotated[

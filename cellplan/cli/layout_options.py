@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.output import say, say_json
+from cellplan.cli.output import say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 from cellplan.guard import processors
@@ -125,7 +125,7 @@ def search_and_say(
         place = {"folder": str(folder), "report_path": str(folder / "study.html")}
         say_json({"schema": record["schema"], "exit": int(outcome), **place, "study": record})
     else:
-        say("\n".join(layout_lines(record, folder)))
+        show(layout_lines(record, folder), passed=outcome == ExitStatus.PASSED)
     raise typer.Exit(outcome)
 
 

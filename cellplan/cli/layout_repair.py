@@ -5,7 +5,7 @@ from typing import Final, NoReturn
 
 import typer
 
-from cellplan.cli.output import say, say_json
+from cellplan.cli.output import say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 from cellplan.guard import processors
@@ -47,5 +47,5 @@ def run_repair(
         place = {"folder": str(folder), "report_path": str(folder / "advice.html")}
         say_json({"schema": SCHEMA, "exit": int(status), **place, "advice": record})
     else:
-        say("\n".join(advice_lines(record, folder, request.cell)))
+        show(advice_lines(record, folder, request.cell), passed=status == ExitStatus.PASSED)
     raise typer.Exit(status)

@@ -3,15 +3,17 @@
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Final, NoReturn
 
 import typer
+from typer.completion import get_completion_inspect_parameters
 
 import cellplan
 from cellplan.cli.base_map import base_map
 from cellplan.cli.check import check
 from cellplan.cli.compare import compare
+from cellplan.cli.completion import Install, Show
 from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
@@ -19,11 +21,13 @@ from cellplan.cli.fastest import fastest
 from cellplan.cli.init import init
 from cellplan.cli.layout import layout
 from cellplan.cli.output import say
+from cellplan.cli.overview import FIRST_STEPS, WIDEST, Overview, examples
 from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
 from cellplan.cli.solve import solve
 from cellplan.cli.sweep import sweep
+from cellplan.cli.verbosity import with_verbosity
 from cellplan.cli.verify import verify
 from cellplan.cli.view import view
 from cellplan.errors import ExitStatus
@@ -34,12 +38,18 @@ INTERRUPTIONS: Final = [
 REPEAT_DELAY_S: Final = 0.02  # [s] delay after which the callback that lost the interruption has ended
 
 app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
+    cls=Overview,
+    add_completion=False,  # with options of its own, which name the shell
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDEST},
 )
+COMMANDS: Final[dict[str, dict[str, Callable[..., None]]]] = {
+    "Begin": {"init": init, "robots": robots, "check": check, "explain": explain, "schema": schema},
+    "Solve": {"solve": solve, "view": view, "verify": verify, "export": export},
+    "Improve": {"layout": layout, "map": base_map, "fastest": fastest, "sweep": sweep, "compare": compare},
+    "Real cell": {"rehearse": rehearse},
+}  # by group, in the order of work
 
 
 def _show_version(desired: bool) -> None:
@@ -48,37 +58,36 @@ def _show_version(desired: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(invoke_without_command=True)
 def program(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    install_completion: Install = None,
+    show_completion: Show = None,
 ) -> None:
     """Offline programming for cooperative robots that work on one moving part."""
+    del version, install_completion, show_completion  # their callbacks have ended the program
+    if context.invoked_subcommand is None:
+        say(FIRST_STEPS)
+        raise typer.Exit(ExitStatus.BAD_INPUT)
 
 
-app.command()(init)
-app.command()(check)
-app.command()(explain)
-app.command()(solve)
-app.command()(verify)
-app.command()(view)
-app.command()(export)
-app.command()(sweep)
-app.command()(compare)
-app.command()(fastest)
-app.command("map")(base_map)
-app.command()(layout)
-app.command()(rehearse)
-app.command()(robots)
-app.command()(schema)
+for group, commands in COMMANDS.items():
+    for name, command in commands.items():
+        app.command(name, rich_help_panel=group, epilog=examples(name))(with_verbosity(command))
+get_completion_inspect_parameters()  # prepares the shells
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status; no exception leaves, no traceback is shown."""
     try:
         outcome = app(args=arguments, prog_name="cellplan", standalone_mode=False)
-    except SystemExit:  # what remains of a closed pipe below the help texts of typer
+    except SystemExit as end:
+        if end.code in (0, None):  # completion was shown or installed
+            return ExitStatus.PASSED
+        # what remains of a closed pipe below the help texts of typer
         return report_failure(OutputError("standard output: the result was not shown: broken pipe"))
     except typer.Abort:
         return report_failure(KeyboardInterrupt())

@@ -5,12 +5,21 @@ from typing import Annotated
 
 import typer
 
-CellFile = Annotated[Path, typer.Argument(metavar="CELL", help="Cell file (YAML).", show_default=False)]
-RunDir = Annotated[Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False)]
+from cellplan.cli.completion import INTEGRATORS, METHODS, MODES, cell_files, one_of, run_folders, task_names
+
+CellFile = Annotated[
+    Path, typer.Argument(metavar="CELL", help="Cell file (YAML).", show_default=False, autocompletion=cell_files)
+]
+RunDir = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Run folder.", show_default=False, autocompletion=run_folders)
+]
 OriginalCell = Annotated[
     Path | None,
     typer.Option(
-        "--cell", metavar="CELL", help="The cell file that was solved: it and its files are compared with the run."
+        "--cell",
+        metavar="CELL",
+        help="The cell file that was solved: it and its files are compared with the run.",
+        autocompletion=cell_files,
     ),
 ]
 AllowDirs = Annotated[
@@ -27,7 +36,10 @@ AllowDirs = Annotated[
 Mode = Annotated[
     str | None,
     typer.Option(
-        "--mode", metavar="MODE", help="Which robots move: simultaneous, pairwise, part_at_rest or semi_coordinated."
+        "--mode",
+        metavar="MODE",
+        help="Which robots move: simultaneous, pairwise, part_at_rest or semi_coordinated.",
+        autocompletion=one_of(MODES),
     ),
 ]
 Method = Annotated[
@@ -37,11 +49,17 @@ Method = Annotated[
         metavar="NAME",
         help="Resolution method: weighted_pseudo_inverse, damped_least_squares, jacobian_transpose, filtered_inverse, "
         "filtered_inverse_ii, heuristic_search, recursive_search or quadratic_program.",
+        autocompletion=one_of(METHODS),
     ),
 ]
 Integrator = Annotated[
     str | None,
-    typer.Option("--integrator", metavar="NAME", help="Integration of joint velocities: auto, accurate or euler."),
+    typer.Option(
+        "--integrator",
+        metavar="NAME",
+        help="Integration of joint velocities: auto, accurate or euler.",
+        autocompletion=one_of(INTEGRATORS),
+    ),
 ]
 Duration = Annotated[float | None, typer.Option("--duration", metavar="S", help="Duration of the motion in seconds.")]
 Clearance = Annotated[
@@ -58,3 +76,10 @@ Settings = Annotated[
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
+Watch = Annotated[
+    bool, typer.Option("--watch", help="Do it again whenever the cell or a file that it names is saved; Ctrl-C ends.")
+]
+TaskName = Annotated[
+    str | None,
+    typer.Option("--task", metavar="NAME", help="Plan this task only.", autocompletion=task_names),
+]

@@ -3,10 +3,47 @@
 import contextlib
 import json
 import os
+import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 from cellplan.cli.errors import OutputError, error_lines, exit_status
+from cellplan.cli.terminal import is_terminal, screen_text
+from cellplan.errors import ExitStatus
+
+
+class Result(NamedTuple):
+    """What came of a command.
+
+    Attributes:
+        status: Exit status of the program.
+        lines: For people: the verdict, and what stands below it.
+        record: For machines.
+        folder: The run folder that was written; None if there is none.
+    """
+
+    status: ExitStatus
+    lines: Sequence[str]
+    record: Mapping[str, object]
+    folder: Path | None = None
+
+
+def show(lines: Sequence[str], *, passed: bool | None = None) -> None:
+    """Show a result to a person: styled and wrapped on a terminal, the same lines as they are elsewhere.
+
+    Args:
+        lines: The verdict, and what stands below it.
+        passed: The verdict; None for a result that neither passes nor fails.
+
+    Raises:
+        OutputError: Standard output is closed or cannot take the text.
+    """
+    if is_terminal():
+        say(screen_text(lines, passed=passed, width=shutil.get_terminal_size().columns))
+    else:
+        say("\n".join(lines))
 
 
 def say(text: str) -> None:
@@ -28,9 +65,17 @@ def say(text: str) -> None:
         raise OutputError(f"standard output: the result was not shown: {why.lower()}") from error
 
 
-def say_json(value: Mapping[str, object]) -> None:
+def say_json(value: Mapping[str, object], *, on_one_line: bool = False) -> None:
     """Write one JSON object to standard output; figures that are not finite are refused, for JSON has none."""
-    say(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    say(json.dumps(value, indent=None if on_one_line else 2, ensure_ascii=False, allow_nan=False))
+
+
+def present(result: Result, *, as_json: bool, on_one_line: bool = False) -> None:
+    """Show a result to a person, or give it to a machine, which may want it on one line."""
+    if as_json:
+        say_json(result.record, on_one_line=on_one_line)
+    else:
+        show(result.lines, passed=result.status == ExitStatus.PASSED)
 
 
 @contextlib.contextmanager

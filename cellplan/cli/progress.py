@@ -1,12 +1,14 @@
 """Progress of long commands on the error stream: a bar on a terminal, occasional lines elsewhere, nothing if quiet."""
 
 import contextlib
+import logging
 import os
 import sys
 import time
 from collections.abc import Callable, Iterator
 
 from cellplan.cli.errors import tell
+from cellplan.cli.verbosity import STAGES, StageTimes
 
 LINE_EVERY_S = 10.0  # [s] between two lines of a log
 
@@ -15,8 +17,16 @@ Listener = Callable[[str, float], None]
 
 @contextlib.contextmanager
 def progress_listener(*, quiet: bool) -> Iterator[Listener]:
-    """A callback for the progress of stages, valid within the ``with`` statement."""
-    if quiet:
+    """A callback for the progress of stages, valid within the ``with`` statement; times of stages if they are desired.
+
+    Args:
+        quiet: Whether no progress is shown.
+    """
+    if STAGES.isEnabledFor(logging.INFO):
+        times = StageTimes()
+        yield lambda stage, _share: times.at(stage)
+        times.end()
+    elif quiet:
         yield lambda _stage, _share: None
     elif _is_screen():
         with _bar() as listener:

@@ -5,15 +5,23 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import cell_files
 from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
 SCHEMA = "cellplan.rehearse/1"
 
 ErrorsFile = Annotated[
-    Path, typer.Option("--errors", metavar="FILE", help="Errors of the real cell (YAML).", show_default=False)
+    Path,
+    typer.Option(
+        "--errors",
+        metavar="FILE",
+        help="Errors of the real cell (YAML).",
+        show_default=False,
+        autocompletion=cell_files,
+    ),
 ]
 Feedback = Annotated[
     bool, typer.Option("--feedback", help="Correct the references from pass to pass until the true error converges.")
@@ -73,5 +81,5 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}
         say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "rehearsal": record})
     else:
-        say("\n".join(summary_lines(record, folder)))
+        show(summary_lines(record, folder), passed=rehearsal.passed)
     raise typer.Exit(status)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cellplan.cli.completion import robot_models
 from cellplan.cli.options import AsJson
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say, say_json, show
 
 if TYPE_CHECKING:
     from cellplan.model.robot import RobotModel
@@ -19,7 +20,10 @@ SCHEMA = "cellplan.robots/1"
 Model = Annotated[
     str | None,
     typer.Argument(
-        metavar="MODEL", help="URDF, xacro file, joint-axis table or bundled robot to describe.", show_default=False
+        metavar="MODEL",
+        help="URDF, xacro file, joint-axis table or bundled robot to describe.",
+        show_default=False,
+        autocompletion=robot_models,
     ),
 ]
 PackageDirs = Annotated[
@@ -65,11 +69,14 @@ def robots(
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
     elif model is None:
-        say("\n\n".join("\n".join(_lines(record)) for record in records))
+        for number, record in enumerate(records):
+            if number:
+                say("")
+            show(_lines(record))
     else:
         from cellplan.report.text.robot_description import description_lines
 
-        say("\n".join(description_lines(records[0])))
+        show(description_lines(records[0]))
 
 
 def _listed() -> list[dict[str, Any]]:

@@ -1,7 +1,10 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -16,12 +19,15 @@ from cellplan.cli.options import (
     Mode,
     Quiet,
     Settings,
+    TaskName,
+    Watch,
 )
-from cellplan.cli.output import json_failure, say, say_json
-from cellplan.cli.progress import progress_listener
+from cellplan.cli.output import Result, json_failure, present
+from cellplan.cli.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
+    from cellplan.model.cell import Cell
     from cellplan.pipeline.background_plots import BackgroundPlots
     from cellplan.pipeline.solution import Solution
     from cellplan.report.record.common import Record
@@ -31,7 +37,6 @@ SCHEMA = "cellplan.solve/1"
 Output = Annotated[
     Path | None, typer.Option("-o", "--output", metavar="DIR", help="Run folder (default: outputs/<cell name>).")
 ]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
 ]
@@ -55,63 +60,117 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
     with_view: WithView = False,
+    watch: Watch = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
     """Plan, check, and write joint tables, report and plots.
 
     The tables are written only when every check passes. Exit status: 0 passed, 1 a check failed, 2 bad input,
-    3 no solution, 4 internal error.
+    3 no solution, 4 internal error, 130 interrupted.
     """
+    overrides = {
+        "mode": mode,
+        "method": method,
+        "integrator": integrator,
+        "duration": duration,
+        "clearance_mm": clearance_mm,
+    }
+    request = _Request(
+        cell=cell,
+        output=output,
+        settings=tuple(settings or ()),
+        overrides=overrides,
+        task=task,
+        keep_rejected=keep_rejected,
+        with_view=with_view,
+        allow_dirs=tuple(allow_dir or ()),
+    )
+    if watch:
+        _watch(request, as_json=as_json, quiet=quiet)
+    with json_failure(SCHEMA, desired=as_json), progress_listener(quiet=quiet) as progress:
+        result = _solved(request, lambda _: None, progress)
+    present(result, as_json=as_json)
+    raise typer.Exit(result.status)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Request:
+    """What is to be solved and written, as the options say."""
+
+    cell: Path
+    output: Path | None
+    settings: tuple[str, ...]
+    overrides: Mapping[str, str | float | None]
+    task: str | None
+    keep_rejected: bool
+    with_view: bool
+    allow_dirs: tuple[Path, ...]
+
+
+def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
+    """Solve and write; ``follow`` is called with the cell as soon as it is read."""
     from cellplan.guard import BackgroundProcess
 
-    with json_failure(SCHEMA, desired=as_json), BackgroundProcess() as background:
+    with BackgroundProcess() as background:
         from cellplan.pipeline.background_plots import BackgroundPlots
 
         plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
-        from cellplan.cli.repair_line import repair_lines
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
         from cellplan.pipeline.solve import solve_with_plots
-        from cellplan.report.text.run import summary_lines
 
-        given = load_cell(cell, allow_dirs=allow_dir or ())
-        changed = with_overrides(
-            given,
-            settings or (),
-            mode=mode,
-            method=method,
-            integrator=integrator,
-            duration=duration,
-            clearance_mm=clearance_mm,
-        )
-        require_task(changed, task)
-        folder = output or Path("outputs") / changed.name
+        given = load_cell(request.cell, allow_dirs=request.allow_dirs)
+        follow(given)
+        changed = with_overrides(given, request.settings, **request.overrides)
+        require_task(changed, request.task)
+        folder = request.output or Path("outputs") / changed.name
         refuse_unless_replaceable(folder)
-        with progress_listener(quiet=quiet) as progress:
-            solution = solve_with_plots(changed, plots, task=task, progress=progress)
-            record = _written(solution, folder, keep_rejected, plots, with_view)
+        solution = solve_with_plots(changed, plots, task=request.task, progress=progress)
+        record = _written(solution, folder, request, plots)
+    return _result(request, changed, solution, record, folder)
+
+
+def _result(request: _Request, changed: "Cell", solution: "Solution", record: "Record", folder: Path) -> Result:
+    """What to say of a solution that was written."""
+    from cellplan.cli.next_steps import after_solve, view_line
+    from cellplan.cli.verbosity import log_effort
+    from cellplan.report.text.run import summary_lines
+
+    log_effort(record)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
-    if as_json:
-        place = {"folder": str(folder), "report_path": str(folder / "report.html")}
-        say_json({"schema": SCHEMA, "status": record["status"], "exit": int(status), **place, "report": record})
-    else:
-        further = [] if solution.passed or task is not None else repair_lines(cell, changed, allow_dir or ())
-        page = [f"3-D page: {folder / 'view.html'}"] if with_view else []
-        say("\n".join([*summary_lines(record, folder), *page, *further]))
-        if solution.remark:
-            say(solution.remark)
-    raise typer.Exit(status)
+    lines = summary_lines(record, folder)
+    lines += [f"3-D page: {folder / 'view.html'}"] if request.with_view else []
+    lines += [] if request.with_view else [view_line(folder, request.cell, request.allow_dirs)]
+    if request.task is None:
+        failed = [check["name"] for check in record["checks"] if not check["passed"]]
+        lines += after_solve(request.cell, changed, failed, run=folder, allow_dirs=request.allow_dirs)
+    lines += [solution.remark] if solution.remark else []
+    place = {"folder": str(folder), "report_path": str(folder / "report.html")}
+    about = {"schema": SCHEMA, "status": record["status"], "exit": int(status), **place}
+    return Result(status, lines, {**about, "report": record}, folder)
 
 
-def _written(solution: "Solution", folder: Path, keep_rejected: bool, plots: "BackgroundPlots", view: bool) -> "Record":
+def _written(solution: "Solution", folder: Path, request: _Request, plots: "BackgroundPlots") -> "Record":
     """Write a run folder, with its 3-D page where that is desired."""
     from cellplan.pipeline.write_run import write_run
 
-    record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots, view=view)
-    if view:
+    record = write_run(solution, folder, keep_rejected=request.keep_rejected, plots=plots, view=request.with_view)
+    if request.with_view:
         from cellplan.pipeline.view.write import write_view_of_run
 
         write_view_of_run(folder, solution.cell)
     return record
+
+
+def _watch(request: _Request, *, as_json: bool, quiet: bool) -> NoReturn:
+    """Solve again and again, beside a page that shows the latest result."""
+    from cellplan.cli.watch import watch
+    from cellplan.cli.watch_page import WatchPage
+
+    run = request.output or Path("outputs") / request.cell.stem
+    pages = [("report", "report.html"), *([("3-D page", "view.html")] if request.with_view else [])]
+    watch(
+        partial(_solved, request), request.cell, schema=SCHEMA, as_json=as_json, quiet=quiet, page=WatchPage(run, pages)
+    )

@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings, TaskName
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -32,7 +32,6 @@ Workers = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")]
 KeepRuns = Annotated[bool, typer.Option("--keep-runs", help="Keep the run folder of every variant below runs/.")]
-TaskName = Annotated[str | None, typer.Option("--task", metavar="NAME", help="Plan this task only.")]
 
 
 def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
@@ -83,5 +82,5 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
         place = {"folder": str(folder), "report_path": str(folder / "study.html")}
         say_json({"schema": SCHEMA, "exit": int(status), **place, "study": record})
     else:
-        say("\n".join(study_lines(record, folder)))
+        show(study_lines(record, folder), passed=status == ExitStatus.PASSED)
     raise typer.Exit(status)

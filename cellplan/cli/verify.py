@@ -3,8 +3,9 @@
 import typer
 
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
+from cellplan.cli.verbosity import log_effort
 from cellplan.errors import ExitStatus, NotVerifiedError
 
 SCHEMA = "cellplan.verify/1"
@@ -23,7 +24,8 @@ def verify(
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.gate.open_gate import open_gate
-        from cellplan.report.text.run import figure_lines, read_record
+        from cellplan.report.text.failures import count_text
+        from cellplan.report.text.run import figure_lines, motion_text, read_record
 
         try:
             with progress_listener(quiet=quiet) as progress:
@@ -35,6 +37,7 @@ def verify(
             say_json({**failure, "errors": error.findings})
             raise typer.Exit(error.status) from None
         record = read_record(run)
+        log_effort(record)
     if as_json:
         about = {"folder": str(run), "cell": verified.cell.name, "run": verified.digest, "files": verified.file_count}
         compared = {"inputs": list(verified.inputs_compared), "remarks": list(verified.remarks)}
@@ -46,6 +49,7 @@ def verify(
         f"  unchanged files: {verified.file_count}",
         f"  unchanged inputs: {', '.join(verified.inputs_compared) or 'none compared'}",
         *(f"  note: {remark}" for remark in verified.remarks),
-        *figure_lines(record),
+        f"  {count_text(record['checks'])}; {motion_text(record)}",
+        *figure_lines(record, "the report"),
     ]
-    say("\n".join(lines))
+    show(lines, passed=True)

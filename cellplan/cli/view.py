@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from cellplan.cli.completion import cell_files
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, Settings
-from cellplan.cli.output import json_failure, say, say_json
+from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
@@ -14,7 +15,9 @@ SCHEMA = "cellplan.view/1"
 
 Shown = Annotated[
     Path,
-    typer.Argument(metavar="RUN|CELL|STUDY", help="Run folder, cell file, or study of cellplan layout."),
+    typer.Argument(
+        metavar="RUN|CELL|STUDY", help="Run folder, cell file, or study of cellplan layout.", autocompletion=cell_files
+    ),
 ]
 Output = Annotated[
     Path | None,
@@ -57,4 +60,4 @@ def view(  # noqa: PLR0913, PLR0917 - the options of the command
         say_json({"schema": SCHEMA, "status": "written", "exit": int(ExitStatus.PASSED), **about, "failures": failures})
         return
     shown = [f"  shows: {failure}" for failure in failures] if record["kind"] != "study" else []
-    say("\n".join([f"{record['cell']}: {target} ({size / 1e6:.1f} MB)", *shown, f"open {target} in a browser"]))
+    show([f"{record['cell']}: {target} ({size / 1e6:.1f} MB)", *shown, f"open {target} in a browser"])

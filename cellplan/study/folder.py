@@ -84,7 +84,7 @@ def write_whole(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         draft.replace(path)
-    except OSError:
+    except (OSError, KeyboardInterrupt):
         draft.unlink(missing_ok=True)
         raise
 

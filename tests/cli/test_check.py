@@ -19,8 +19,10 @@ def test_a_sound_cell_is_reported_with_postures_and_paths_and_nothing_is_written
     lines = capsys.readouterr().out.splitlines()
     assert status == 0
     assert lines[0] == "four-robots: passed"
-    assert "  start of reis (given): A1_deg 0, B1_deg -93, C1_deg 108, D1_deg 0, E1_deg -15, F1_deg 0" in lines
-    assert any(line.startswith("  task rectangle: path of ") for line in lines)
+    reis = next(line for line in lines if line.startswith("  start of reis "))
+    assert reis.split(maxsplit=4)[3:] == ["given", "A1_deg 0, B1_deg -93, C1_deg 108, D1_deg 0, E1_deg -15, F1_deg 0"]
+    assert any(line.startswith("  task rectangle ") and " 1224 mm " in line for line in lines)
+    assert lines[-1] == f"next: cellplan solve {cells / 'four_robots.yaml'}"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 from pathlib import Path
 
 import pytest
@@ -43,7 +44,12 @@ def test_a_sound_cell_is_reported_and_written(
     assert (status, err) == (0, "")
     lines = out.splitlines()
     assert lines[0] == "four-robots: passed"
-    assert lines[-2:] == [f"report: {folder / 'report.html'}", f"tables: {folder / 'tables'}"]
+    assert lines[-4:] == [
+        f"report: {folder / 'report.html'}",
+        f"tables: {folder / 'tables'}",
+        f"next: cellplan view {folder}",
+        f"next: cellplan export {folder} --format csv --cell {coarse_cell}",
+    ]
     assert sorted(path.name for path in (folder / "tables").iterdir()) == [
         "abb.csv",
         "clock.csv",
@@ -203,3 +209,20 @@ def test_findings_about_a_cell_come_all_at_once_each_with_its_line(
     assert any("did you mean 'model'?" in line for line in lines)
     reported = json.loads(out)
     assert (reported["status"], reported["exit"], reported["errors"]) == ("error", 2, lines)
+
+
+def test_the_lines_to_type_next_do_what_they_say(
+    hasty_pair: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["solve", "hasty.yaml", "--set", "motion.duration_s=3.5", "-q"]) == 0
+    told = capsys.readouterr().out
+    assert run(["solve", "hasty.yaml", "--duration", "0.4", "--set", "motion.step_s=0.0005", "-o", "fast", "-q"]) == 1
+    told += capsys.readouterr().out
+
+    steps = [line.removeprefix("next: cellplan ") for line in told.splitlines() if line.startswith("next: ")]
+
+    assert [step.split()[0] for step in steps] == ["view", "export", "view", "fastest", "layout"]
+    for step in steps[:3]:
+        assert run([*shlex.split(step), "-q"]) == 0, step
+    assert steps[3] == "fastest hasty.yaml --set motion.duration_s=0.4 --set motion.step_s=0.0005"

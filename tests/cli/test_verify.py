@@ -28,7 +28,7 @@ def test_a_sound_run_is_reported_with_its_figures(copy: Copy, capsys: pytest.Cap
     assert lines[0] == "small-pair: verified"
     assert lines[1] == f"  unchanged files: {sum(path.is_file() for path in copy.run.rglob('*')) - 1}"
     assert lines[2].endswith("robots/left.yaml, robots/right.urdf, small.yaml")
-    assert any(line.startswith("  task path (right): largest error ") for line in lines)
+    assert any(line.startswith("  largest tool error ") and line.endswith(" task path (right)") for line in lines)
 
 
 def test_a_machine_gets_one_object(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:

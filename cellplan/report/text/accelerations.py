@@ -1,21 +1,30 @@
 """Accelerations as text: the joint closest to its limit, jerk, tool and part, and what was not judged."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from cellplan.report.record.common import Record
+from cellplan.report.text.columns import Row
 
 
-def acceleration_lines(record: Record) -> Iterator[str]:
-    """Lines about the accelerations of a run; none for a record without them."""
+def acceleration_rows(record: Record) -> Iterator[Row]:
+    """Rows about the accelerations of a run; none for a record without them."""
     accelerations = record.get("accelerations")
-    if accelerations is None:
-        return
-    yield from _joint_lines(record["joints"])
-    yield from _world_lines(accelerations)
-    yield from _not_judged_lines(accelerations["not_judged"])
+    if accelerations is not None:
+        yield from _joint_rows(record["joints"])
+        yield from _world_rows(accelerations)
 
 
-def _joint_lines(joints: Record) -> Iterator[str]:
+def not_judged_lines(record: Record) -> Iterator[str]:
+    """One line for each quantity that was not judged, with its robots and the reason."""
+    robots: dict[tuple[str, str], list[str]] = {}
+    for left in (record.get("accelerations") or {"not_judged": []})["not_judged"]:
+        robots.setdefault((left["what"], left["reason"]), []).extend([left["robot"]] if left["robot"] else [])
+    for (what, reason), names in robots.items():
+        of = f" of {', '.join(names)}" if names else ""
+        yield f"  not judged: {what}{of} ({reason})"
+
+
+def _joint_rows(joints: Record) -> Iterator[Row]:
     """The joint with the largest fraction of its limit, or else the largest acceleration; the largest jerk."""
     uses = [(f"{robot} {name}", use) for robot, named in joints.items() for name, use in named.items()]
     known = [each for each in uses if each[1].get("peak_acceleration") is not None]
@@ -24,38 +33,26 @@ def _joint_lines(joints: Record) -> Iterator[str]:
         joint, use = max(limited, key=lambda each: float(each[1]["acceleration_ratio"]))
         source = "assumed" if use["acceleration_limit_source"] == "assumed" else "stated"
         figure = f"{100.0 * use['acceleration_ratio']:.4g} % of its {source} limit"
-        yield f"  largest joint acceleration {figure}: {joint} at {use['peak_acceleration_at_s']:.3f} s"
+        yield "largest joint acceleration", figure, f"{joint} at {use['peak_acceleration_at_s']:.3f} s"
     elif known:
         joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_acceleration"]))
         figure = f"{use['peak_acceleration']:.4g} {use['unit']}/s2, not limited"
-        yield f"  largest joint acceleration {figure}: {joint} at {use['peak_acceleration_at_s']:.3f} s"
+        yield "largest joint acceleration", figure, f"{joint} at {use['peak_acceleration_at_s']:.3f} s"
     if known:
         joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_jerk"]))
         figure = f"{use['peak_jerk']:.4g} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
-        yield f"  largest joint jerk {figure}: {joint} at {use['peak_jerk_at_s']:.3f} s"
+        yield "largest joint jerk", figure, f"{joint} at {use['peak_jerk_at_s']:.3f} s"
 
 
-def _world_lines(accelerations: Record) -> Iterator[str]:
+def _world_rows(accelerations: Record) -> Iterator[Row]:
     """The tool tip and the part with the largest acceleration."""
-    texts = []
     if accelerations["tools"]:
         robot, tool = max(accelerations["tools"].items(), key=lambda it: it[1]["peak_acceleration_m_s2"])
-        texts.append(f"of a tool tip {_figure(tool)} ({robot})")
+        yield "largest tool acceleration", *_figure(tool, f"tool tip of {robot}")
     if accelerations["part"] is not None:
-        texts.append(f"of the part {_figure(accelerations['part']['corner'])}")
-    if texts:
-        yield f"  largest acceleration {', '.join(texts)}"
+        yield "largest part acceleration", *_figure(accelerations["part"]["corner"], "part")
 
 
-def _not_judged_lines(entries: Iterable[Record]) -> Iterator[str]:
-    """One line for each quantity that was not judged, with its robots and the reason."""
-    robots: dict[tuple[str, str], list[str]] = {}
-    for left in entries:
-        robots.setdefault((left["what"], left["reason"]), []).extend([left["robot"]] if left["robot"] else [])
-    for (what, reason), names in robots.items():
-        of = f" of {', '.join(names)}" if names else ""
-        yield f"  not judged: {what}{of} ({reason})"
-
-
-def _figure(point: Record) -> str:
-    return f"{point['peak_acceleration_m_s2']:.3g} m/s2 at {point['peak_acceleration_at_s']:.3f} s"
+def _figure(point: Record, what: str) -> tuple[str, str]:
+    """Figure of a point, and when it is reached."""
+    return f"{point['peak_acceleration_m_s2']:.3g} m/s2", f"{what} at {point['peak_acceleration_at_s']:.3f} s"

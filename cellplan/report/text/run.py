@@ -1,19 +1,17 @@
-"""A run as text: verdict, cycle time, worst values, failed checks, and location of the report."""
+"""A run as text: verdict, failed checks, worst figures in columns, what was not judged, location of the report."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
+from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.report.record.common import Record
-from cellplan.report.text.accelerations import acceleration_lines
+from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
+from cellplan.report.text.columns import Row, aligned
+from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import DEFAULT_METHOD
-from cellplan.report.text.notes import (
-    accuracy_note,
-    clock_note,
-    grip_notes,
-    left_out_notes,
-    open_surface_notes,
-)
+from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
 
 
 def read_record(folder: Path) -> Record:
@@ -26,38 +24,66 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
     """All lines about one run folder."""
     return [
         f"{record['cell']}: {record['status']}",
-        *figure_lines(record),
-        *_failure_lines(record["checks"]),
+        f"  {count_text(record['checks'])}; {motion_text(record)}",
+        *failure_lines(record["checks"], "the report"),
+        *figure_lines(record, "the report"),
         *(f"  {line}" for line in record.get("not_in_program", [])),
         *_place_lines(folder),
     ]
 
 
-def figure_lines(record: Record) -> list[str]:
-    """The worst values of a run."""
+def figure_lines(record: Record, more: str) -> list[str]:
+    """The worst values of a run, and what was not judged.
+
+    Args:
+        record: The report of the run.
+        more: Where the pairs stand that were not judged in full.
+    """
     return [
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_text(record)}{_method_text(record['solver'])}",
         *_program_lines(record),
-        *_task_lines(record["tasks"]),
-        *_closure_lines(record.get("closure", {})),
-        *_margin_lines(record["joints"]),
-        *_speed_lines(record["joints"]),
-        *acceleration_lines(record),
-        *_drift_lines(record.get("repeatability", {})),
-        *_clearance_lines(record["clearance"]["whole"]),
-        *_slack_lines(record["solver"]["slack"]),
+        *aligned(_rows(record)),
         *_fallback_lines(record["solver"]),
         *(f"  note: {line}" for line in record.get("remarks", [])),
         *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grip_notes(record)),
+        *not_judged_lines(record),
         *(f"  {line}" for line in record.get("rests_on", {}).get("lines", [])),
-        *left_out_lines(record),
+        *left_out_lines(record, more),
     ]
 
 
-def left_out_lines(record: Record) -> list[str]:
-    """One line for each kind of pairs that were not judged in full."""
-    return [f"  {line}" for line in left_out_notes(record)]
+def left_out_lines(record: Record, more: str) -> list[str]:
+    """How many pairs were not judged in full, by reason; nothing for a record without such a key.
+
+    Args:
+        record: A report.
+        more: Where these pairs and the reasons stand.
+    """
+    if "left_out" not in record:
+        return []
+    counts = Counter(str(each["kind"]) for each in record["left_out"])
+    if not counts:
+        return [f"  {NOTHING_LEFT_OUT}"]
+    kinds = ", ".join(f"{counts[kind]} {TITLES[kind]}" for kind in LeftOutKind if counts[kind])
+    total = counts.total()
+    return [f"  not checked in full: {total} {'pair' if total == 1 else 'pairs'} ({kinds}); all in {more}"]
+
+
+def motion_text(record: Record) -> str:
+    """Mode, duration and method."""
+    return f"mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_text(record)}{_method_text(record['solver'])}"
+
+
+def _rows(record: Record) -> Iterator[Row]:
+    """The worst values: distances, margins and speeds first, errors of the tools after them."""
+    yield from _clearance_rows(record["clearance"]["whole"])
+    yield from _margin_rows(record["joints"])
+    yield from _speed_rows(record["joints"])
+    yield from acceleration_rows(record)
+    yield from _task_rows(record["tasks"])
+    yield from _closure_rows(record.get("closure", {}))
+    yield from _drift_rows(record.get("repeatability", {}))
+    yield from _slack_rows(record["solver"]["slack"])
 
 
 def _clock_text(record: Record) -> str:
@@ -71,16 +97,20 @@ def _method_text(solver: Record) -> str:
     return "" if solver["method"] == DEFAULT_METHOD else f", method {solver['method']}"
 
 
-def _task_lines(tasks: Record) -> Iterator[str]:
+def _task_rows(tasks: Record) -> Iterator[Row]:
     for name, task in tasks.items():
-        position, orientation = _largest(task, "position_error", "mm"), _largest(task, "orientation_error", "deg")
-        yield f"  task {name} ({task['robot']}): largest error {_short(position)} mm, {_short(orientation)} deg"
+        yield "largest tool error", _error_text(task), f"task {name} ({task['robot']})"
 
 
-def _closure_lines(closures: Record) -> Iterator[str]:
+def _closure_rows(closures: Record) -> Iterator[Row]:
     for robot, closure in closures.items():
-        position, orientation = _largest(closure, "position_error", "mm"), _largest(closure, "orientation_error", "deg")
-        yield f"  grasp of {robot}: largest closure error {_short(position)} mm, {_short(orientation)} deg"
+        yield "largest closure error", _error_text(closure), f"grasp of {robot}"
+
+
+def _error_text(errors: Record) -> str:
+    """The largest error of position and of orientation."""
+    position, orientation = _largest(errors, "position_error", "mm"), _largest(errors, "orientation_error", "deg")
+    return f"{_short(position)} mm, {_short(orientation)} deg"
 
 
 def _largest(errors: Record, name: str, unit: str) -> float | None:
@@ -90,7 +120,7 @@ def _largest(errors: Record, name: str, unit: str) -> float | None:
     return at_rows if at_rows is None or between is None else max(at_rows, between)
 
 
-def _margin_lines(joints: Record) -> Iterator[str]:
+def _margin_rows(joints: Record) -> Iterator[Row]:
     """The joint with the smallest margin, in degrees and in millimetres."""
     for unit in ("deg", "mm"):
         bounded = [
@@ -101,10 +131,10 @@ def _margin_lines(joints: Record) -> Iterator[str]:
         ]
         if bounded:
             margin, joint, at_s = min(bounded)
-            yield f"  smallest joint margin {margin:.4g} {unit}: {joint}{_time(at_s)}"
+            yield "smallest joint margin", f"{margin:.4g} {unit}", f"{joint}{_time(at_s)}"
 
 
-def _speed_lines(joints: Record) -> Iterator[str]:
+def _speed_rows(joints: Record) -> Iterator[Row]:
     driven = [
         (use["velocity_ratio"], f"{robot} {joint}", use["peak_velocity_at_s"])
         for robot, uses in joints.items()
@@ -113,7 +143,7 @@ def _speed_lines(joints: Record) -> Iterator[str]:
     ]
     if driven:
         ratio, joint, at_s = max(driven)
-        yield f"  largest joint speed {100.0 * ratio:.4g} % of its limit: {joint}{_time(at_s)}"
+        yield "largest joint speed", f"{100.0 * ratio:.4g} % of its limit", f"{joint}{_time(at_s)}"
 
 
 def _program_lines(record: Record) -> Iterator[str]:
@@ -127,7 +157,7 @@ def _program_lines(record: Record) -> Iterator[str]:
         yield f"  {name}: {words}"
 
 
-def _drift_lines(repeatability: Record) -> Iterator[str]:
+def _drift_rows(repeatability: Record) -> Iterator[Row]:
     """The largest drift of a joint over a cycle; nothing if all joints return."""
     for name, found in repeatability.items():
         if found["closes"]:
@@ -138,24 +168,23 @@ def _drift_lines(repeatability: Record) -> Iterator[str]:
             if f"worst_drift_{unit}" in found:
                 where = of_cycles.format(found[cycle])
                 drift = found[f"worst_drift_{unit}"]
-                yield f"  joint drift {drift:.4g} {unit} in {where} of {subject}: {found[joint]}"
+                yield "largest joint drift", f"{drift:.4g} {unit}", f"{found[joint]} in {where} of {subject}"
 
 
-def _clearance_lines(whole: Record) -> Iterator[str]:
+def _clearance_rows(whole: Record) -> Iterator[Row]:
     if whole["minimum_mm"] is not None and whole["pair"]:
         first, second = whole["pair"]
         proof = "certified" if whole["certified"] else "not certified"
         least = "" if whole.get("exact", True) else "at least "
-        figure = f"{least}{whole['minimum_mm']:.4g} mm, {proof}"
         rests_on = accuracy_note(whole["pair"], whole.get("accuracies_mm"))
         where = f"{first} - {second}{_time(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
-        yield f"  smallest clearance {figure}: {where}"
+        yield "smallest clearance", f"{least}{whole['minimum_mm']:.4g} mm, {proof}", where
 
 
-def _slack_lines(slack: Record | None) -> Iterator[str]:
+def _slack_rows(slack: Record | None) -> Iterator[Row]:
     """The largest task slack."""
     if slack and slack["max"]:
-        yield f"  task slack up to {slack['max']:.2g} ({slack['unit']}){_time(slack['max_at_s'])}"
+        yield "largest task slack", f"{slack['max']:.2g}", f"{slack['unit']}{_time(slack['max_at_s'])}"
 
 
 def _fallback_lines(solver: Record) -> Iterator[str]:
@@ -165,13 +194,6 @@ def _fallback_lines(solver: Record) -> Iterator[str]:
         lost = resolution.get("lost")
         reason = f"; {lost['message']}" if lost else ""
         yield f"  collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps{reason}"
-
-
-def _failure_lines(checks: Iterable[Record]) -> Iterator[str]:
-    for check in checks:
-        if not check["passed"]:
-            run = f"{check['run']}: " if check.get("run") else ""
-            yield f"  FAILED {run}{check['message']}"
 
 
 def _place_lines(folder: Path) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cellplan.report.text.accelerations import acceleration_lines
+from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 
 
 def use(ratio: float | None, source: str = "assumed", *, peak: float = 100.0, jerk: float = 500.0) -> dict[str, Any]:
@@ -32,10 +32,11 @@ def record(**changes: Any) -> dict[str, Any]:
 
 
 def test_the_worst_joint_the_largest_jerk_tool_and_part_have_a_line_each() -> None:
-    assert list(acceleration_lines(record())) == [
-        "  largest joint acceleration 47.1 % of its stated limit: holder A2 at 1.250 s",
-        "  largest joint jerk 1234 deg/s3 over 4 ms: pen B1 at 0.750 s",
-        "  largest acceleration of a tool tip 2.35 m/s2 at 0.500 s (pen), of the part 57 m/s2 at 0.500 s",
+    assert list(acceleration_rows(record())) == [
+        ("largest joint acceleration", "47.1 % of its stated limit", "holder A2 at 1.250 s"),
+        ("largest joint jerk", "1234 deg/s3 over 4 ms", "pen B1 at 0.750 s"),
+        ("largest tool acceleration", "2.35 m/s2", "tool tip of pen at 0.500 s"),
+        ("largest part acceleration", "57 m/s2", "part at 0.500 s"),
     ]
 
 
@@ -43,7 +44,7 @@ def test_what_was_not_judged_is_reported_once_for_each_reason() -> None:
     left = [{"robot": name, "what": "accelerations and jerk", "reason": "a study"} for name in ("holder", "pen")]
     failing = {"robot": None, "what": "accelerations at 2.000 s, when pen/B1 fails", "reason": "it stops at once"}
 
-    assert list(acceleration_lines(record(not_judged=[*left, failing])))[3:] == [
+    assert list(not_judged_lines(record(not_judged=[*left, failing]))) == [
         "  not judged: accelerations and jerk of holder, pen (a study)",
         "  not judged: accelerations at 2.000 s, when pen/B1 fails (it stops at once)",
     ]
@@ -52,10 +53,10 @@ def test_what_was_not_judged_is_reported_once_for_each_reason() -> None:
 def test_joints_without_limits_are_shown_by_their_own_figure() -> None:
     joints = {"pen": {"B1": use(None, "unlimited", peak=321.0)}}
 
-    first = next(iter(acceleration_lines(record() | {"joints": joints})))
+    first = next(iter(acceleration_rows(record() | {"joints": joints})))
 
-    assert first == "  largest joint acceleration 321 deg/s2, not limited: pen B1 at 1.250 s"
+    assert first == ("largest joint acceleration", "321 deg/s2, not limited", "pen B1 at 1.250 s")
 
 
 def test_a_record_of_an_older_version_has_no_such_lines() -> None:
-    assert list(acceleration_lines({"joints": {}})) == []
+    assert [*acceleration_rows({"joints": {}}), *not_judged_lines({"joints": {}})] == []

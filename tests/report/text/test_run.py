@@ -35,16 +35,21 @@ def record() -> dict[str, Any]:
     }
 
 
+def words(lines: list[str]) -> list[str]:
+    """Lines without the width of their columns."""
+    return [" ".join(line.split()) for line in lines]
+
+
 def test_a_passed_run_is_reported_in_a_few_lines(record: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
 
     assert summary_lines(record, tmp_path) == [
         "pair: passed",
-        "  mode simultaneous, 4 s",
-        "  task ring (pen): largest error 0.0016 mm, 2e-05 deg",
-        "  smallest joint margin 37.25 deg: holder A2 at 1.500 s",
-        "  largest joint speed 35.1 % of its limit: pen B1 at 2.500 s",
-        "  smallest clearance 12.35 mm, certified: pen/tool - holder/A2 at 0.250 s",
+        "  1 check passed; mode simultaneous, 4 s",
+        "  smallest clearance     12.35 mm, certified   pen/tool - holder/A2 at 0.250 s",
+        "  smallest joint margin  37.25 deg             holder A2 at 1.500 s",
+        "  largest joint speed    35.1 % of its limit   pen B1 at 2.500 s",
+        "  largest tool error     0.0016 mm, 2e-05 deg  task ring (pen)",
         f"report: {tmp_path / 'report.html'}",
         f"tables: {tmp_path / 'tables'}",
     ]
@@ -55,8 +60,8 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_reported(record: di
 
     lines = summary_lines(record, tmp_path)
 
-    assert lines[1] == "  mode simultaneous, 4 s, method quadratic_program"
-    assert "  task slack up to 0.012 (m/s) at 1.500 s" in lines
+    assert lines[1] == "  1 check passed; mode simultaneous, 4 s, method quadratic_program"
+    assert "largest task slack 0.012 m/s at 1.500 s" in words(lines)
 
 
 def test_where_the_accurate_mode_gave_up_is_reported(record: dict[str, Any], tmp_path: Path) -> None:
@@ -79,17 +84,44 @@ def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[st
     record |= {
         "status": "failed",
         "checks": [
-            {"passed": False, "message": "first"},
-            {"passed": True, "message": "fine"},
-            {"passed": False, "message": "second", "run": "ring"},
+            {"name": "collision", "passed": False, "message": "first"},
+            {"name": "joint_position", "passed": False, "message": "second", "run": "ring"},
+            {"name": "collision", "passed": True, "message": "fine"},
+            {"name": "collision", "passed": False, "message": "third"},
         ],
     }
 
     lines = summary_lines(record, tmp_path)
 
-    assert lines[0] == "pair: failed"
-    assert [line for line in lines if "FAILED" in line] == ["  FAILED first", "  FAILED ring: second"]
+    assert lines[:7] == [
+        "pair: failed",
+        "  3 of 4 checks failed; mode simultaneous, 4 s",
+        "  collisions: 2 failed",
+        "    FAILED first",
+        "    FAILED third",
+        "  joint limits: 1 failed",
+        "    FAILED ring: second",
+    ]
     assert not any(line.startswith("tables:") for line in lines)
+
+
+def test_of_many_failed_checks_of_one_kind_the_first_are_shown(record: dict[str, Any], tmp_path: Path) -> None:
+    record["checks"] = [{"name": "joint_drift", "passed": False, "message": f"joint {x}"} for x in range(10)]
+
+    lines = summary_lines(record, tmp_path)
+
+    assert lines[2:4] == ["  joint drift: 10 failed", "    FAILED joint 0"]
+    assert lines[10:12] == ["    FAILED joint 7", "    and 2 more, all in the report"]
+
+
+def test_pairs_that_were_not_checked_in_full_are_counted_by_kind(record: dict[str, Any], tmp_path: Path) -> None:
+    grip = {"kind": "grip", "bodies": ["a/hand", "part"], "reason": "holds the part"}
+    record["left_out"] = [{**grip, "kind": "contact_only"}, grip, {**grip, "kind": "contact_only"}]
+    some = summary_lines(record, tmp_path)
+    record["left_out"] = []
+
+    assert "  not checked in full: 3 pairs (1 grip, 2 contact only); all in the report" in some
+    assert "  every pair was checked in full" in summary_lines(record, tmp_path)
 
 
 def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp_path: Path) -> None:
@@ -97,8 +129,8 @@ def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp
 
     lines = summary_lines(record, tmp_path)
 
-    assert "  smallest joint margin 37.25 deg: holder A2 at 1.500 s" in lines
-    assert "  smallest joint margin 500 mm: rail X at 1.500 s" in lines
+    assert "smallest joint margin 37.25 deg holder A2 at 1.500 s" in words(lines)
+    assert "smallest joint margin 500 mm rail X at 1.500 s" in words(lines)
 
 
 def test_the_tables_of_all_phases_lie_in_one_folder(record: dict[str, Any], tmp_path: Path) -> None:
@@ -136,6 +168,6 @@ def test_a_joint_that_does_not_come_back_is_named(record: dict[str, Any], tmp_pa
     record["repeatability"] = {"all": drifts | {"closes": True}}
     closing = summary_lines(record, tmp_path)
 
-    assert "  joint drift 0.5312 deg in cycle 7 of 25 of task ring: pen B2" in drifting
-    assert "  joint drift 1.25 mm in cycle 1 of 25 of task ring: rail X" in drifting
+    assert "largest joint drift 0.5312 deg pen B2 in cycle 7 of 25 of task ring" in words(drifting)
+    assert "largest joint drift 1.25 mm rail X in cycle 1 of 25 of task ring" in words(drifting)
     assert not any("drift" in line for line in closing)

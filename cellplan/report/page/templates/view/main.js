@@ -26,6 +26,7 @@ class App {
     });
     addEventListener("resize", () => this.refresh());
     addEventListener("hashchange", () => this.follow());
+    addEventListener("message", (event) => event.data === "cellplan:reload" && location.reload()); // of a watched cell
     this.setScene(0);
     if (record.kind !== "study" && !("t" in readAddress()) && this.stage.scene.failures.length) this.showFailure(0);
     this.follow();

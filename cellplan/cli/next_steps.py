@@ -1,0 +1,84 @@
+"""The lines to type next: what a passed cell or run is for, and what helps a failed one."""
+
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from cellplan.io.yaml.writer import flow_text
+from cellplan.model.cell import Cell
+from cellplan.pipeline.synchronous import is_searchable
+
+OPTIONS: Final = {"motion.duration_s": "--duration", "checks.clearance_mm": "--clearance"}  # of layout, by address
+OF_SPEED: Final = frozenset(
+    {"joint_velocity", "joint_acceleration", "joint_acceleration_assumed", "joint_acceleration_between_phases"}
+)  # checks that a longer cycle passes
+
+
+def after_check(cell: Path, checked: Cell, *, passed: bool, allow_dirs: Sequence[Path] = ()) -> list[str]:
+    """What to type after a check.
+
+    Args:
+        cell: The cell file, as the user named it.
+        checked: The cell with its changes.
+        passed: Whether it passed.
+        allow_dirs: Further folders that the files it names may lie in.
+    """
+    if passed:
+        return [_line("solve", str(cell), *_settings(checked.origin.changes), *_folders(allow_dirs))]
+    return list(_repair(cell, checked, allow_dirs))
+
+
+def after_solve(cell: Path, solved: Cell, failed: Iterable[str], *, run: Path, allow_dirs: Sequence[Path]) -> list[str]:
+    """What to type after a cell was solved.
+
+    Args:
+        cell: The cell file, as the user named it.
+        solved: The cell with its changes.
+        failed: Names of the failed checks.
+        run: The run folder.
+        allow_dirs: Further folders that the files it names may lie in.
+    """
+    names = set(failed)
+    if not names:
+        return [_line("export", str(run), "--format", "csv", "--cell", str(cell), *_folders(allow_dirs))]
+    lines = list(_repair(cell, solved, allow_dirs))
+    if names <= OF_SPEED:
+        lines.insert(0, _line("fastest", str(cell), *_settings(solved.origin.changes), *_folders(allow_dirs)))
+    return lines
+
+
+def view_line(run: Path, cell: Path, allow_dirs: Sequence[Path]) -> str:
+    """The line to type for the 3-D page of a run."""
+    named = ["--cell", str(cell), *_folders(allow_dirs)] if allow_dirs else []
+    return _line("view", str(run), *named)
+
+
+def _repair(cell: Path, failed: Cell, allow_dirs: Sequence[Path]) -> Iterator[str]:
+    """The line to type for a cell that fails; none for a job that cannot be searched."""
+    if is_searchable(failed):
+        words = []
+        for address, value in failed.origin.changes.items():
+            option = OPTIONS.get(address)
+            words += [option, _text(value)] if option else _settings({address: value})
+        yield _line("layout", str(cell), "--repair", *words, *_folders(allow_dirs))
+
+
+def _settings(changes: Mapping[str, object]) -> list[str]:
+    """Values that were set in the cell, as options."""
+    return [word for address, value in changes.items() for word in ("--set", f"{address}={_text(value)}")]
+
+
+def _folders(allow_dirs: Sequence[Path]) -> list[str]:
+    """Allowed folders as options."""
+    return [word for folder in allow_dirs for word in ("--allow-dir", str(folder))]
+
+
+def _text(value: object) -> str:
+    """A value as it is written on the command line."""
+    return "null" if value is None else flow_text(value)
+
+
+def _line(*words: str) -> str:
+    """A command to type."""
+    return f"next: {shlex.join(['cellplan', *words])}"

@@ -1,0 +1,60 @@
+"""The list of commands in the order of work, examples, and first steps."""
+
+from itertools import groupby
+from typing import Any, Final
+
+from typer.core import TyperGroup
+
+WIDEST: Final = 110  # [columns] of help; longer lines are hard to read
+FIRST_STEPS: Final = """\
+Usage: cellplan [OPTIONS] COMMAND [ARGS]...
+
+Offline programming for cooperative robots that work on one moving part.
+
+First steps:
+  cellplan init my-cell                        a commented cell to begin with
+  cellplan check my-cell/cell.yaml --watch     read it again on each save
+  cellplan solve my-cell/cell.yaml --view      plan, check, report and 3-D page
+
+cellplan --help lists all commands, cellplan COMMAND --help what one of them can do."""
+EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
+    "check": ("cellplan check cell.yaml --watch", "cellplan check cell.yaml --set robots.kuka.base.x_mm=900"),
+    "solve": (
+        "cellplan solve cell.yaml --view",
+        "cellplan solve cell.yaml --mode pairwise -o outputs/pairwise",
+        "cellplan solve cell.yaml --watch --view",
+    ),
+    "view": ("cellplan view outputs/cell", "cellplan view cell.yaml --set robots.kuka.base.x_mm=900"),
+    "verify": ("cellplan verify outputs/cell --cell cell.yaml",),
+    "export": ("cellplan export outputs/cell --format csv --cell cell.yaml",),
+    "layout": ("cellplan layout cell.yaml --repair", "cellplan layout cell.yaml --objective cycle --budget 5min"),
+    "map": ("cellplan map cell.yaml --robot kuka --grid 100 --certify 3",),
+    "fastest": ("cellplan fastest cell.yaml -o outputs/fastest", "cellplan fastest cell.yaml --demand 120/h"),
+    "sweep": ("cellplan sweep cell.yaml --vary motion.duration_s=3:6:0.5",),
+    "compare": ("cellplan compare cell.yaml", "cellplan compare outputs/one outputs/two"),
+    "rehearse": ("cellplan rehearse cell.yaml --errors errors.yaml --feedback",),
+    "robots": ("cellplan robots kuka_kr16_2", "cellplan robots arm.urdf --flange tool0"),
+}  # by command; each is understood
+
+
+class Overview(TyperGroup):
+    """All commands, listed in groups."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a list for each group, in the order in which the commands were added."""
+        commands = [(name, self.commands[name]) for name in self.list_commands(ctx)]
+        longest = max(len(name) for name, _ in commands)
+        for title, group in groupby(commands, key=lambda named: getattr(named[1], "rich_help_panel", "Commands")):
+            with formatter.section(title):
+                formatter.write_dl(
+                    [
+                        (name.ljust(longest), command.get_short_help_str(formatter.width - longest - 6))
+                        for name, command in group
+                    ]
+                )
+
+
+def examples(command: str) -> str | None:
+    """Examples at the end of the help of a command; None if it has none."""
+    lines = EXAMPLES.get(command)
+    return None if lines is None else "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])

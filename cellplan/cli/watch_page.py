@@ -1,0 +1,75 @@
+"""The page beside a run folder that shows its latest result while the cell is watched."""
+
+import contextlib
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from cellplan.errors import InputError
+from cellplan.report.page.watch import MARK, state_script, watch_page
+from cellplan.study.folder import write_whole
+
+MARK_WITHIN: Final = 400  # [bytes]
+
+
+class WatchPage:
+    """A page and its script; both go when watching ends, and nothing of them is in the run folder.
+
+    Attributes:
+        path: The page to open.
+    """
+
+    def __init__(self, beside: Path, pages: Sequence[tuple[str, str]]) -> None:
+        """Name the page after what it stands beside, and the pages of a run that it shows by title and file name."""
+        self.path = beside.with_name(f"{beside.name}-watch.html")
+        self._script = self.path.with_suffix(".js")
+        self._title, self._pages, self._number, self._run = beside.name, pages, 0, ""
+
+    def open(self) -> None:
+        """Write the page.
+
+        Raises:
+            InputError: The place holds something else, or cannot be written.
+        """
+        for path, mark in ((self.path, MARK), (self._script, "cellplanState(")):
+            if path.is_symlink() or (path.exists() and mark not in _begin(path)):
+                raise InputError(f"{path}: holds something that watching did not write; choose another folder with -o")
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            page = watch_page(self._title, pages=self._pages, state=quote(self._script.name))
+            write_whole(self.path, page.encode())
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot write the page: {(error.strerror or str(error)).lower()}") from error
+        self.show("working")
+
+    def show(self, phase: str, lines: Sequence[str] = (), *, run: Path | None = None) -> None:
+        """Tell the page what is going on; a disk that refuses leaves it as it was.
+
+        Args:
+            phase: One of working, passed, failed and error.
+            lines: What to say about it.
+            run: The run folder of a new result.
+        """
+        if run is not None:
+            self._number += 1
+            self._run = quote(Path(os.path.relpath(run, self.path.parent)).as_posix())
+        state = state_script(number=self._number, run=self._run, phase=phase, lines=lines)
+        with contextlib.suppress(OSError):
+            write_whole(self._script, state.encode())
+
+    def close(self) -> None:
+        """Remove the page and its script."""
+        for path in (self.path, self._script):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def _begin(path: Path) -> str:
+    """The first lines of a file."""
+    try:
+        with path.open("rb") as file:
+            return file.read(MARK_WITHIN).decode("utf-8", "replace")
+    except OSError:
+        return ""

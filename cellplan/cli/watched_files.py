@@ -1,0 +1,147 @@
+"""Files that a cell is read from, watched for changes: by modification time, and then by content.
+
+The system's own notifications do not reach into many containers and network folders, and a cell has few files: asking
+for their times five times a second works everywhere and costs nothing that could be measured.
+"""
+
+import os
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Final
+
+from cellplan.io.input.files import digest
+from cellplan.model.cell import Cell
+
+POLL_EVERY_S: Final = 0.2  # [s] between two polls while waiting
+SETTLED_S: Final = 0.2  # [s] without a further change after which a save counts as complete
+ASK_EVERY_S: Final = 0.3  # [s] between two polls during a computation
+INPUT_SUFFIXES: Final = frozenset(
+    {".yaml", ".yml", ".csv", ".stl", ".obj", ".dae", ".ply", ".urdf", ".xacro", ".srdf", ".json"}
+)
+MOST_ENTRIES: Final = 2000  # [-] files below the folder of a cell that are polled
+
+Stamp = tuple[int, int, int] | None  # time in [ns], size and number of a file; None while there is none
+
+
+class InputsChangedError(Exception):
+    """A file of the cell was saved while it was being worked on."""
+
+
+class WatchedFiles:
+    """The cell file, and every file that it was last read from.
+
+    Attributes:
+        cell: The cell file.
+    """
+
+    def __init__(self, cell: Path) -> None:
+        """Begin with the cell file alone."""
+        self.cell = cell
+        self._digests: dict[Path, str | None] = {}
+        self._stamps: dict[Path, Stamp] = {}
+        self._asked = 0.0
+        self._are_inputs_unknown = False
+        self._note(cell)
+
+    @property
+    def count(self) -> int:
+        """Number of files."""
+        return len(self._stamps)
+
+    def begin(self) -> None:
+        """Take the files as they are now, before they are read."""
+        for path in self._stamps:
+            self._note(path)
+
+    def follow(self, cell: Cell) -> None:
+        """Watch the files that a cell was read from, with the content that was read."""
+        self._digests, self._stamps, self._are_inputs_unknown = {}, {}, False
+        for path, content in _files_of(cell, self.cell).items():
+            self._note(path)
+            if self._digests[path] != content:  # saved since it was read
+                self._stamps[path], self._digests[path] = None, content
+
+    def follow_neighbours(self) -> None:
+        """Watch what a cell that cannot be read may name: files of the usual kinds below its folder, new ones too."""
+        self._are_inputs_unknown = True
+        for path in _neighbours(self.cell.parent):
+            if path not in self._stamps:
+                self._note(path)
+
+    def changed(self) -> Path | None:
+        """A file whose content is another one than before; None if all are the same."""
+        for path, stamp in self._stamps.items():
+            now = _stamp(path)
+            if now != stamp:
+                if _digest(path) != self._digests[path]:
+                    return path
+                self._stamps[path] = now
+        if not self._are_inputs_unknown:
+            return None
+        return next((path for path in _neighbours(self.cell.parent) if path not in self._stamps), None)
+
+    def require_unchanged(self) -> None:
+        """Poll the files now and then during a computation.
+
+        Raises:
+            InputsChangedError: One of them was saved.
+        """
+        if time.monotonic() - self._asked < ASK_EVERY_S:
+            return
+        self._asked = time.monotonic()
+        if self.changed() is not None:
+            raise InputsChangedError
+
+    def wait(self) -> Path:
+        """The file that was saved next, once it is complete."""
+        while (path := self.changed()) is None:
+            time.sleep(POLL_EVERY_S)
+        self.settle()
+        return path
+
+    def settle(self) -> None:
+        """Wait until no file has changed for a moment."""
+        before: dict[Path, Stamp] = {}
+        while (now := {path: _stamp(path) for path in self._stamps}) != before:
+            before = now
+            time.sleep(SETTLED_S)
+
+    def _note(self, path: Path) -> None:
+        """Keep time and content of a file."""
+        self._stamps[path] = _stamp(path)
+        self._digests[path] = _digest(path)
+
+
+def _files_of(cell: Cell, path: Path) -> Mapping[Path, str]:
+    """The files that a cell was read from and the digests of what was read; bundled robots do not change."""
+    named = {path.parent / name: content for name, content in cell.inputs.items()}
+    return {path: cell.inputs.get(path.name, "")} | {file: content for file, content in named.items() if file.is_file()}
+
+
+def _neighbours(folder: Path) -> Iterator[Path]:
+    """Files of the usual kinds below a folder, hidden ones excepted; of a large folder the first ones."""
+    left = MOST_ENTRIES
+    for above, folders, files in os.walk(folder):
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        left -= len(files)
+        if left < 0:
+            return
+        yield from (Path(above) / name for name in sorted(files) if Path(name).suffix.lower() in INPUT_SUFFIXES)
+
+
+def _stamp(path: Path) -> Stamp:
+    """What changes when a file is saved."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+def _digest(path: Path) -> str | None:
+    """SHA-256 of a file; None while it cannot be read."""
+    try:
+        return digest(path.read_bytes())
+    except OSError:
+        return None

@@ -1,0 +1,21 @@
+"""Aligned columns: what is measured, its figure, and where it stands; two spaces or more between columns."""
+
+from collections.abc import Iterable, Sequence
+
+Row = tuple[str, str, str]  # what, its figure, where and when
+
+
+def aligned(rows: Iterable[Sequence[str]], indent: str = "  ") -> list[str]:
+    """Lines of rows with the same number of columns, each column as wide as its widest text.
+
+    Args:
+        rows: Texts by column.
+        indent: What every line begins with.
+    """
+    table = [tuple(row) for row in rows]
+    if not table:
+        return []
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        indent + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in table
+    ]
