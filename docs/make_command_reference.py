@@ -40,21 +40,44 @@ def main() -> None:
 def command_reference() -> str:
     """Text of the page."""
     program: Any = typer.main.get_command(app)
-    names = list(program.commands)
-    contents = [f"- [`{name}`](#cellplan-{name}): {sentences(program.commands[name])[0]}" for name in names]
-    parts = [command_section(name, program.commands[name]) for name in names]
-    return "\n".join([INTRODUCTION + "\n".join(contents), *parts]) + "\n"
+    parts = [command_section(name, command) for name, command in program.commands.items()]
+    own = ["\n## Of the program itself\n", *option_table(program)]
+    return "\n".join([INTRODUCTION + contents(program), *parts, *own]) + "\n"
+
+
+def contents(program: Any) -> str:
+    """All commands in their groups, with their first sentence."""
+    lines: list[str] = []
+    group = None
+    for name, command in program.commands.items():
+        if command.rich_help_panel != group:
+            group = command.rich_help_panel
+            lines += ["", f"**{group}**", ""]
+        lines.append(f"- [`{name}`](#cellplan-{name}): {sentences(command)[0]}")
+    return "\n".join(lines).strip()
 
 
 def command_section(name: str, command: Any) -> str:
-    """Heading, usage, text and options of a command."""
-    arguments = [parameter for parameter in command.params if parameter.param_type_name == "argument"]
-    options = [parameter for parameter in command.params if parameter.param_type_name == "option"]
-    usage = " ".join(["cellplan", name, "[OPTIONS]", *(argument_usage(argument) for argument in arguments)])
-    lines = [f"\n## `cellplan {name}`\n", "```text", usage, "```\n", *paragraphs(command), ""]
-    rows = [f"| `{argument.metavar}` | {cell(argument.help)} |" for argument in arguments]
-    rows += [f"| {option_words(option)} | {cell(option.help)} |" for option in options if not option.hidden]
-    return "\n".join([*lines, "| argument or option | meaning |", "|---|---|", *rows])
+    """Heading, usage, text, options and examples of a command."""
+    arguments = [argument_usage(parameter) for parameter in command.params if is_argument(parameter)]
+    usage = " ".join(["cellplan", name, "[OPTIONS]", *arguments])
+    lines = [f"\n## `cellplan {name}`\n", "```text", usage, "```\n", *paragraphs(command), "", *option_table(command)]
+    examples = [line.strip() for line in (command.epilog or "").splitlines() if line.strip().startswith("cellplan ")]
+    return "\n".join([*lines, *(["\n```text", *examples, "```"] if examples else [])])
+
+
+def option_table(command: Any) -> list[str]:
+    """Arguments and options of a command with their meaning."""
+    shown = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
+    arguments = [(f"`{parameter.metavar}`", parameter.help) for parameter in shown if is_argument(parameter)]
+    options = [(option_words(parameter), parameter.help) for parameter in shown if not is_argument(parameter)]
+    rows = [f"| {names} | {cell(meaning)} |" for names, meaning in [*arguments, *options]]
+    return ["| argument or option | meaning |", "|---|---|", *rows]
+
+
+def is_argument(parameter: Any) -> bool:
+    """Whether a parameter is an argument, not an option."""
+    return bool(parameter.param_type_name == "argument")
 
 
 def argument_usage(argument: Any) -> str:
@@ -83,7 +106,7 @@ def paragraphs(command: Any) -> list[str]:
 
 def cell(text: str | None) -> str:
     """A text as the cell of a table."""
-    return " ".join((text or "").split()).replace("|", "\\|")
+    return " ".join((text or "").split()).replace("|", "\\|").replace("<", "&lt;")
 
 
 if __name__ == "__main__":
