@@ -15,6 +15,7 @@ from pymdownx.slugs import slugify
 DOCS = Path(__file__).resolve().parent.parent
 ROOT = DOCS.parent
 SECTION = re.compile(r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n?)*)", re.MULTILINE)
+GROUP = re.compile(r"^### (.+)\n", re.MULTILINE)
 ROW = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<target>[^)#]+)\)", re.MULTILINE)
 LINK = re.compile(r"\]\((?P<target>[^)#\s:]+)(?P<anchor>#[^)]*)?\)")
 FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL)
@@ -66,14 +67,20 @@ def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
 
 
 def navigation(index: Path) -> list[dict[str, Any]]:
-    """The lists of a page as navigation: one entry for each section, pages in their order."""
-    text = index.read_text(encoding="utf-8")
+    """The lists of a page as navigation: sections, their groups, and pages in their order."""
     entries = []
-    for section in SECTION.finditer(text):
-        rows = [entry(row["title"], row["target"]) for row in ROW.finditer(section["text"])]
-        alone = rows[0] if len(rows) == 1 else {section["title"]: rows}
-        entries.append({section["title"]: next(iter(alone.values()))})
+    for section in SECTION.finditer(index.read_text(encoding="utf-8")):
+        first, *groups = GROUP.split(section["text"])
+        rows = listed(first)
+        for title, text in zip(groups[::2], groups[1::2], strict=True):
+            rows.append({title: listed(text)})
+        entries.append({section["title"]: next(iter(rows[0].values())) if len(rows) == 1 else rows})
     return entries
+
+
+def listed(text: str) -> list[dict[str, Any]]:
+    """The list entries of a text that are links, as navigation."""
+    return [entry(row["title"], row["target"]) for row in ROW.finditer(text)]
 
 
 def entry(title: str, target: str) -> dict[str, Any]:
