@@ -20,6 +20,10 @@ ROW = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<target>[^)#]+)\)", re.MULTILINE
 LINK = re.compile(r"\]\((?P<target>[^)#\s:]+)(?P<anchor>#[^)]*)?\)")
 FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL)
 MESSAGE = re.compile(r'<!-- (?:from|source): [^>]*-->\s*<div class="')  # of the page of messages
+AS_TYPED = [  # signs of which browsers would stretch one of two: bars, and parentheses of which one has an exponent
+    ("<mo>&#x0007C;</mo>", '<mo stretchy="false">&#x0007C;</mo>'),
+    ('stretchy="true" fence="true" minsize="1.2em" maxsize="1.2em"', 'stretchy="false"'),
+]
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml"}
 
 
@@ -61,6 +65,8 @@ def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
             formula = convert(html.unescape(match["tex"]).strip(), display=display)
         except Exception as error:
             raise PluginError(f"{page.file.src_uri}: cannot read the formula {match['tex']}: {error}") from error
+        for grown, plain in AS_TYPED:
+            formula = formula.replace(grown, plain)
         return f'<span class="formula">{formula}</span>' if display == "block" else formula
 
     return FORMULA.sub(drawn, MESSAGE.sub('<div class="message ', html_text))
