@@ -55,6 +55,15 @@ def test_the_sections_of_the_start_page_have_their_order() -> None:
     assert re.findall(r"^## (.+)$", text, re.MULTILINE) == SECTIONS
 
 
+def test_the_pictures_of_the_tutorial_are_few_and_small() -> None:
+    text = (DOCS / "tutorial.md").read_text(encoding="utf-8")
+    sizes = {path.name: path.stat().st_size for path in (DOCS / "images" / "tutorial").iterdir()}
+
+    assert set(re.findall(r"\]\(images/tutorial/([^)]+)\)", text)) == set(sizes)
+    assert len(sizes) <= 6
+    assert max(sizes.values()) <= 80_000
+
+
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"], ids=lambda page: page.name)
 def test_every_anchor_that_a_page_names_exists(page: Path) -> None:
     text = FENCE.sub("", page.read_text(encoding="utf-8"))
