@@ -128,7 +128,7 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
         folder = request.output or Path("outputs") / changed.name
         refuse_unless_replaceable(folder)
         solution = solve_with_plots(changed, plots, task=request.task, progress=progress)
-        record = _written(solution, folder, request, plots)
+        record = _written(solution, folder, request, plots, progress)
     return _result(request, changed, solution, record, folder)
 
 
@@ -152,15 +152,19 @@ def _result(request: _Request, changed: "Cell", solution: "Solution", record: "R
     return Result(status, lines, {**about, "report": record}, folder)
 
 
-def _written(solution: "Solution", folder: Path, request: _Request, plots: "BackgroundPlots") -> "Record":
+def _written(
+    solution: "Solution", folder: Path, request: _Request, plots: "BackgroundPlots", progress: Listener
+) -> "Record":
     """Write a run folder, with its 3-D page where that is desired."""
     from cellplan.pipeline.write_run import write_run
 
-    record = write_run(solution, folder, keep_rejected=request.keep_rejected, plots=plots, view=request.with_view)
+    record = write_run(
+        solution, folder, keep_rejected=request.keep_rejected, plots=plots, view=request.with_view, progress=progress
+    )
     if request.with_view:
         from cellplan.pipeline.view.write import write_view_of_run
 
-        write_view_of_run(folder, solution.cell)
+        write_view_of_run(folder, solution.cell, progress=progress)
     return record
 
 

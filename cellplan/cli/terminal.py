@@ -21,6 +21,7 @@ STYLES: Final = (  # of a whole line, by what it begins with; the first that fit
 )
 COLUMN_GAP: Final = re.compile(r"\S {2,}(?=\S)")
 MAX_HANGING: Final = 0.6  # [-] fraction of the width at which further lines may begin, at most
+TABLE_GAPS: Final = 3  # [-] gaps from which a line is a row of a table, which would be harder to read if wrapped
 NARROW: Final = 20  # [columns] of a terminal below which nothing is wrapped
 
 
@@ -72,7 +73,7 @@ def _wrapped(line: "Text", width: int) -> "list[Text]":
     """The line in pieces of at most ``width`` columns; a word that is longer, such as a path, is left whole."""
     from rich.text import Text
 
-    if len(line.plain) <= width or width < NARROW or WHOLE.match(line.plain):
+    if len(line.plain) <= width or width < NARROW or _is_whole(line.plain):
         return [line]
     hanging = " " * _hanging_indent(line.plain, width)
     pieces, start, room = [], 0, width
@@ -91,6 +92,11 @@ def _wrapped(line: "Text", width: int) -> "list[Text]":
     for piece in pieces:
         piece.rstrip()
     return pieces[:1] + [Text.assemble(hanging, piece) for piece in pieces[1:]]
+
+
+def _is_whole(text: str) -> bool:
+    """Whether a line stands on one line whatever the width: something to copy, or a row of a table."""
+    return WHOLE.match(text) is not None or len(COLUMN_GAP.findall(text)) >= TABLE_GAPS
 
 
 def _hanging_indent(text: str, width: int) -> int:

@@ -53,6 +53,12 @@ def test_further_lines_of_a_column_stand_below_it() -> None:
     assert shown[1].index("0.300") == LINES[4].index("left/forearm")
 
 
+def test_rows_of_tables_are_not_wrapped() -> None:
+    row = "  simultaneous  passed  12.34  56.7  89.01  10.16"
+
+    assert ESCAPE.sub("", screen_text(["pair", row], passed=None, width=30)).split("\n") == ["pair", row]
+
+
 def test_without_colours_there_is_no_escape(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
 
