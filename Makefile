@@ -81,7 +81,7 @@ $(STAMP): $(PROGRAM) pyproject.toml
 
 install: $(STAMP)
 
-constraints: $(STAMP)
+constraints: $(STAMP) $(DOCS_STAMP)
 	@echo "# The versions that the project was last tested with; written by \`make constraints\`." >constraints.txt
 	$(BIN)/python -m pip freeze --exclude-editable >>constraints.txt
 

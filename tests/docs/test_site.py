@@ -88,7 +88,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site of this checkout."""
     folder = tmp_path_factory.mktemp("site")
     run = build(ROOT, folder)
-    assert run.returncode == 0, f"install with: pip install --editable '.[docs]'\n{run.stdout}{run.stderr}"
+    assert "No module named" not in run.stderr, "install with: pip install --editable '.[docs]'"
+    assert run.returncode == 0, run.stdout + run.stderr
     return folder
 
 
