@@ -20,6 +20,8 @@ ROW = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<target>[^)#]+)\)", re.MULTILINE
 LINK = re.compile(r"\]\((?P<target>[^)#\s:]+)(?P<anchor>#[^)]*)?\)")
 FORMULA = re.compile(r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL)
 MESSAGE = re.compile(r'<!-- (?:from|source): [^>]*-->\s*<div class="')  # of the page of messages
+LONG_NAME = re.compile(r"(?<=<code>)[^<]{25,}(?=</code>)")
+SEAM = re.compile(r"(?<=[/_.=])(?=\w)")  # where a long name may be broken
 AS_TYPED = [  # signs of which browsers would stretch one of two: bars, and parentheses of which one has an exponent
     ("<mo>&#x0007C;</mo>", '<mo stretchy="false">&#x0007C;</mo>'),
     ('stretchy="true" fence="true" minsize="1.2em" maxsize="1.2em"', 'stretchy="false"'),
@@ -57,7 +59,7 @@ def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
 
 
 def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
-    """Write formulas as MathML, which browsers draw without a script, and let messages be wrapped."""
+    """Write formulas as MathML, which browsers draw without a script; let messages and long names be broken."""
 
     def drawn(match: re.Match[str]) -> str:
         display = "block" if match["tag"] == "div" else "inline"
@@ -69,7 +71,8 @@ def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
             formula = formula.replace(grown, plain)
         return f'<span class="formula">{formula}</span>' if display == "block" else formula
 
-    return FORMULA.sub(drawn, MESSAGE.sub('<div class="message ', html_text))
+    broken = LONG_NAME.sub(lambda match: SEAM.sub("<wbr>", match[0]), MESSAGE.sub('<div class="message ', html_text))
+    return FORMULA.sub(drawn, broken)
 
 
 def navigation(index: Path) -> list[dict[str, Any]]:

@@ -51,3 +51,12 @@ def test_the_page_of_time_laws_states_their_peaks(law: TimeLaw, rate: float, acc
     assert np.gradient(way.share, TAU).max() == pytest.approx(rate, rel=1e-4)  # differences, not the formula
     assert np.abs(np.gradient(way.rate, TAU)[2:-2]).max() == pytest.approx(acceleration, rel=1e-3)
     assert peak_rate(law) == pytest.approx(rate)
+
+
+def test_every_source_of_the_comparison_is_numbered_and_used() -> None:
+    text, _, sources = (DOCS / "comparison.md").read_text(encoding="utf-8").partition("## Sources\n")
+    used = {int(number) for group in re.findall(r"\[(\d+(?:, \d+)*)\]", text) for number in group.split(", ")}
+    numbered = [int(number) for number in re.findall(r"^(\d+)\. .+: <https://[^>]+>$", sources, re.MULTILINE)]
+
+    assert numbered == list(range(1, len(numbered) + 1))
+    assert used == set(numbered)
