@@ -23,29 +23,62 @@ from cellplan.geometry.transforms import Array, frame_from_axes, inverse, pose_f
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.report.plots.palette import INK, robot_colours
-from cellplan.scene.bodies import Kind, body_poses, scene_bodies
+from cellplan.scene.bodies import Kind, body_poses, is_ground, scene_bodies
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 TARGET: Final = ROOT / "docs" / "images" / "four_robots.png"
 INSTANT: Final = 1.5  # [s] on the clock of the cell
-WIDTH, HEIGHT, FINER = 1400, 840, 2  # pixels of the picture, and drawn per pixel shown, each way
+FINER: Final = 2  # pixels drawn per pixel shown, each way
 TONES: Final = 85  # steps from black to white in the file: too fine to see, and smaller to store
 SEGMENTS: Final = 64  # sides of a round body
 CREASE: Final = np.cos(np.radians(40.0))  # faces that meet at less are drawn as one round surface
 
-EYE: Final = np.array([5.0, -5.0, 3.9])  # [m]
-LOOKED_AT: Final = np.array([1.10, -0.02, 0.75])  # [m] the middle of the picture
 LENS: Final = 3.36  # focal length in half widths of the picture
 LAMP: Final = np.array([0.30, -0.42, 0.86]) / np.linalg.norm([0.30, -0.42, 0.86])  # direction to the lamp
-SHADOW_SIDE, SHADOW_REACH = 2400, 2.6  # pixels and half width in [m] of the lamp's view
+SHADOW_SIDE: Final = 2400  # pixels of the lamp's view, each way
 SHADOW_ROOM: Final = 0.010  # [m] by which a surface does not shade itself
 AMBIENT, FILL, SHADE, GLOSS = 0.44, 0.20, 0.30, 0.14  # light from everywhere and from the viewer, lamp in shadow, shine
 
 GRID, GRID_LINE = 0.5, 0.005  # [m] between the lines on the floor, and half their width
-FADE: Final = (2.3, 4.2)  # [m] from the middle: here the floor begins and ends to vanish
 FLOOR, LINE, PART, STAND, METAL = "#f3f5f8", "#cfd6de", "#c9ced4", "#aab2bc", "#525b66"
-SHADES: Final = {Kind.PART: PART, Kind.TOOL: METAL, Kind.PEDESTAL: STAND}  # others have the colour of their robot
+SHADES: Final = {
+    Kind.PART: PART,
+    Kind.TOOL: METAL,
+    Kind.PEDESTAL: STAND,
+    Kind.OBSTACLE: STAND,
+}  # others have the colour of their robot
 ROD, LINE_RADIUS = 0.010, 0.0055  # [m] radius of the line from flange to tip, and of the line that stands for a path
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class View:
+    """Where a picture is taken from, in [m], and how large it is, in pixels.
+
+    Attributes:
+        eye: Place of the viewer.
+        target: The middle of the picture.
+        width: Pixels.
+        height: Pixels.
+        reach: Half width of what casts shadows.
+        fade: Distances from the middle at which the floor begins and ends to vanish.
+    """
+
+    eye: Array
+    target: Array
+    width: int
+    height: int
+    reach: float
+    fade: tuple[float, float]
+
+
+FOUR_ROBOTS: Final = View(
+    eye=np.array([5.0, -5.0, 3.9]),
+    target=np.array([1.10, -0.02, 0.75]),
+    width=1400,
+    height=840,
+    reach=2.6,
+    fade=(2.3, 4.2),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -89,17 +122,18 @@ def round_normals(mesh: Mesh) -> Array:
     return normals.reshape(-1, 3, 3)
 
 
-def pieces_of(solution: Solution) -> Iterator[tuple[Mesh, Array, str]]:
-    """Everything that stands on the floor at the instant: bodies, pedestals, tools without a body, and the paths."""
+def pieces_of(solution: Solution, instant: float = INSTANT) -> Iterator[tuple[Mesh, Array, str]]:
+    """Everything that stands on the floor at an instant: bodies, pedestals, tools without a body, and the paths."""
     cell, motion = solution.cell, solution.runs[0].motion
-    k = int(np.searchsorted(motion.times, INSTANT))
+    k = int(np.searchsorted(motion.times, instant))
     q = {robot.name: motion.q[k : k + 1, cell.columns(robot.name)] for robot in cell.robots}
     chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
     colours = robot_colours(cell)
-    bodies = [body for body in scene_bodies(cell) if body.kind is not Kind.OBSTACLE]
-    for body, X_WS in zip(bodies, body_poses(bodies, chains, q), strict=True):
+    bodies = [body for body in scene_bodies(cell) if not is_ground(body)]
+    poses = body_poses(bodies, chains, q)
+    for body, R, p in zip(bodies, poses.R[:, 0], poses.p[:, 0], strict=True):
         colour = SHADES.get(body.kind) or colours[str(body.robot)]
-        yield tessellate(body.shape, SEGMENTS), X_WS[0], colour
+        yield tessellate(body.shape, SEGMENTS), pose_from(R, p), colour
     for robot in cell.robots:
         flange = chains[robot.name].flange_poses(q[robot.name])[0]
         yield from rods(np.stack([flange[:3, 3], (flange @ robot.tool.X_FT)[:3, 3]]), radius=ROD, colour=METAL)
@@ -107,7 +141,9 @@ def pieces_of(solution: Solution) -> Iterator[tuple[Mesh, Array, str]]:
 
 
 def part_pose(cell: Cell, chains: dict[str, ScrewChain], q: dict[str, Array]) -> Array:
-    """Pose of the part in the world, shape (4, 4), while a robot holds it."""
+    """Pose of the part in the world, shape (4, 4)."""
+    if cell.part.X_WP is not None:
+        return cell.part.X_WP
     grasp = cell.part.held_by[0]
     X_WP: Array = chains[grasp.robot].tool_poses(q[grasp.robot])[0] @ inverse(grasp.X_PT)
     return X_WP
@@ -183,16 +219,17 @@ def barycentric(corners: Array, points: Array) -> Array:
 class Lamp:
     """What the lamp sees: everything farther from it lies in shadow."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Surface, view: View) -> None:
         """Brightness of the surface as seen from the lamp."""
+        self._shown = view
         self._R = frame_from_axes(LAMP, np.array([0.0, 0.0, 1.0])).T
         seen = self._view(surface.corners)
         side = (SHADOW_SIDE, SHADOW_SIDE)
         _, self._depth = rasterise(seen[:, :, :2], seen[:, :, 2], side)
 
     def _view(self, points: Array) -> Array:
-        scale = 0.5 * SHADOW_SIDE / SHADOW_REACH
-        seen = (points - LOOKED_AT) @ self._R.T
+        scale = 0.5 * SHADOW_SIDE / self._shown.reach
+        seen = (points - self._shown.target) @ self._R.T
         return np.concatenate([seen[..., :2] * scale + 0.5 * SHADOW_SIDE, seen[..., 2:]], axis=-1)
 
     def light(self, points: Array) -> Array:
@@ -208,24 +245,29 @@ class Lamp:
         return lit / len(offsets) ** 2
 
 
-def paint(surface: Surface) -> Array:
-    """The picture, shape (HEIGHT, WIDTH, 3), values 0 to 1."""
-    rows, columns = HEIGHT * FINER, WIDTH * FINER
-    forward = (LOOKED_AT - EYE) / np.linalg.norm(LOOKED_AT - EYE)
+def axes_of(view: View) -> Array:
+    """Directions to the right, down and away from the viewer, one in each row."""
+    forward = (view.target - view.eye) / np.linalg.norm(view.target - view.eye)
     right = np.cross(forward, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(forward, right), forward])  # right, down, away
+    return np.stack([right, np.cross(forward, right), forward])
+
+
+def paint(surface: Surface, view: View) -> Array:
+    """The picture, shape (height, width, 3), values 0 to 1."""
+    rows, columns = view.height * FINER, view.width * FINER
+    axes = axes_of(view)
     focus = 0.5 * LENS * columns
-    seen = (surface.corners - EYE) @ axes.T
+    seen = (surface.corners - view.eye) @ axes.T
     screen = focus * seen[:, :, :2] / seen[:, :, 2:] + (0.5 * columns, 0.5 * rows)
     nearest, nearness = rasterise(screen, 1.0 / seen[:, :, 2], (rows, columns))
     y, x = np.divmod(np.arange(rows * columns), columns)
     rays = np.stack([(x + 0.5 - 0.5 * columns) / focus, (y + 0.5 - 0.5 * rows) / focus, np.ones(len(x))], axis=1) @ axes
-    lamp = Lamp(surface)
-    image = floor_colours(rays, lamp)
+    lamp = Lamp(surface, view)
+    image = floor_colours(rays, lamp, view)
     covered = np.flatnonzero(nearest.ravel() >= 0)
     triangle = nearest.ravel()[covered]
-    points = EYE + rays[covered] / nearness.ravel()[covered, None]
+    points = view.eye + rays[covered] / nearness.ravel()[covered, None]
     shares = (
         barycentric(screen[triangle], np.stack([x[covered] + 0.5, y[covered] + 0.5], axis=1)) / seen[triangle, :, 2]
     )
@@ -235,7 +277,7 @@ def paint(surface: Surface) -> Array:
     image = image.reshape(rows, columns, 3)
     ids = np.where(nearest >= 0, surface.things[nearest], -1)
     image[outlines(ids, nearness)] *= 0.55
-    return image.reshape(HEIGHT, FINER, WIDTH, FINER, 3).mean(axis=(1, 3))
+    return image.reshape(view.height, FINER, view.width, FINER, 3).mean(axis=(1, 3))
 
 
 def shaded(colours: Array, normals: Array, light: Array, rays: Array) -> Array:
@@ -252,18 +294,18 @@ def shaded(colours: Array, normals: Array, light: Array, rays: Array) -> Array:
     )
 
 
-def floor_colours(rays: Array, lamp: Lamp) -> Array:
+def floor_colours(rays: Array, lamp: Lamp, view: View) -> Array:
     """Colour along each ray where nothing stands in the way: a grid with shadows that fades into white."""
     image = np.ones((len(rays), 3))
     down = np.flatnonzero(rays[:, 2] < -1e-3)
-    points = EYE - rays[down] * (EYE[2] / rays[down, 2])[:, None]
-    away = np.linalg.norm(points[:, :2] - LOOKED_AT[:2], axis=1)
-    near = away < FADE[1]
+    points = view.eye - rays[down] * (view.eye[2] / rays[down, 2])[:, None]
+    away = np.linalg.norm(points[:, :2] - view.target[:2], axis=1)
+    near = away < view.fade[1]
     down, points, away = down[near], points[near], away[near]
     to_line = np.abs((points[:, :2] + 0.5 * GRID) % GRID - 0.5 * GRID).min(axis=1)
     colours = np.where((to_line < GRID_LINE)[:, None], to_rgb(LINE), to_rgb(FLOOR))
     colours = colours * (0.80 + 0.20 * lamp.light(points))[:, None]
-    fade = np.clip((away - FADE[0]) / (FADE[1] - FADE[0]), 0.0, 1.0)[:, None]
+    fade = np.clip((away - view.fade[0]) / (view.fade[1] - view.fade[0]), 0.0, 1.0)[:, None]
     fade = fade * fade * (3.0 - 2.0 * fade)
     image[down] = colours * (1.0 - fade) + fade
     return image
@@ -291,19 +333,23 @@ def with_legend(picture: Image.Image, solution: Solution) -> Image.Image:
     work = {task.robot: f"draws the {task.name}" for task in cell.tasks}
     colours = robot_colours(cell)
     for index, robot in enumerate(cell.robots):
-        y = HEIGHT - 34 - 30 * (len(cell.robots) - 1 - index)
+        y = FOUR_ROBOTS.height - 34 - 30 * (len(cell.robots) - 1 - index)
         pen.rounded_rectangle((28, y - 8, 44, y + 8), radius=3, fill=colours[robot.name])
         pen.text((56, y), robot.name, fill=INK, font=bold, anchor="lm")
         pen.text((150, y), work.get(robot.name, "carries the cylinder"), fill=INK, font=plain, anchor="lm")
     return picture
 
 
+def picture_of(solution: Solution, view: View, instant: float = INSTANT) -> Image.Image:
+    """The cell at an instant."""
+    tones = np.round(TONES * paint(surface_of(pieces_of(solution, instant)), view)) / TONES
+    return Image.fromarray(np.round(255.0 * tones).astype(np.uint8))
+
+
 def main() -> None:
     """Solve the cell and draw it."""
     solution = solve(load_cell(ROOT / "cells" / "four_robots.yaml"))
-    tones = np.round(TONES * paint(surface_of(pieces_of(solution)))) / TONES
-    picture = with_legend(Image.fromarray(np.round(255.0 * tones).astype(np.uint8)), solution)
-    picture.save(TARGET, optimize=True)
+    with_legend(picture_of(solution, FOUR_ROBOTS), solution).save(TARGET, optimize=True)
 
 
 if __name__ == "__main__":

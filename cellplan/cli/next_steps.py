@@ -41,11 +41,17 @@ def after_solve(cell: Path, solved: Cell, failed: Iterable[str], *, run: Path, a
     """
     names = set(failed)
     if not names:
-        return [_line("export", str(run), "--format", "csv", "--cell", str(cell), *_folders(allow_dirs))]
+        return [export_line(run, cell, allow_dirs)]
     lines = list(_repair(cell, solved, allow_dirs))
     if names <= OF_SPEED:
         lines.insert(0, _line("fastest", str(cell), *_settings(solved.origin.changes), *_folders(allow_dirs)))
     return lines
+
+
+def export_line(run: Path, cell: Path | None, allow_dirs: Sequence[Path]) -> str:
+    """The line to type for the programs of a run; without its cell file, by the run's own copy of it."""
+    words = ["--without-cell"] if cell is None else ["--cell", str(cell)]
+    return _line("export", str(run), "--format", "csv", *words, *_folders(allow_dirs))
 
 
 def view_line(run: Path, cell: Path, allow_dirs: Sequence[Path]) -> str:

@@ -23,6 +23,7 @@ def verify(
     Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
     """
     with json_failure(SCHEMA, desired=as_json):
+        from cellplan.cli.next_steps import export_line
         from cellplan.pipeline.gate.open_gate import open_gate
         from cellplan.report.text.failures import count_text
         from cellplan.report.text.run import figure_lines, motion_text, read_record
@@ -51,5 +52,6 @@ def verify(
         *(f"  note: {remark}" for remark in verified.remarks),
         f"  {count_text(record['checks'])}; {motion_text(record)}",
         *figure_lines(record, "the report"),
+        export_line(run, cell, allow_dir or ()),
     ]
     show(lines, passed=True)

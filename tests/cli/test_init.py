@@ -1,6 +1,7 @@
 """A new folder with a cell to begin with."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,20 @@ def test_the_first_template_passes_by_the_commands_that_are_printed(
         assert run([*step.split()[1:], "--quiet"]) == 0
     page = steps[-1].split()[1]
     assert Path(page).read_text(encoding="utf-8").lower().startswith("<!doctype html>")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("sketched_pictures")
+@pytest.mark.parametrize("name", [template.name for template in TEMPLATES])
+def test_every_command_on_the_page_of_a_template_passes(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    run(["init", "new", "-t", name])
+    monkeypatch.chdir("new")
+    blocks = re.findall(r"^```sh\n(.*?)^```$", Path("README.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    commands = [line.split() for block in blocks for line in block.splitlines()]
+
+    assert {words[1] for words in commands} >= {"check", "solve"}
+    for words in commands:
+        assert run([*words[1:]]) == 0, words
 
 
 def test_a_template_is_chosen_by_its_name(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

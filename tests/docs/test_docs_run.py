@@ -94,6 +94,7 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "tutorial.md",
     "own-part-and-path.md",
     "hand-over.md",
+    "templates.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 

@@ -23,6 +23,7 @@ TRACES = {
     "program format": r"\brender_csv\b",
     "command": r"\bcellplan\.cli\.verify\b",
     "bundled robot": r"\bplanar_3r\b",
+    "template": r"\bown-urdf\b",
     "shape": r"\bcase [^:\n]*\bSphere\(",
     "kind of path": r"\bRhombusEntry\b|\bcase PolygonPath\(|\bPathSpec = ",
 }
@@ -83,7 +84,9 @@ def rows(recipe: str) -> dict[str, list[str]]:
 
 
 def file_of(place: str) -> Path:
-    return ROOT / place if place.startswith(("benchmarks/", "docs/", "tests/")) else PACKAGE / place
+    return (
+        ROOT / place if place.startswith(("benchmarks/", "cells/", "docs/", "pyproject", "tests/")) else PACKAGE / place
+    )
 
 
 def test_every_kind_of_addition_has_a_recipe() -> None:
