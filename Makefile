@@ -6,12 +6,13 @@
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install constraints test test-all quick-tests lint style rules format demo bench bench-methods reproduce clean FORCE
+.PHONY: help install constraints test test-all quick-tests lint style rules format demo docs bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
 PROGRAM := $(VENV)/.program
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 WORKERS ?= auto
 ROUND_OPTION := $(if $(ROUNDS),--rounds $(ROUNDS))
 USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
@@ -26,6 +27,7 @@ help:
 	@echo "make lint      everything but the tests"
 	@echo "make install   only make .venv; with CONSTRAINTS=constraints.txt in the versions of that file"
 	@echo "make constraints  write the installed versions to constraints.txt"
+	@echo "make docs      write the documentation as a site to site/; warnings are errors"
 	@echo "make bench     measure speed, beside other libraries and brute force, and write docs/benchmarks.md"
 	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
@@ -67,6 +69,11 @@ $(PROGRAM): pyproject.toml
 	echo "installed: $$(du -sm $(VENV) | cut -f 1) MB in $$(($$(date +%s) - begin)) s"; \
 	printf '%s' '$(CURDIR)' >$@
 
+$(DOCS_STAMP): $(PROGRAM) pyproject.toml
+	@echo "installing what the documentation is made with"
+	@$(BIN)/python -m pip install --quiet $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable '.[docs]'
+	@touch $@
+
 $(STAMP): $(PROGRAM) pyproject.toml
 	@echo "installing the tools of the tests into $(VENV)"
 	@$(BIN)/python -m pip install --quiet $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable '.[dev]'
@@ -74,7 +81,7 @@ $(STAMP): $(PROGRAM) pyproject.toml
 
 install: $(STAMP)
 
-constraints: $(STAMP)
+constraints: $(STAMP) $(DOCS_STAMP)
 	@echo "# The versions that the project was last tested with; written by \`make constraints\`." >constraints.txt
 	$(BIN)/python -m pip freeze --exclude-editable >>constraints.txt
 
@@ -95,7 +102,7 @@ test: style
 quick-tests: $(STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow"
 
-test-all: lint
+test-all: lint $(DOCS_STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
 
 format: $(STAMP)
@@ -110,6 +117,11 @@ demo: $(PROGRAM)
 	@echo "  $(CURDIR)/outputs/four-robots/view.html"
 	@echo "the program is $(BIN)/cellplan; after '. $(BIN)/activate' it is called cellplan"
 
+# The variable silences an advertisement of the theme, which colours the output.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
+	@echo "open site/index.html in a browser"
+
 bench: $(STAMP)
 	$(BIN)/python benchmarks/peer_setup.py
 	$(BIN)/python benchmarks/page.py $(ROUND_OPTION)
@@ -122,5 +134,5 @@ bench-methods: $(STAMP)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/methods.py $(ROUND_OPTION)
 
 clean:
-	rm -rf $(VENV) .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist outputs/*/
+	rm -rf $(VENV) .venv-bench .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache dist site outputs/*/
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

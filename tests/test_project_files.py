@@ -9,6 +9,7 @@ import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OPTIONAL = PROJECT["optional-dependencies"]
 LINES = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
 
 
@@ -21,7 +22,7 @@ def numbers(version: str) -> tuple[int, ...]:
     return tuple(int(number) for number in re.findall(r"\d+", version))
 
 
-@pytest.mark.parametrize("requirement", [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["dev"]])
+@pytest.mark.parametrize("requirement", [*PROJECT["dependencies"], *OPTIONAL["dev"], *OPTIONAL["docs"]])
 def test_the_constraints_hold_every_dependency_in_an_allowed_version(requirement: str) -> None:
     pinned = {plain(line.partition("==")[0]): line.partition("==")[2] for line in LINES}
     name, _, least = requirement.partition(">=")
@@ -41,7 +42,7 @@ def test_the_workflow_runs_what_exists_and_needs_no_secret() -> None:
     targets = {match for command in commands for match in re.findall(r"\bmake (\w+)", command)}
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
 
-    assert targets == {"test", "install"}
+    assert targets == {"test", "install", "docs"}
     assert [target for target in targets if not re.search(rf"^{target}:", makefile, re.MULTILINE)] == []
     assert [
         path for command in commands for path in re.findall(r"tests/\S+", command) if not (ROOT / path).exists()

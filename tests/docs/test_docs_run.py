@@ -91,6 +91,9 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "load-sharing.md",
     "demanded-feeds.md",
     "place-a-robot.md",
+    "tutorial.md",
+    "own-part-and-path.md",
+    "hand-over.md",
     "templates.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
