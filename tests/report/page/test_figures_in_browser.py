@@ -191,7 +191,7 @@ def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme
         const sizes = shown.map((each) => {
           const scale = each.getBoundingClientRect().width / each.viewBox.baseVal.width;
           const words = [...each.querySelectorAll("text")];
-          return scale * Math.min(...words.map((text) => Number(text.getAttribute("font-size"))));
+          return scale * Math.min(...words.map((text) => parseFloat(getComputedStyle(text).fontSize)));
         });
         const wide = shown.map((each) => each.getBoundingClientRect().right);
         const title = figure("joint margins").querySelector(".title");
