@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Report
-from cellplan.pipeline.floor_plan import floor_plan, schedule_paths
+from cellplan.pipeline.floor_plan import floor_plan, schedule_paths, swept_state
 from cellplan.pipeline.still.instant import graver, worst_instant
 from cellplan.pipeline.still.picture import run_still
 from cellplan.report.floor_plan.sheet import floor_plan_svg
@@ -44,6 +44,5 @@ def _floor_plan(cell: Cell, phases: Sequence[DrawnPhase]) -> str:
     motions = [phase.report.q for phase in phases]
     paths = {name: points for phase in phases for name, points in schedule_paths(phase.schedule).items()}
     whole = sum(phase.report.cycle_time for phase in phases)
-    state = f"Robots at the start, and what they sweep in {whole:.3f} s"
     start = {name: q[0] for name, q in motions[0].items()}
-    return floor_plan_svg(floor_plan(cell, start, motions, paths, state=state))
+    return floor_plan_svg(floor_plan(cell, start, motions, paths, state=swept_state(whole)))

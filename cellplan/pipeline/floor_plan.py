@@ -69,6 +69,11 @@ def floor_plan(
     )
 
 
+def swept_state(duration: float) -> str:
+    """What the floor plan of a run shows, which takes a time in [s]."""
+    return f"Robots at the start, and what they sweep in {duration:.3f} s"
+
+
 def schedule_paths(schedule: Schedule) -> dict[str, Array]:
     """Points along the path of every task of a run in [m], shape (N, 3) each."""
     found = {}
@@ -161,9 +166,9 @@ def _rows(q: Mapping[str, Array]) -> Indices:
     steps = np.max([np.abs(np.diff(values, axis=0)).sum(axis=1) for values in q.values()], axis=0)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     count = min(MOST_ROWS, len(travelled), 2 + int(travelled[-1] / TRAVEL))
-    wanted = np.linspace(0.0, travelled[-1], count)
+    marks = np.linspace(0.0, travelled[-1], count)
     return np.unique(
-        np.append(np.searchsorted(travelled, wanted - LEVEL), len(travelled) - 1).clip(0, len(travelled) - 1)
+        np.append(np.searchsorted(travelled, marks - LEVEL), len(travelled) - 1).clip(0, len(travelled) - 1)
     )
 
 

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
+from xml.etree import ElementTree as ET
 
 from cellplan.io.input.findings import shown
 from cellplan.io.run.stored import StoredRun
@@ -14,7 +15,7 @@ CellDrawings = Mapping[str, Mapping[str, str]]
 
 PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
 COURSE: Final = re.compile(r'(?<= d=")[MLHVlhvz\d. -]*(?=")')  # of a line
-FIGURE: Final = re.compile(r"(?<![\w#])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
+FIGURE: Final = re.compile(r"(?<![\w#-])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
 ROUNDING: Final = (
     3.0  # units of a sheet, which are at most a tenth of a millimetre: what rounding to a whole one can do
 )
@@ -59,11 +60,8 @@ def other_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
 def foreign_piece(got: str, drawn: str) -> str | None:
     """The first piece of a drawing that the one drawn anew has nowhere, whatever its figures; None without any."""
     known = {_without_figures(piece) for piece in PIECE.findall(drawn)}
-    pieces = PIECE.findall(got)
-    foreign = next((piece for piece in pieces if _without_figures(piece) not in known), None)
-    if foreign is None and [*map(_name, pieces)].count("</svg") != 1:
-        foreign = "end of the drawing"
-    return None if foreign is None else shown(" ".join(foreign.split()))
+    foreign = next((piece for piece in PIECE.findall(got) if _without_figures(piece) not in known), None)
+    return next(_unbalanced(got), None) if foreign is None else shown(" ".join(foreign.split()))
 
 
 def is_same_drawing(got: str, drawn: str) -> bool:
@@ -76,10 +74,16 @@ def _is_same_piece(got: str, drawn: str) -> bool:
     """Whether two pieces are the same; figures of tags may differ by rounding."""
     if got == drawn:
         return True
-    if not drawn.startswith("<") or FIGURE.split(got) != FIGURE.split(drawn):
+    one, other = (COURSE.sub(_apart, piece) for piece in (got, drawn))
+    if not drawn.startswith("<") or FIGURE.split(one) != FIGURE.split(other):
         return False
-    figures = zip(FIGURE.findall(got), FIGURE.findall(drawn), strict=True)
-    return all(abs(float(one) - float(other)) <= ROUNDING for one, other in figures)
+    figures = zip(FIGURE.findall(one), FIGURE.findall(other), strict=True)
+    return all(abs(float(first) - float(second)) <= ROUNDING for first, second in figures)
+
+
+def _apart(course: re.Match[str]) -> str:
+    """The course of a line with its letters set apart from its figures."""
+    return re.sub("[A-Za-z]", r" \g<0> ", course[0])
 
 
 def _without_figures(piece: str) -> str:
@@ -87,6 +91,9 @@ def _without_figures(piece: str) -> str:
     return FIGURE.sub("0", COURSE.sub("", piece)) if piece.startswith("<") else piece.strip()
 
 
-def _name(piece: str) -> str:
-    """What a tag begins with."""
-    return re.split(r"[\s>/]", piece[1:], maxsplit=1)[0] if not piece.startswith("</") else piece.rstrip(">")
+def _unbalanced(got: str) -> Iterator[str]:
+    """What keeps a drawing from being one whole element."""
+    try:
+        ET.fromstring(got)  # noqa: S314 - it holds no piece, and so no entity, that is not drawn here
+    except ET.ParseError as error:
+        yield f"a drawing that cannot be read ({error})"

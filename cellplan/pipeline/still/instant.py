@@ -104,7 +104,7 @@ def is_exact(minimum: ClearanceMinimum) -> bool:
 
 
 def graver(instant: Instant) -> tuple[float, ...]:
-    """Order of the instants of several runs, the gravest first: failures, then the smallest clearances."""
+    """Order of the worst times of several runs, the gravest first: failures, then the smallest clearances."""
     if instant.check is not None:
         return (0.0, *_gravity(instant.check))
     distance = np.inf if instant.minimum is None else float(instant.minimum.minimum or 0.0)

@@ -11,6 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall
 from cellplan.report.floor_plan.style import style
 
+SVG_START: Final = '<svg class="plan-sheet"'
 WIDTH_MM, HEIGHT_MM = 297, 210  # A4 across
 UNIT: Final = 10.0  # units of the sheet per [mm] of paper
 MARGIN, COLUMN, GAP = 90, 640, 60  # units: border, width of the table, distance between it and the plan
@@ -61,7 +62,7 @@ def floor_plan_svg(plan: FloorPlan) -> str:
     numbers = {robot.name: index for index, robot in enumerate(plan.robots)}
     robots = ", ".join(f"{robot.name} at x {robot.base[0]:.1f} mm, y {robot.base[1]:.1f} mm" for robot in plan.robots)
     body = [
-        f'<svg class="plan-sheet" xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
+        f'{SVG_START} xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
         f'viewBox="0 0 {UNIT * WIDTH_MM:.0f} {UNIT * HEIGHT_MM:.0f}" role="img" '
         'aria-labelledby="floor-plan-title floor-plan-desc">',
         f'<title id="floor-plan-title">Floor plan of {escape(plan.cell)}, scale 1:{sheet.scale:g}</title>',

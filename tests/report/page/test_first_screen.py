@@ -9,6 +9,7 @@ from cellplan.model.report import Check
 from cellplan.model.task import Process
 from cellplan.report.page.checks import FAILURES, MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
+from cellplan.report.page.render import report_page
 from cellplan.report.page.times import TimeLinks, page_begin
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
@@ -124,3 +125,21 @@ def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: An
     assert page_begin(record) == 0.0
     assert {row["run"] for row in rows} <= set(reports)
     assert all(row["message"] for row in rows)
+
+
+def test_a_picture_is_shown_even_if_nothing_has_a_time(passed_run: Any) -> None:
+    record = record_of(passed_run)
+    nowhere = {
+        kind: {**each, "minimum_mm": None, "pair": None, "at_s": None} for kind, each in record["clearance"].items()
+    }
+    record = {**record, "clearance": nowhere}
+    still = '<?xml version="1.0"?><svg viewBox="0 0 4 3"><title>picture</title></svg>'
+
+    page = report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}, still=still)
+
+    assert worst_instant(record) is None
+    assert page.count("<title>picture</title>") == 1
+    assert "<?xml" not in page
+    assert (
+        "picture" not in report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}).split("<main")[1]
+    )
