@@ -149,7 +149,7 @@ def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
     if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
         title = f"{TITLES.get(instant.check.name, 'Failed')} {at}"
-        return title, _wrapped(instant.check.message)
+        return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:
         distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
         least = "" if is_exact(instant.minimum) else "at least "
