@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
-from cellplan.report.page.checks import FAILURES
+from cellplan.report.record.failures import FAILURES
 
 NOTE_WIDTH: Final = 84  # [characters] of a line below the title
 MOST_NOTES: Final = 2
@@ -116,7 +116,7 @@ def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
     if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
         title = f"{FAILURES.get(instant.check.name, 'Failed')} {at}"
-        return title, _wrapped(instant.check.message)
+        return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:
         distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
         least = "" if is_exact(instant.minimum) else "at least "

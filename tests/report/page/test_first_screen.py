@@ -7,10 +7,11 @@ import pytest
 
 from cellplan.model.report import Check
 from cellplan.model.task import Process
-from cellplan.report.page.checks import FAILURES, MAX_LISTED, failure_groups
+from cellplan.report.page.checks import MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
 from cellplan.report.page.render import report_page
 from cellplan.report.page.times import TimeLinks, page_begin
+from cellplan.report.record.failures import FAILURES
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
