@@ -9,41 +9,8 @@ import numpy as np
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
+from cellplan.report.record.failures import FAILURES
 
-TITLES: Final = {
-    "collision": "Collision",
-    "grip_depth": "Holder too deep in the part",
-    "mount_depth": "Tool too deep in the arm",
-    "standing_depth": "Body too deep in its support",
-    "tool_depth": "Tool too deep in the part",
-    "joint_position": "Joint beyond its limit",
-    "locked_joint": "Failed joint moves",
-    "home": "Idle robot leaves its home",
-    "payload": "Payload exceeded",
-    "payload_centre": "Centre of mass of the load",
-    "payload_moment": "Moment of the load",
-    "payload_inertia": "Inertia of the load",
-    "clearance": "Clearance too small",
-    "joint_velocity": "Joint too fast",
-    "joint_acceleration": "Joint acceleration too high",
-    "joint_acceleration_between_phases": "Joint acceleration too high where phases meet",
-    "joint_acceleration_assumed": "Joint acceleration above its assumed limit",
-    "joint_jerk": "Joint jerk too high",
-    "part_acceleration": "Acceleration of the part too high",
-    "tool_speed": "Tool too fast",
-    "closure_position_error": "Co-holder off its grasp",
-    "closure_orientation_error": "Co-holder tilted on its grasp",
-    "closure_position_error_between_rows": "Co-holder off its grasp between the rows",
-    "closure_orientation_error_between_rows": "Co-holder tilted on its grasp between the rows",
-    "position_error": "Tool off its path",
-    "orientation_error": "Tool orientation off",
-    "position_error_between_rows": "Tool off its path between the rows",
-    "orientation_error_between_rows": "Tool orientation off between the rows",
-    "process_feed": "Feed not kept",
-    "process_on_delay": "Delay at the start of a process",
-    "process_off_delay": "Delay at the end of a process",
-    "joint_drift": "Joints do not return",
-}  # what failed checks are called, the gravest first
 NOTE_WIDTH: Final = 84  # [characters] of a line below the title
 MOST_NOTES: Final = 2
 
@@ -113,8 +80,8 @@ def graver(instant: Instant) -> tuple[float, ...]:
 
 def _gravity(check: Check) -> tuple[float, float]:
     """Order of failed checks, the gravest first: by kind, then by the excess over the limit."""
-    kinds = list(TITLES)
-    kind = kinds.index(check.name) if check.name in TITLES else len(kinds)
+    kinds = list(FAILURES)
+    kind = kinds.index(check.name) if check.name in FAILURES else len(kinds)
     if check.name == "collision":
         excess = check.value  # time in contact
     elif check.name in {"clearance", "joint_position"}:
@@ -148,8 +115,8 @@ def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     """Title and the lines below it."""
     at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
     if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
-        title = f"{TITLES.get(instant.check.name, 'Failed')} {at}"
-        return title, _wrapped(instant.check.message)
+        title = f"{FAILURES.get(instant.check.name, 'Failed')} {at}"
+        return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:
         distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
         least = "" if is_exact(instant.minimum) else "at least "

@@ -23,7 +23,7 @@ from cellplan.report.still.shading import mixed
 from cellplan.report.still.sheet import still_svg
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, scene_bodies
 
-PATH_POINTS: Final = 121  # [-] of a path
+PATH_POINTS: Final = 81  # [-] of a path
 CONTACT_SIDES: Final = 24  # [-] of round bodies where a place of contact is sought
 INSIDE: Final = 1e-6  # [m] below a surface
 MARKED: Final = "marked"

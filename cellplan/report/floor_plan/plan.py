@@ -9,6 +9,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 
+LONGEST_CHAIN = 14  # places of a chain of dimensions; of more only the whole length is given
 SAME_PLACE = 0.5  # [mm] lines of a chain of dimensions that are nearer are one
 
 
@@ -143,8 +144,9 @@ class FloorPlan:
         around = [each.corners[:, axis] for each in self.outlines if each.layer is Layer.SURROUNDINGS]
         ends = [float(min(map(np.min, around))), float(max(map(np.max, around)))] if around else []
         chain = distinct([*places, *ends])
-        for first, second in pairwise(chain):
-            yield Dimension(axis=axis, first=first, second=second, row=0)
+        if len(chain) <= LONGEST_CHAIN:
+            for first, second in pairwise(chain):
+                yield Dimension(axis=axis, first=first, second=second, row=0)
         if len(chain) > 2:
             yield Dimension(axis=axis, first=chain[0], second=chain[-1], row=1)
 

@@ -14,7 +14,7 @@ from cellplan.report.floor_plan.style import style
 SVG_START: Final = '<svg class="plan-sheet"'
 WIDTH_MM, HEIGHT_MM = 297, 210  # A4 across
 UNIT: Final = 10.0  # units of the sheet per [mm] of paper
-MARGIN, COLUMN, GAP = 90, 640, 60  # units: border, width of the table, distance between it and the plan
+MARGIN, COLUMN, GAP = 90, 700, 40  # units: border, width of the table, distance between it and the plan
 HEADING: Final = 150  # units above the plan
 BAND, ROW = 70, 75  # units from the plan to the first row of dimensions, and from row to row
 ROWS: Final = 2
@@ -169,7 +169,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
     yield _text("key", x, y + 40, f"{bar:g} mm")
     y = top + 230
-    columns = (("robot", 0), ("x", 285), ("y", 375), ("z", 450), ("turn", 550), ("reach", 640))
+    columns = (("robot", 0), ("x", 310), ("y", 420), ("z", 505), ("turn", 610), ("reach", 700))
     for word, offset in columns:
         yield _text("head" if not offset else "head right", left + offset, y, word)
     yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'

@@ -18,6 +18,7 @@ from cellplan.report.plots.placing import SWATCH, TICK, Placed, PlacedPanel, Wor
 from cellplan.report.plots.thinning import peaks_kept, straightened
 
 FINE: Final = 100  # coordinates to a point
+POINTS_DRAWN: Final = 1.5  # of a curve in a point of width: one per pixel, more would only enlarge the files
 THINNING_TOL: Final = 0.12 * FINE  # that a curve may lie beside its points: a tenth of its width
 FARTHEST: Final = 1e7  # of coordinates: what lies far outside its box
 FONT: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
@@ -68,11 +69,27 @@ def _description(figure: Figure) -> str:
 
 def _words(each: Words) -> str:
     """A line of text."""
-    place = f'x="{each.x:.2f}" y="{each.y:.2f}" font-size="{each.size:g}" fill="{each.colour}"'
+    place = f'x="{_short(each.x)}" y="{_short(each.y)}" font-size="{each.size:g}" fill="{each.colour}"'
     anchor = f' text-anchor="{each.anchor}"' if each.anchor != "start" else ""
     weight = ' font-weight="bold"' if each.is_bold else ""
     kind = f' class="{each.kind}"' if each.kind else ""
     return f"<text{kind} {place}{anchor}{weight}>{escape(each.text)}</text>"
+
+
+def _tick_labels(box: PlacedPanel) -> Iterator[str]:
+    """The numbers along both axes, a group for each."""
+    for kind in ("tick-y", "tick-x"):
+        labels = [each for each in box.words if each.kind == kind]
+        if labels:
+            first = labels[0]
+            pen = f'font-size="{first.size:g}" fill="{first.colour}" text-anchor="{first.anchor}"'
+            texts = (f'<text x="{_short(each.x)}" y="{_short(each.y)}">{escape(each.text)}</text>' for each in labels)
+            yield f'<g class="{kind}" {pen}>{"".join(texts)}</g>'
+
+
+def _short(length: float) -> str:
+    """A length with at most two decimals."""
+    return f"{length:.2f}".rstrip("0").rstrip(".")
 
 
 def _swatches(found: Placed) -> Iterator[str]:
@@ -104,7 +121,8 @@ def _panels(found: Placed) -> Iterator[str]:
         yield "</svg>"
         frame = _plane_frame(box) if is_plane else f"M0 0V{box.height:.6g}H{box.width:.6g}"
         yield f'<path class="frame" d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
-        yield from map(_words, box.words)
+        yield from _tick_labels(box)
+        yield from (_words(each) for each in box.words if not each.kind.startswith("tick"))
         yield "</g>"
 
 
@@ -172,7 +190,7 @@ def _curve(box: PlacedPanel, curve: Curve) -> Iterator[str]:
 def _stretch(box: PlacedPanel, x: Array, y: Array, is_function: bool) -> str:
     """The path of a stretch without gaps: its first point, and from each point to the next."""
     if is_function:
-        kept = peaks_kept(y)
+        kept = peaks_kept(y, round(POINTS_DRAWN * box.width))
         x, y = x[kept], y[kept]
     points = np.stack([FINE * box.across(x), FINE * box.down(y)], axis=-1)
     points = np.rint(np.clip(points, -FARTHEST, FARTHEST))

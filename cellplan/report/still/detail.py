@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import bounding_sphere
 from cellplan.report.still.camera import Camera
-from cellplan.report.still.painter import Painter
+from cellplan.report.still.painter import Painter, solid_facets
 from cellplan.report.still.picture import ShownSolid, StillPicture
 
 CONNECTION_SHARE: Final = 0.3  # [-] of the detail that the connection of two points fills
@@ -18,6 +18,7 @@ PLACE_SHOWN: Final = 0.4  # [m] across a detail of one place
 ENLARGED: Final = 1.8  # [-] a detail is shown where it is larger by more than this
 RING, SPOT = 150, 40  # radius round a place, and of a point
 ABOVE: Final = 110  # from the points to their label
+HIDDEN: Final = 0.003  # [m] below what is painted over it
 SMALLEST_FRAME: Final = 60  # half edge of the frame round what is enlarged
 
 
@@ -54,7 +55,7 @@ def is_worth_it(picture: StillPicture, camera: Camera, edge: int) -> bool:
 
 
 def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[tuple[str, int], str]) -> str:
-    """What matters, enlarged in a window, with a frame round its place in the picture.
+    """What matters, enlarged in a window without what hides it, with a frame round its place in the picture.
 
     Args:
         picture: The picture.
@@ -67,7 +68,7 @@ def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[
     high, place = low + window.edge, low + 0.5 * window.edge
     middle = picture.mark.mean(axis=0)
     close = Camera(axes=camera.axes, middle=camera.axes[:2] @ middle, scale=scale, place=place)
-    near = [each for each in picture.solids if _reaches(each, close, low, high)]
+    near = [each for each in picture.solids if _reaches(each, close, low, high) and not _hides(each, picture, close)]
     x, y, edge = window.x, window.y, window.edge
     box = f'x="{x}" y="{y}" width="{edge}" height="{edge}" rx="40"'
     return "\n".join(
@@ -76,7 +77,7 @@ def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[
             f'<clipPath id="still-detail"><rect {box}/></clipPath>',
             f'<rect class="sheet" {box}/>',
             '<g clip-path="url(#still-detail)">',
-            Painter(close, low, high, classes).paths(near, picture.lines),
+            Painter(close, low, high, classes, place).paths(near, picture.lines),
             mark(picture, close),
             "</g>",
             f'<rect class="frame" {box}/>',
@@ -106,6 +107,23 @@ def _shown(picture: StillPicture, camera: Camera) -> float:
 def _factor(ratio: float) -> str:
     """How much larger the detail is, as text."""
     return f"{ratio:.0f} × enlarged" if ratio >= 3.0 else f"{ratio:.1f} × enlarged"
+
+
+def _hides(solid: ShownSolid, picture: StillPicture, camera: Camera) -> bool:
+    """Whether a solid that does not matter itself is painted over what does."""
+    if solid.name in picture.marked:
+        return False
+    corners = camera.project(solid_facets(solid, camera))
+    sides = np.roll(corners, -1, axis=1) - corners
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    for point in camera.project(np.concatenate([picture.mark, picture.mark.mean(axis=0)[None]])):
+        apart = point - corners
+        turns = sides[..., 0] * apart[..., 1] - sides[..., 1] * apart[..., 0]
+        is_over = (turns <= 0.0).all(axis=1) & (normals[:, 2] < 0.0)
+        above = np.einsum("ij,ij->i", normals, apart[:, 0]) / np.where(is_over, normals[:, 2], -1.0)
+        if (is_over & (above < -HIDDEN)).any():
+            return True
+    return False
 
 
 def _reaches(solid: ShownSolid, camera: Camera, low: Array, high: Array) -> bool:

@@ -9,12 +9,13 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.mesh.decimate import decimated
-from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere
+from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere, support_point
 
 LONGEST: Final = (
     0.25  # [m] of an edge along a box or a cylinder: facets are painted whole, in the order of their depths
 )
 MOST_PARTS: Final = 12  # [-] of one edge
+SILHOUETTE: Final = np.pi / 4.0 * (np.arange(8) + 0.5)  # [rad] directions of the corners of a silhouette
 FEWEST_SIDES, MOST_SIDES = 6, 48  # [-] of a round solid
 MESH_CELLS: Final = 2.5  # [-] along the longest edge of a mesh for each of the sides of a round solid
 FEWEST_TRIANGLES: Final = 60  # [-] of a mesh
@@ -31,13 +32,29 @@ def facets(shape: Solid, segments: int) -> Array:
         case Box(size):
             return _box(tuple(_parts(edge) for edge in size)) * np.asarray(size)
         case Cylinder(radius, length):
-            return _grown(_cylinder(segments, _parts(length)), radius, length)
+            return _grown(_cylinder(segments, _parts(length), _parts(2.0 * radius)), radius, length)
         case Capsule(radius, length):
             return _grown(_capsule(segments, _parts(length)), radius, length)
         case Sphere(radius):
             return _grown(_capsule(segments, 0), radius, 0.0)
         case Mesh():
             return _of_mesh(shape, segments)
+
+
+def silhouette(shape: Solid, X_WS: Array, axes: Array) -> Array:
+    """A flat octagon as large as a solid looks, in the world in [m], shape (3, 4, 3).
+
+    Args:
+        shape: The solid.
+        X_WS: Its pose in the world, shape (4, 4).
+        axes: Axes of the camera, shape (3, 3).
+    """
+    R, p = X_WS[:3, :3], X_WS[:3, 3]
+    around = np.stack([np.cos(SILHOUETTE), np.sin(SILHOUETTE)], axis=1) @ axes[:2]
+    seen = np.array([axes[:2] @ (R @ support_point(shape, R.T @ n) + p) for n in around])
+    ring = seen @ axes[:2] + axes[2] * float(axes[2] @ p)
+    k = np.arange(3)
+    return np.stack([ring[k], ring[k + 1], ring[-k - 2], ring[-k - 1]], axis=1)
 
 
 def sides(shape: Solid, deviation: float) -> int:
@@ -83,16 +100,16 @@ def _box(parts: tuple[int, int, int]) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _cylinder(segments: int, parts: int) -> Array:
-    """Side and both ends of a cylinder of unit radius and length."""
-    ends = _strips(segments)
+def _cylinder(segments: int, parts: int, across: int) -> Array:
+    """Side and both ends of a cylinder of unit radius and length, in parts along it and across its ends."""
+    ends = _strips(segments, across)
     return np.concatenate([_side(segments, parts), _raised(ends, 0.5), _raised(ends[:, ::-1], -0.5)])
 
 
 @lru_cache(maxsize=64)
 def _capsule(segments: int, parts: int) -> Array:
     """Side and both half balls of a capsule of unit radius and length; no side without parts."""
-    bands = max(2, segments // 6)
+    bands = max(1, segments // 6)
     latitude = 0.5 * np.pi * np.arange(bands + 1) / bands
     found = [_side(segments, parts)] if parts else []
     for low, high in pairwise(latitude):
@@ -121,11 +138,14 @@ def _side(segments: int, parts: int) -> Array:
     return np.concatenate(pieces)
 
 
-def _strips(segments: int) -> Array:
-    """A disc of unit radius across the axis, in strips of four corners."""
+def _strips(segments: int, parts: int) -> Array:
+    """A disc of unit radius across the axis, in strips of four corners, each cut into parts."""
     ring = _ring(segments, 1.0, 0.0)
     k = np.arange(segments // 2 - 1)
-    return np.stack([ring[k], ring[k + 1], ring[-k - 2], ring[-k - 1]], axis=1)
+    right, left = (np.stack([ring[first], ring[second]]) for first, second in ((k, -k - 1), (k + 1, -k - 2)))
+    shares = np.arange(parts + 1)[:, None, None] / parts
+    near, far = (side[0] + shares * (side[1] - side[0]) for side in (right, left))  # shape (parts + 1, K, 3)
+    return np.stack([near[:-1], far[:-1], far[1:], near[1:]], axis=2).reshape(-1, 4, 3)
 
 
 def _raised(quads: Array, share: float) -> Array:

@@ -7,9 +7,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.shapes import bounding_sphere
 from cellplan.geometry.transforms import transform_points
 from cellplan.report.still.camera import Camera
-from cellplan.report.still.facets import facets, sides
+from cellplan.report.still.facets import facets, sides, silhouette
 from cellplan.report.still.picture import ShownLine, ShownSolid
 from cellplan.report.still.shading import LINE, tones
 
@@ -18,9 +19,9 @@ DEPTH_STEP: Final = 1e-5  # [m] depths that differ by less are equal, so that ro
 CREASE: Final = 0.8  # [-] cosine between neighbouring facets below which their common edge is drawn
 MOST_FACETS: Final = 2800  # [-] of a picture, those that face away among them; with more solids each has fewer
 DEVIATION: Final = 12.0  # units of the sheet by which a round solid may differ from its facets
-COARSEST: Final = 64.0  # [-] times that
+COARSEST: Final = 4.0  # [-] times that
 SHORTEST_EDGE: Final = 24  # units of the sheet along both axes together: shorter ones do not show
-LIFT: Final = 0.012  # [m] by which a line is nearer than the surface that it lies on
+LIFT: Final = 0.06  # [m] by which a line is nearer than the surface that it lies on
 RUN: Final = 8  # [-] pieces of a line that are painted together
 SAME_POINT: Final = 6  # decimals of corners in [m] that are one corner
 
@@ -49,18 +50,20 @@ class Painter:
         low: Left upper corner of what is shown of the sheet, shape (2,).
         high: Right lower corner, shape (2,).
         classes: Names of the classes of materials and tones, filled while painting.
+        focus: Point of the sheet, shape (2,), near which facets must be in their right order; None for all of it.
     """
 
     camera: Camera
     low: Array
     high: Array
     classes: dict[tuple[str, int], str] = field(default_factory=dict)
+    focus: Array | None = None
 
     def paths(self, solids: Sequence[ShownSolid], lines: Sequence[ShownLine]) -> str:
         """SVG of solids and lines."""
         mesh = self._mesh(solids)
         edges = drawn_edges(mesh)
-        depths = [mesh.corners[:, :, 2].mean(axis=1)]
+        depths = [mesh.corners[:, :, 2].mean(axis=1) if self.focus is None else depths_near(mesh.corners, self.focus)]
         pieces = [piece for line in lines for piece in self._pieces(line)]
         depths.append(np.array([depth for depth, _ in pieces]))
         order = np.argsort(np.round(np.concatenate(depths) / DEPTH_STEP), kind="stable")
@@ -84,10 +87,7 @@ class Painter:
 
     def _mesh(self, solids: Sequence[ShownSolid]) -> Mesh2D:
         """Facets that face the viewer and lie within what is shown."""
-        coarser, placed = 1.0, self._facets(solids, 1.0)
-        while sum(map(len, placed)) > 4 * MOST_FACETS and coarser < COARSEST:
-            coarser *= 2.0
-            placed = self._facets(solids, coarser)
+        placed = self._placed(solids)
         counts = [len(each) // 4 for each in placed]
         world = np.concatenate([np.zeros((0, 3)), *placed]).reshape(-1, 4, 3)
         owners = np.repeat(np.arange(len(solids)), counts)
@@ -99,13 +99,25 @@ class Painter:
         seen &= (corners[:, :, :2].min(axis=1) <= self.high).all(axis=1)
         return Mesh2D(corners[seen], normals[seen], owners[seen])
 
+    def _placed(self, solids: Sequence[ShownSolid]) -> list[Array]:
+        """Corners of the facets of each solid in the world, shape (4 K, 3): as many as a picture may have."""
+        coarser, found = 1.0, self._facets(solids, 1.0)
+        while sum(map(len, found)) > 4 * MOST_FACETS and coarser < COARSEST:
+            coarser *= 2.0
+            found = self._facets(solids, coarser)
+        beyond = sum(map(len, found)) - 4 * MOST_FACETS
+        sizes = np.round([bounding_sphere(each.shape)[1] for each in solids], 6)
+        for index in np.argsort(sizes, kind="stable").tolist():  # the smallest first
+            if beyond <= 0:
+                break
+            flat = silhouette(solids[index].shape, solids[index].X_WS, self.camera.axes).reshape(-1, 3)
+            beyond -= len(found[index]) - len(flat)
+            found[index] = flat
+        return found
+
     def _facets(self, solids: Sequence[ShownSolid], coarser: float) -> list[Array]:
         """Corners of the facets of each solid in the world, shape (4 K, 3)."""
-        deviation = coarser * DEVIATION / self.camera.scale
-        return [
-            transform_points(each.X_WS, facets(each.shape, sides(each.shape, deviation)).reshape(-1, 3))
-            for each in solids
-        ]
+        return [solid_facets(each, self.camera, coarser=coarser).reshape(-1, 3) for each in solids]
 
     def _pieces(self, line: ShownLine) -> list[tuple[float, str]]:
         """Depth and path of pieces of a line."""
@@ -127,6 +139,21 @@ class Painter:
         if key not in self.classes:
             self.classes[key] = f"{'l' if tone == LINE else 'c'}{len(self.classes)}"
         return self.classes[key]
+
+
+def depths_near(corners: Array, focus: Array) -> Array:
+    """Depths of facets on the sheet, shape (K, 4, 3), where they are nearest to a point of it, shape (K,)."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    apart = np.clip(focus, low[:, :2], high[:, :2]) - corners[:, 0, :2]
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    rise = np.einsum("ij,ij->i", normals[:, :2], apart) / np.where(normals[:, 2] == 0.0, np.inf, normals[:, 2])
+    return np.clip(corners[:, 0, 2] - rise, low[:, 2], high[:, 2])
+
+
+def solid_facets(solid: ShownSolid, camera: Camera, *, coarser: float = 1.0) -> Array:
+    """Facets of a solid in the world in [m], shape (K, 4, 3), as fine as a camera needs them."""
+    found = facets(solid.shape, sides(solid.shape, coarser * DEVIATION / camera.scale))
+    return transform_points(solid.X_WS, found.reshape(-1, 3)).reshape(-1, 4, 3)
 
 
 @dataclass(slots=True)

@@ -37,7 +37,7 @@ def still_svg(picture: StillPicture) -> str:
         'aria-labelledby="still-title still-desc">',
         f'<title id="still-title">{escape(picture.title)}</title>',
         f'<desc id="still-desc">{escape(_described(picture))}</desc>',
-        f"<style>{STYLE}{light}\n@media (prefers-color-scheme: dark) {{{DARK}{dark}\n}}</style>",
+        f"<style>{STYLE}{light}\n@media screen and (prefers-color-scheme: dark) {{{DARK}{dark}\n}}</style>",
         f'<rect class="sheet" width="{WIDTH}" height="{HEIGHT}" rx="80"/>',
         '<g class="bad">' if picture.is_bad else "<g>",
         _floor(picture, camera),

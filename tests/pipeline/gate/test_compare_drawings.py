@@ -1,7 +1,13 @@
 """What the gate says of drawings: rounding is none of it, a word or an element is."""
 
-import pytest
+import shutil
+from pathlib import Path
 
+import pytest
+from builders.run_edits import Copy, seal
+
+from cellplan import open_gate
+from cellplan.errors import InputError
 from cellplan.pipeline.gate.compare_drawings import foreign_piece, is_same_drawing
 
 DRAWN = (
@@ -51,3 +57,38 @@ def test_words_elements_and_attributes_must_be_those_that_are_drawn(old: str, ne
     assert other != DRAWN
     assert piece in str(foreign_piece(other, DRAWN))
     assert not is_same_drawing(other, DRAWN)
+
+
+def forged(sound: Path, folder: Path, name: str, old: str, new: str) -> Copy:
+    """A copy of a run in which a drawing says something else, in its file and on the page alike."""
+    shutil.copytree(sound, folder / "all")
+    copy = Copy(cell=folder / "all" / "cell" / "small.yaml", run=folder / "all" / "run", other=folder)
+    drawing, page = (copy.run / file for file in (name, "report.html"))
+    text = drawing.read_text(encoding="utf-8")
+    other = text.replace(old, new, 1)
+    assert other != text
+    drawing.write_text(other, encoding="utf-8")
+    page.write_text(page.read_text(encoding="utf-8").replace(text, other), encoding="utf-8")
+    seal(copy)
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [("still.svg", "</title>", " and released</title>"), ("floor_plan.svg", "</svg>", "<script>x()</script></svg>")],
+)
+def test_a_run_with_words_of_others_in_a_drawing_is_refused(
+    name: str, old: str, new: str, sound: Path, tmp_path: Path
+) -> None:
+    copy = forged(sound, tmp_path, name, old, new)
+
+    with pytest.raises(InputError, match=rf"{name}: unexpected .*, which cellplan does not draw"):
+        open_gate(copy.run, cell=copy.cell)
+
+
+def test_a_run_with_another_course_in_a_drawing_is_verified_with_a_remark(sound: Path, tmp_path: Path) -> None:
+    copy = forged(sound, tmp_path, "floor_plan.svg", 'd="M', 'd="M9')
+
+    remarks = open_gate(copy.run, cell=copy.cell).remarks
+
+    assert any("some pictures differ" in remark and "floor_plan.svg" in remark for remark in remarks)

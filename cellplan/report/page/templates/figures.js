@@ -31,7 +31,7 @@
     const box = group.querySelector("svg.box");
     const curves = [...box.querySelectorAll("path.curve")].map(readCurve);
     const marks = [...box.querySelectorAll("path.mark")].map((path) => ({ path, d: path.getAttribute("d") }));
-    const ends = [...group.children].filter((each) => each.getAttribute("text-anchor") === "end" && !each.matches(".tick-y"));
+    const ends = [...group.children].filter((each) => each.tagName === "text" && each.getAttribute("text-anchor") === "end");
     const [width, height] = numbers("size");
     const cursor = make("g", { class: "figure-cursor" }, group);
     return {

@@ -127,7 +127,7 @@
   addEventListener("resize", wide);
   wide();
   const unfold = () => {
-    const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const target = document.querySelector(":target");
     for (let each = target; each; each = each.parentElement) if (each.tagName === "DETAILS") each.open = true;
     if (target) target.scrollIntoView();
   };
