@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
-from cellplan.report.record.failures import FAILURES
+from cellplan.report.page.checks import FAILURES
 
 NOTE_WIDTH: Final = 84  # [characters] of a line below the title
 MOST_NOTES: Final = 2
