@@ -7,7 +7,7 @@ FONT: Final = 'system-ui,"Segoe UI","Helvetica Neue",Arial,sans-serif'
 STYLE: Final = f"""
 svg.still-sheet {{ font-family: {FONT}; color-scheme: light dark; }}
 .still-sheet .sheet {{ fill: #f6f8fa; }}
-.still-sheet path {{ stroke-width: 6; stroke-linejoin: round; }}
+.still-sheet path {{ stroke-width: 9; stroke-linejoin: round; }}
 .still-sheet .e {{ stroke: #101820; stroke-opacity: .45; stroke-width: 9; fill: none; stroke-linecap: round; }}
 .still-sheet .grid {{ stroke: #c8d0d9; stroke-width: 8; fill: none; }}
 .still-sheet .shadow {{ fill: #1d2733; fill-opacity: .13; stroke: none; }}
