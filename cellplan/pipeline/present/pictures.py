@@ -59,7 +59,10 @@ def _shares(record: Record) -> dict[str, Sheet]:
 
 SHEETS: Final[Mapping[str, Callable[[Record], Mapping[str, Sheet | None]]]] = {
     "study": study_sheets,
-    "layout": lambda record: {"floor plan": floor_plan(record), "front": front_sheet(record)},
+    "layout": lambda record: {
+        "floor plan": floor_plan(record),
+        "front": front_sheet(record) if len(record["front"]) > 1 else None,
+    },
     "map": lambda record: {"map": map_sheet(record)},
     "fastest": _shares,
 }

@@ -38,6 +38,12 @@ class Grid:
         return [list(row) for row in zip(*self.columns.values(), strict=True)][:MOST_ROWS]
 
     @property
+    def sides(self) -> list[str]:
+        """Side to which each column is aligned: numbers to the right, texts and the first column to the left."""
+        has_text = [any(isinstance(value, str) for value in column) for column in self.columns.values()]
+        return ["left" if is_text or place == 0 else "right" for place, is_text in enumerate(has_text)]
+
+    @property
     def left_out(self) -> int:
         """Number of rows that are not shown."""
         return max(0, max(map(len, self.columns.values()), default=0) - MOST_ROWS)
