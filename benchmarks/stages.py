@@ -44,8 +44,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     },
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
-    "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
-    "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},
+    "plots": {"cellplan.report.plots.run": ("run_figures",), "cellplan.report.plots.rendering": ("pictures",)},
     "report.json": {"cellplan.report.record.run": ("run_record",), "cellplan.report.record.series": ("series_json",)},
     "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {

@@ -11,8 +11,6 @@ from nbclient import NotebookClient
 import cellplan.planning.methods
 from cellplan.pipeline.export import EXPORTERS
 
-pytestmark = pytest.mark.usefixtures("sketched_pictures")
-
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 NOTEBOOK = EXAMPLES / "gallery" / "first_look.ipynb"
 PRINTED = {

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, Quiet, Settings
+from cellplan.cli.options import AllowDirs, AsJson, PlotFormats, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.cli.sweep import KeepRuns, Resume, TaskName, Workers
@@ -37,6 +37,7 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
     workers: Workers = None,
     resume: Resume = False,
     keep_runs: KeepRuns = False,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -57,6 +58,7 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
             allow_dirs=tuple(allow_dir or ()),
             settings=tuple(settings or ()),
             task=task,
+            formats=tuple(plots or ()),
         )
         folder = output or Path("outputs") / f"{first_name(job)}-compare"
         job = replace(job, runs=folder if keep_runs else None)

@@ -1,5 +1,6 @@
 """``cellplan solve``: plan a cell, check the result and write joint tables, report and plots."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from cellplan.cli.options import (
     Integrator,
     Method,
     Mode,
+    PlotFormats,
     Quiet,
     Settings,
 )
@@ -22,7 +24,6 @@ from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
-    from cellplan.pipeline.background_plots import BackgroundPlots
     from cellplan.pipeline.solution import Solution
     from cellplan.report.record.common import Record
 
@@ -55,6 +56,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
     with_view: WithView = False,
+    plots: PlotFormats = None,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
@@ -63,19 +65,16 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     The tables are written only when every check passes. Exit status: 0 passed, 1 a check failed, 2 bad input,
     3 no solution, 4 internal error.
     """
-    from cellplan.guard import BackgroundProcess
-
-    with json_failure(SCHEMA, desired=as_json), BackgroundProcess() as background:
-        from cellplan.pipeline.background_plots import BackgroundPlots
-
-        plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
+    with json_failure(SCHEMA, desired=as_json):
         from cellplan.cli.repair_line import repair_lines
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.solve import solve_with_plots
+        from cellplan.pipeline.solve import solve as solve_cell
+        from cellplan.report.plots.rendering import require_formats
         from cellplan.report.text.run import summary_lines
 
+        require_formats(plots or ())
         given = load_cell(cell, allow_dirs=allow_dir or ())
         changed = with_overrides(
             given,
@@ -90,8 +89,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or Path("outputs") / changed.name
         refuse_unless_replaceable(folder)
         with progress_listener(quiet=quiet) as progress:
-            solution = solve_with_plots(changed, plots, task=task, progress=progress)
-            record = _written(solution, folder, keep_rejected, plots, with_view)
+            solution = solve_cell(changed, task=task, progress=progress)
+            record = _written(solution, folder, keep_rejected, plots or (), with_view)
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "report.html")}
@@ -105,11 +104,11 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     raise typer.Exit(status)
 
 
-def _written(solution: "Solution", folder: Path, keep_rejected: bool, plots: "BackgroundPlots", view: bool) -> "Record":
+def _written(solution: "Solution", folder: Path, keep_rejected: bool, formats: Collection[str], view: bool) -> "Record":
     """Write a run folder, with its 3-D page where that is desired."""
     from cellplan.pipeline.write_run import write_run
 
-    record = write_run(solution, folder, keep_rejected=keep_rejected, plots=plots, view=view)
+    record = write_run(solution, folder, keep_rejected=keep_rejected, formats=formats, view=view)
     if view:
         from cellplan.pipeline.view.write import write_view_of_run
 

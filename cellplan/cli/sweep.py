@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, PlotFormats, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -45,6 +45,7 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
     workers: Workers = None,
     resume: Resume = False,
     keep_runs: KeepRuns = False,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -72,6 +73,7 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
             settings=(*of_mode, *(settings or ())),
             task=task,
             runs=folder if keep_runs else None,
+            formats=tuple(plots or ()),
         )
         with progress_listener(quiet=quiet) as progress:
             try:

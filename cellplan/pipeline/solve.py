@@ -15,7 +15,6 @@ from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.pipeline.background_plots import BackgroundPlots
 from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
@@ -47,23 +46,6 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
         NoSolutionError: No start posture or no home was found, or a tool lost its path.
     """
     scene, solution = solve_motion(cell, task=task, progress=progress)
-    return certified(solution, scene, progress=progress)
-
-
-def solve_with_plots(
-    cell: Cell, plots: BackgroundPlots, *, task: str | None = None, progress: Progress = silent
-) -> Solution:
-    """Solve as ``solve`` does, while the plots of the motion are drawn in the background during the clearance check.
-
-    Args:
-        cell: The cell, as ``load_cell`` gives it.
-        plots: Takes the reports of all runs as soon as all of them is known but the clearance.
-        task: Name of the only task to work on; the other operators stay at their homes.
-        progress: Called with the stage and the fraction done.
-    """
-    scene, solution = solve_motion(cell, task=task, progress=progress)
-    for run in solution.runs:
-        plots.begin(run.report, cell=run.cell_of(solution.cell))
     return certified(solution, scene, progress=progress)
 
 

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from cellplan.cli import progress
 from cellplan.cli.main import run
 
-pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 
 @pytest.fixture
@@ -203,3 +205,40 @@ def test_findings_about_a_cell_come_all_at_once_each_with_its_line(
     assert any("did you mean 'model'?" in line for line in lines)
     reported = json.loads(out)
     assert (reported["status"], reported["exit"], reported["errors"]) == ("error", 2, lines)
+
+
+def test_plots_are_vector_pictures_unless_others_are_requested(
+    hasty_pair: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["solve", str(hasty_pair), "--duration", "0.1", "-q", "-o"]
+    run([*options, str(tmp_path / "plain")])
+    run([*options, str(tmp_path / "more"), "--plots", "png"])
+
+    plain = {path.name for path in (tmp_path / "plain" / "plots").iterdir()}
+    assert {Path(name).suffix for name in plain} == {".svg"}
+    more = {path.name for path in (tmp_path / "more" / "plots").iterdir()}
+    assert more == plain | {Path(name).with_suffix(".png").name for name in plain}
+    page = (tmp_path / "more" / "report.html").read_bytes()
+    assert page == (tmp_path / "plain" / "report.html").read_bytes()
+    listed = json.loads((tmp_path / "more" / "manifest.json").read_text(encoding="utf-8"))["files"]
+    assert {f"plots/{name}" for name in more} <= set(listed)
+    capsys.readouterr()
+
+
+def test_an_unknown_format_of_plots_is_refused_before_the_cell_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = run(["solve", str(tmp_path / "missing.yaml"), "--plots", "gif"])
+
+    assert status == 2
+    assert "plots: expected one of png, pdf, got 'gif'" in capsys.readouterr().err
+
+
+def test_solving_imports_no_plotting_library(hasty_pair: Path, tmp_path: Path) -> None:
+    arguments = ["solve", str(hasty_pair), "--duration", "0.1", "-q", "-o", str(tmp_path / "run")]
+    program = f"import sys; from cellplan.cli.main import run; run({arguments}); sys.exit('matplotlib' in sys.modules)"
+
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+    assert found.returncode == 0, found.stderr
+    assert list((tmp_path / "run" / "plots").glob("*.svg"))

@@ -3,16 +3,14 @@
 from collections.abc import Callable, Mapping
 from typing import Final
 
-import numpy as np
-
 from cellplan.model.cell import Cell
 from cellplan.model.report import Report
-from cellplan.report.plots.base_map import map_sheet
-from cellplan.report.plots.fastest import curve_sheets
-from cellplan.report.plots.layout import floor_plan, front_sheet
-from cellplan.report.plots.run import clearance_sheets, motion_sheets
-from cellplan.report.plots.sheet import Sheet
-from cellplan.report.plots.study import study_sheets
+from cellplan.report.plots.base_map import map_figure
+from cellplan.report.plots.fastest import curve_figures
+from cellplan.report.plots.figure import Figure
+from cellplan.report.plots.layout import floor_plan, front_figure
+from cellplan.report.plots.run import run_figures
+from cellplan.report.plots.study import study_figures
 from cellplan.report.plots.svg import svg_text
 from cellplan.report.record.common import Record
 from cellplan.report.record.rows import format_of
@@ -21,19 +19,16 @@ Pictures = dict[str, str]  # SVG by what it shows
 
 
 def run_pictures(report: Report, cell: Cell) -> Pictures:
-    """Clearance over time, and the joints of the robot that comes nearest to a limit.
+    """Clearance over time, and the joints that come nearest to their limits.
 
     Args:
         report: The report of one phase.
         cell: The cell as it is in it.
     """
-    sheets = dict(clearance_sheets(report, cell=cell)) if report.clearance.curves else {}
-    bounded = [use for use in report.joints if np.isfinite(use.upper - use.lower)]
-    if bounded:
-        robot = min(bounded, key=lambda use: use.margin / (use.upper - use.lower)).robot
-        name = f"positions_{robot}"
-        sheets |= {key: sheet for key, sheet in motion_sheets(report, cell=cell).items() if key == name}
-    return _drawn(sheets, cell.name)
+    shown = {
+        name: figure for name, figure in run_figures(report, cell=cell).items() if name in ("clearance", "margins")
+    }
+    return _drawn(shown, cell.name)
 
 
 def record_pictures(record: Record) -> Pictures:
@@ -43,26 +38,26 @@ def record_pictures(record: Record) -> Pictures:
         record: Content of its JSON file.
     """
     kind = format_of(record)
-    sheets = SHEETS[kind](record) if kind in SHEETS else {}
-    return _drawn({name: sheet for name, sheet in sheets.items() if sheet is not None}, record["cell"])
+    figures = FIGURES[kind](record) if kind in FIGURES else {}
+    return _drawn({name: figure for name, figure in figures.items() if figure is not None}, record["cell"])
 
 
-def _drawn(sheets: Mapping[str, Sheet], cell: str) -> Pictures:
-    """Sheets as SVG by what they show."""
-    return {f"{cell}: {name.replace('_', ' ')}": svg_text(sheet) for name, sheet in sheets.items()}
+def _drawn(figures: Mapping[str, Figure], cell: str) -> Pictures:
+    """Figures as SVG by what they show."""
+    return {f"{cell}: {name.replace('_', ' ')}": svg_text(figure) for name, figure in figures.items()}
 
 
-def _shares(record: Record) -> dict[str, Sheet]:
-    """Of the sheets of a production curve that of the speeds alone."""
-    return {name: sheet for name, sheet in curve_sheets(record).items() if name == "max_velocity_ratio"}
+def _shares(record: Record) -> dict[str, Figure]:
+    """Of the figures of a production curve that of the speeds alone."""
+    return {name: figure for name, figure in curve_figures(record).items() if name == "max_velocity_ratio"}
 
 
-SHEETS: Final[Mapping[str, Callable[[Record], Mapping[str, Sheet | None]]]] = {
-    "study": study_sheets,
+FIGURES: Final[Mapping[str, Callable[[Record], Mapping[str, Figure | None]]]] = {
+    "study": study_figures,
     "layout": lambda record: {
         "floor plan": floor_plan(record),
-        "front": front_sheet(record) if len(record["front"]) > 1 else None,
+        "front": front_figure(record) if len(record["front"]) > 1 else None,
     },
-    "map": lambda record: {"map": map_sheet(record)},
+    "map": lambda record: {"map": map_figure(record)},
     "fastest": _shares,
 }

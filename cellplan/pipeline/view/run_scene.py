@@ -132,10 +132,10 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
     """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
     if "" in stored.records:
-        times, q = _series(stored, "", cell)
+        times, q = stored_series(stored, "", cell)
         yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, times=times, q=q)
         return
-    read = {name: _series(stored, name, cell) for name in stored.records}
+    read = {name: stored_series(stored, name, cell) for name in stored.records}
     for phase in phases:
         if phase["name"] not in read:
             file = stored.file("", "report.json")
@@ -151,8 +151,12 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
         )
 
 
-def _series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
-    """Times and stacked joint positions of one run, from its series."""
+def stored_series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
+    """Times in [s] and stacked joint positions in [rad] or [m] of one run, from its series.
+
+    Raises:
+        InputError: The series do not fit the cell.
+    """
     tree, columns = stored.series(place), list[Array]()
     try:
         times = np.array(tree["times_s"], dtype=np.float64)
