@@ -9,6 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.report import JointUse, Report
 from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Key, Limit, Mark, Panel, time_axis, value_axis
 from cellplan.report.plots.palette import INK, LIMIT, ROBOTS
+from cellplan.report.plots.placing import number_sign
 from cellplan.report.record.common import rounded_down
 
 MAX_ROBOTS: Final = 8  # with a panel each; more share one, with a curve for the worst joint of each robot
@@ -132,4 +133,4 @@ def _axis(shares: Array, *, is_margin: bool) -> Axis:
 
 def _worst_text(value: float, *, is_margin: bool) -> str:
     """The worst share in words."""
-    return f"{rounded_down(value):.1f} %" if is_margin else f"{value:.1f} %"
+    return f"{number_sign(f'{rounded_down(value) if is_margin else value:.1f}')} %"

@@ -147,13 +147,14 @@ def _clearance_panel(report: Report, required: float, index: int) -> Panel:
     kind, title = list(CLASS_TITLES.items())[index]
     distances = 1e3 * report.clearance.curves.get(kind, np.empty(0))
     minimum = report.clearance.minima.get(kind)
-    if not np.isfinite(distances).any() or minimum is None or minimum.minimum is None or minimum.at_s is None:
+    known = distances[np.isfinite(distances)]
+    if not len(known) or minimum is None or minimum.minimum is None or minimum.at_s is None:
         return Panel(title=title, note="no such pair", y=value_axis(0.0, 1.0, is_floored=True), items=[])
     smallest, word = 1e3 * minimum.minimum, "smallest" if minimum.exact else "at least"
     return Panel(
         title=f"{title}, in mm",
         note=f"{word} {rounded_down(smallest):.1f} at {minimum.at_s:.2f} s, required {required:g}",
-        y=value_axis(0.0, max(float(np.nanmax(distances)), required) or 1.0, unit="mm", is_floored=True),
+        y=value_axis(0.0, max(float(known.max()), required) or 1.0, unit="mm", is_floored=True),
         items=[
             Limit(required, is_upper=False),
             Curve("distance", report.clearance.curve_times, distances, CLASSES[index]),

@@ -59,6 +59,7 @@ def _grown(unit: Array, radius: float, length: float) -> Array:
     return grown
 
 
+@lru_cache(maxsize=256)
 def _of_mesh(mesh: Mesh, segments: int) -> Array:
     """Triangles of a mesh or of a coarser one, the last corner twice."""
     coarse = decimated(mesh, max(FEWEST_TRIANGLES, segments * segments), finest=MESH_CELLS * segments)

@@ -16,11 +16,12 @@ from cellplan.report.still.shading import LINE, tones
 FACING: Final = 1e-6  # [-] facets that are seen more sharply edge-on are left out: rounding
 DEPTH_STEP: Final = 1e-5  # [m] depths that differ by less are equal, so that rounding does not decide
 CREASE: Final = 0.8  # [-] cosine between neighbouring facets below which their common edge is drawn
-MOST_FACETS: Final = 4200  # [-] of a picture, those that face away among them; with more solids each has fewer
+MOST_FACETS: Final = 2800  # [-] of a picture, those that face away among them; with more solids each has fewer
 DEVIATION: Final = 12.0  # units of the sheet by which a round solid may differ from its facets
 COARSEST: Final = 64.0  # [-] times that
+SHORTEST_EDGE: Final = 24  # units of the sheet along both axes together: shorter ones do not show
 LIFT: Final = 0.012  # [m] by which a line is nearer than the surface that it lies on
-RUN: Final = 5  # [-] pieces of a line that are painted together
+RUN: Final = 8  # [-] pieces of a line that are painted together
 SAME_POINT: Final = 6  # decimals of corners in [m] that are one corner
 
 
@@ -77,7 +78,8 @@ class Painter:
             found.add(names[index], texts[index])
             for first, second in edges.get(index, ()):
                 (x, y), (u, v) = corners[index, first].tolist(), corners[index, second].tolist()
-                found.add("e", f"M{x} {y}L{u} {v}")
+                if abs(u - x) + abs(v - y) > SHORTEST_EDGE:
+                    found.add("e", f"M{x} {y}l{u - x} {v - y}")
         return found.text()
 
     def _mesh(self, solids: Sequence[ShownSolid]) -> Mesh2D:

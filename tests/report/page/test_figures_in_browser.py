@@ -179,6 +179,30 @@ def test_a_dragged_range_fills_every_panel_and_values_stay_where_they_were(page:
     assert browser.console == []
 
 
+def test_two_fingers_zoom_about_their_middle_and_one_reads(page: Path, browser: Browser) -> None:
+    browser.open(page, size=(390, 844))
+
+    said, ticks, heard = ask(
+        browser,
+        f"""
+        const finger = (kind, id, share) =>
+          point(kind, "{MARGINS}", spot("{MARGINS}", "abb", share), {{ pointerId: id, pointerType: "touch" }});
+        finger("pointerdown", 1, 0.5); finger("pointermove", 1, 0.75);
+        const said = reading("{MARGINS}", "kuka");
+        finger("pointerup", 1, 0.75); finger("pointerleave", 1, 0.75);
+        finger("pointerdown", 2, 0.4); finger("pointerdown", 3, 0.6);
+        finger("pointermove", 2, 0.3); finger("pointermove", 3, 0.7);
+        const ticks = labels("{MARGINS}", "abb");
+        finger("pointerup", 2, 0.3); finger("pointerup", 3, 0.7);
+        return [said, ticks, heard];""",
+    )
+
+    assert numbers(said)[0] == pytest.approx(3.0, abs=0.02)
+    assert heard == [pytest.approx(3.0, abs=0.02)]
+    assert 0.0 < min(ticks) < 2.0 < max(ticks) < 4.0
+    assert browser.console == []
+
+
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme: str) -> None:
     browser.open(page, size=(390, 844), theme=theme)

@@ -102,6 +102,27 @@ def test_what_was_not_judged_leads_to_its_full_lines(passed_run: Any) -> None:
     assert {text for text, place in found if place == "#unstated"} == {line.partition(":")[0] for line in lines}
 
 
+def test_pairs_that_someone_excluded_are_named_and_the_others_counted(passed_run: Any) -> None:
+    def entry(kind: str, *bodies: str) -> dict[str, Any]:
+        return {"kind": kind, "bodies": bodies, "reason": "because"}
+
+    record = record_of(passed_run)
+    left_out = [
+        entry("grip", "a", "part"),
+        entry("excluded", "b", "c"),
+        entry("mounted", "d", "e"),
+        entry("grip", "f", "g"),
+    ]
+
+    texts = [text for text, place in not_judged({**record, "left_out": left_out}) if place == "#left-out"]
+
+    assert texts == [
+        "not checked in full, excluded by the cell: b - c (because)",
+        "3 pairs with reduced checks (2 grip, 1 mounted on each other)",
+    ]
+    assert ("every pair was checked in full", "#left-out") in not_judged({**record, "left_out": []})
+
+
 @pytest.mark.parametrize("begin", [0.0, 4.98])
 def test_a_time_of_a_page_leads_to_that_of_the_program(begin: float) -> None:
     at = TimeLinks("../view.html", begin)

@@ -1,5 +1,6 @@
 """Plots: every peak survives, limits are drawn, and the bytes depend on the data alone."""
 
+import re
 import struct
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -104,6 +105,7 @@ def test_margins_and_speeds_are_shares_of_the_limits_of_each_joint(failed_run: A
             assert quick.curves[use.joint][:, 1].max() == pytest.approx(peak, abs=0.3)
         assert near.marks[0][1] == pytest.approx(min(curve[:, 1].min() for curve in near.curves.values()), abs=0.3)
     assert min(panel.marks[0][1] for panel in margins) < 0.0
+    assert any(re.search(r": −\d+\.\d % at ", word) for word in texts(drawn["margins.svg"]))
 
 
 def test_many_robots_share_a_panel_with_their_worst_joints(passed_run: Any) -> None:
