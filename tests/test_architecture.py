@@ -175,11 +175,10 @@ def is_door(path: Path, engine: str, doors: dict[str, list[str]]) -> bool:
 
 
 def test_every_engine_is_a_declared_dependency() -> None:
-    """Extras read xacro files, talk to a cluster, make frames, write DXF, and plots as PNG and PDF."""
-    project = CONFIGURATION["project"]
-    extras = project["optional-dependencies"]
-    optional = [line for name in ("xacro", "cluster", "frames", "plots", "dxf") for line in extras[name]]
-    requirements = [*project["dependencies"], *optional]
+    """Extras read xacro files, talk to a cluster, write DXF, PNG and PDF, make frames: only who does so needs them."""
+    extras = CONFIGURATION["project"]["optional-dependencies"]
+    further = [requirement for name in ("xacro", "cluster", "plots", "dxf", "frames") for requirement in extras[name]]
+    requirements = [*CONFIGURATION["project"]["dependencies"], *further]
     declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in requirements}
     package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml", "pydantic_core": "pydantic"}
     package_of["collada"] = "pycollada"

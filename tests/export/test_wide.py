@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from builders.home_to_home import PICK_AND_PLACE
 
 from cellplan import Solution, VerifiedRun, export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
@@ -169,9 +170,26 @@ def test_two_columns_of_the_same_name_are_refused(in_turns: Solution) -> None:
 
 
 @pytest.mark.slow
-def test_rows_that_phases_share_count_to_the_later_one(tmp_path: Path) -> None:
-    from builders.home_to_home import PICK_AND_PLACE
+def test_a_program_of_two_cycles_is_one_table_that_is_verified(tmp_path: Path) -> None:
+    (tmp_path / "cell.yaml").write_text(f"{PICK_AND_PLACE}  cycles: 2\n", encoding="utf-8")
+    solution = solve(load_cell(tmp_path / "cell.yaml"))
+    write_run(solution, tmp_path / "run")
+    verified = open_gate(tmp_path / "run", cell=tmp_path / "cell.yaml")
 
+    assert export_program(verified, tmp_path / "wide", form="wide") == ("wide.csv",)
+    table = pd.read_csv(tmp_path / "wide" / "wide.csv")
+    clock = pd.read_csv(tmp_path / "run" / "tables" / "clock.csv", comment="#")
+    joints = pd.read_csv(tmp_path / "run" / "tables" / "pen.csv", comment="#")
+    assert list(table["phase"]) == list(clock["phase"])
+    for name in joints.columns[1:]:
+        np.testing.assert_allclose(table[f"pen.{name}"], joints[name], atol=1e-9)
+    count = len(table) // 2  # the second cycle repeats the rows of the first, whose last row it begins in
+    first, second = table["seam.position_error_mm"][:count], table["seam.position_error_mm"][count:-1]
+    np.testing.assert_array_equal(first.to_numpy(), second.to_numpy())
+
+
+@pytest.mark.slow
+def test_rows_that_phases_share_count_to_the_later_one(tmp_path: Path) -> None:
     (tmp_path / "cell.yaml").write_text(PICK_AND_PLACE, encoding="utf-8")
     solution = solve(load_cell(tmp_path / "cell.yaml"))
     columns = wide_columns(solution_rows(solution))

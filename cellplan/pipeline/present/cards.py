@@ -20,7 +20,7 @@ from cellplan.pipeline.present.pictures import record_pictures, run_pictures
 from cellplan.pipeline.present.result_tables import NOWHERE, record_at, run_records, tables_of
 from cellplan.pipeline.solution import Solution
 from cellplan.planning.layout_screening import Screening
-from cellplan.report.page.figures import key_figures
+from cellplan.report.page.figures import figure, key_figures
 from cellplan.report.page.filters import fixed, small
 from cellplan.report.page.notebook import Card, Grid
 from cellplan.report.record.common import Record
@@ -109,7 +109,7 @@ def _(result: Report) -> Card:
     failed = [check.message for check in result.checks if not check.passed]
     checks = f"{len(result.checks)} checks" if not failed else f"{len(failed)} of {len(result.checks)} checks"
     clearance = tables_of(result)["clearance"]()
-    figures = [{"label": "Cycle time", "value": fixed(result.cycle_time, 2), "unit": "s", "detail": result.mode}]
+    figures = [figure("Cycle time", fixed(result.cycle_time, 2), "s", note=result.mode)]
     return Card(
         kind="Report" if result.phase is None else f"Report of {result.phase}",
         name=result.cell,
@@ -137,14 +137,9 @@ def _(result: Cell) -> Card:
         kind="Cell",
         name=result.name,
         figures=[
-            {"label": "Mode", "value": str(result.motion.mode), "unit": "", "detail": ""},
-            {"label": "Part", "value": _part_text(result), "unit": "", "detail": ""},
-            {
-                "label": "Required clearance",
-                "value": small(MM * result.checks.clearance),
-                "unit": "mm",
-                "detail": f"{len(result.obstacles)} obstacles",
-            },
+            figure("Mode", str(result.motion.mode), "", note=""),
+            figure("Part", _part_text(result), "", note=""),
+            figure("Required clearance", small(MM * result.checks.clearance), "mm"),
         ],
         grids=[
             _grid("Robots", robots, ("robot", "model", "role", "joints", "x_mm", "y_mm", "z_mm", "yaw_deg"), "robots"),
@@ -165,8 +160,8 @@ def _(result: Screening) -> Card:
         if result.cell is None
         else f"{result.cell.name}: {len(result.start)} layouts",
         figures=[
-            {"label": "Follow the paths", "value": str(followed), "unit": "", "detail": ""},
-            {"label": "Within all limits", "value": str(feasible), "unit": "", "detail": "collisions are not checked"},
+            figure("Follow the paths", str(followed), "", note=""),
+            figure("Within all limits", str(feasible), "", note="collisions are not checked"),
         ],
         grids=[_grid("Layouts", tables["candidates"](), (), "candidates")],
     )

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Final
 
-import numpy as np
-
 from cellplan.model.cell import Cell
 from cellplan.model.report import Report
 from cellplan.report.plots.base_map import map_figure
@@ -21,19 +19,16 @@ Pictures = dict[str, str]  # SVG by what it shows
 
 
 def run_pictures(report: Report, cell: Cell) -> Pictures:
-    """Clearance over time, and the joints of the robot that comes nearest to a limit.
+    """Clearance over time, and the joints that come nearest to their limits.
 
     Args:
         report: The report of one phase.
         cell: The cell as it is in it.
     """
-    shown = {"clearance"} if report.clearance.curves else set()
-    bounded = [use for use in report.joints if np.isfinite(use.upper - use.lower)]
-    if bounded:
-        robot = min(bounded, key=lambda use: use.margin / (use.upper - use.lower)).robot
-        shown.add(f"positions_{robot}")
-    figures = run_figures(report, cell=cell)
-    return _drawn({name: figure for name, figure in figures.items() if name in shown}, cell.name)
+    shown = {
+        name: figure for name, figure in run_figures(report, cell=cell).items() if name in ("clearance", "margins")
+    }
+    return _drawn(shown, cell.name)
 
 
 def record_pictures(record: Record) -> Pictures:
@@ -59,7 +54,10 @@ def _shares(record: Record) -> dict[str, Figure]:
 
 FIGURES: Final[Mapping[str, Callable[[Record], Mapping[str, Figure | None]]]] = {
     "study": study_figures,
-    "layout": lambda record: {"floor plan": floor_plan(record), "front": front_figure(record)},
+    "layout": lambda record: {
+        "floor plan": floor_plan(record),
+        "front": front_figure(record) if len(record["front"]) > 1 else None,
+    },
     "map": lambda record: {"map": map_figure(record)},
     "fastest": _shares,
 }

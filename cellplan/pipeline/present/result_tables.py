@@ -71,7 +71,7 @@ def _(result: Mapping) -> Tables:  # type: ignore[type-arg]
 
 @tables_of.register
 def _(result: Path) -> Tables:
-    if result.is_dir() and (result / MANIFEST).exists():
+    if _is_run(result):
         stored = read_stored_run(result)
         phases = {record.get("phase"): place for place, record in stored.records.items()}
         tables = run_tables(list(stored.records.values()))
@@ -139,10 +139,15 @@ def record_at(path: Path) -> Record:
     Raises:
         InputError: There is none, or it cannot be read.
     """
-    if path.is_dir() and (path / MANIFEST).exists():
+    if _is_run(path):
         return read_stored_run(path).record
     file = next((path / name for name in RECORDS if (path / name).exists()), path) if path.is_dir() else path
     return parse_json(read_regular_file(file, file=str(file), limit=LARGEST), str(file))
+
+
+def _is_run(path: Path) -> bool:
+    """Whether a path is the folder of a run."""
+    return all((path / name).is_file() for name in (MANIFEST, "report.json"))
 
 
 def run_records(phases: Sequence[tuple[Report, Cell]]) -> list[Record]:

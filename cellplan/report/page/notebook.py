@@ -10,8 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from cellplan.report.page.filters import fixed
 from cellplan.report.page.render import template
-from cellplan.report.record.common import Entries
+from cellplan.report.record.common import Entries, Record
 
 MOST_ROWS: Final = 10  # [-] of a table
 DIGITS: Final = 4  # [-] significant, of numbers in tables
@@ -38,6 +39,12 @@ class Grid:
         return [list(row) for row in zip(*self.columns.values(), strict=True)][:MOST_ROWS]
 
     @property
+    def sides(self) -> list[str]:
+        """Side to which each column is aligned: numbers to the right, texts and the first column to the left."""
+        has_text = [any(isinstance(value, str) for value in column) for column in self.columns.values()]
+        return ["left" if is_text or place == 0 else "right" for place, is_text in enumerate(has_text)]
+
+    @property
     def left_out(self) -> int:
         """Number of rows that are not shown."""
         return max(0, max(map(len, self.columns.values()), default=0) - MOST_ROWS)
@@ -53,7 +60,7 @@ class Card:
         verdict: The verdict in a few words; empty without one.
         passed: Whether it is a good one; None where it is neither good nor bad.
         findings: What is wrong, a line each.
-        figures: Key figures, with ``label``, ``value``, ``unit`` and ``detail``, and ``is_bad`` where they may be.
+        figures: Key figures, each as ``figure`` gives it.
         pictures: Pictures as SVG by what they show.
         grids: Short tables.
     """
@@ -77,7 +84,15 @@ def card_html(card: Card) -> str:
     pictures = {
         title: f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}" for title, svg in card.pictures.items()
     }
-    return template("notebook.html").render(card=card, pictures=pictures, shown=_shown, most=MOST_LINES)
+    texts = {"shown": _shown, "detail": _detail, "most": MOST_LINES}
+    return template("notebook.html").render(card=card, pictures=pictures, **texts)
+
+
+def _detail(figure: Record) -> str:
+    """Where and when a key figure is found, and what else there is to say."""
+    at = "" if figure["at_s"] is None else f"at {fixed(figure['at_s'] + figure['shift'], 3)} s"
+    place = " ".join(part for part in (figure["where"], at) if part)
+    return "; ".join(part for part in (place, figure["note"]) if part)
 
 
 def _shown(value: Any) -> str:

@@ -159,8 +159,8 @@ def _names(form: Any) -> list[str]:
 
 def _listed(record: Record, key: str, form: Any = None, names: Iterable[str] = ()) -> Table:
     """Table of a list of records."""
-    known = [*names, *(_names(form) if form else ())]
-    return lambda: columns_of(map(flat, record.get(key) or ()), (name for name in known if name not in LIFTED))
+    known = [*names, *(name for name in (_names(form) if form else ()) if name not in LIFTED)]
+    return lambda: columns_of(map(flat, record.get(key) or ()), known)
 
 
 def _study_tables(record: Record) -> Tables:

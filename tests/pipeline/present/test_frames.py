@@ -241,7 +241,7 @@ def test_without_pandas_the_line_that_installs_it_is_named(solution: Solution, m
 
 
 @pytest.mark.slow
-def test_records_of_all_studies_have_tables(cells: Path, tmp_path: Path) -> None:
+def test_records_of_all_studies_have_tables(sound: Path, cells: Path, tmp_path: Path) -> None:
     """Of real searches, as the commands write them: each table has a row for each entry of the record."""
     pair, quick = str(cells / "planar_pair.yaml"), ["--set", "motion.step_s=0.02", "-q"]
     vary = ["--vary", "right.base={x_mm: [1500, 2300], y_mm: [0, 600]}"]
@@ -250,8 +250,19 @@ def test_records_of_all_studies_have_tables(cells: Path, tmp_path: Path) -> None
         "map": ["map", pair, "--robot", "right", "--grid", "400", "-q"],
         "fastest": ["fastest", pair, "-q"],
     }
+    small = str(sound / "cell" / "small.yaml")
+    (tmp_path / "errors.yaml").write_text("cellplan_errors: 1\nrobots: {right: {base: {xyz_mm: [0.5, 0, 0]}}}\n")
+    commands["rehearse"] = ["rehearse", small, "--errors", str(tmp_path / "errors.yaml"), "-q"]
+    commands["compare"] = ["compare", pair, *quick]
+    commands["repair"] = ["layout", small, "--repair", "--clearance", "200", "-q"]
     for name, command in commands.items():
         assert run_cli([*command, "-o", str(tmp_path / name)]) in {0, 1}
+    assert len(to_frame(tmp_path / "compare")) == len(record_of(tmp_path / "compare" / "study.json")["variants"])
+    advice = record_of(tmp_path / "repair" / "advice.json")
+    assert list(to_frame(tmp_path / "repair")["text"]) == [remedy["text"] for remedy in advice["remedies"]] != []
+    rehearsed = record_of(tmp_path / "rehearse" / "rehearsal.json")["tasks"]["path"]["before"]
+    error = to_frame(tmp_path / "rehearse")["before.max_position_error_mm"]
+    assert list(error) == [rehearsed["max_position_error_mm"]]
     assert len(to_frame(tmp_path / "layout")) == len(record_of(tmp_path / "layout" / "study.json")["top"])
     assert len(to_frame(tmp_path / "map")) == len(record_of(tmp_path / "map" / "map.json")["places"])
     curve = pd.read_csv(next((tmp_path / "fastest").glob("*.csv")))
