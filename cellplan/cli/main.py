@@ -17,6 +17,7 @@ from cellplan.cli.errors import OutputError, report_failure
 from cellplan.cli.explain import explain
 from cellplan.cli.export import export
 from cellplan.cli.fastest import fastest
+from cellplan.cli.floor_plan import floor_plan
 from cellplan.cli.layout import layout
 from cellplan.cli.output import say
 from cellplan.cli.rehearse import rehearse
@@ -63,6 +64,7 @@ app.command()(explain)
 app.command()(solve)
 app.command()(verify)
 app.command()(view)
+app.command("floorplan")(floor_plan)
 app.command()(export)
 app.command()(sweep)
 app.command()(compare)

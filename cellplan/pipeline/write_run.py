@@ -1,6 +1,6 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -14,6 +14,7 @@ from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
 from cellplan.pipeline.early_files import early_files, with_early_files
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
@@ -45,9 +46,10 @@ def write_run(
 ) -> Record:
     """Write a run folder; it appears whole or not at all.
 
-    The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; ``tables/`` only
-    if every check passed. The phases of a program with one for each task have reports and plots of their own in
-    subfolders, and an overview above them. Last comes ``manifest.json``, which names every file.
+    The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; as drawings
+    ``still.svg`` and ``floor_plan.svg``; ``tables/`` only if every check passed. The phases of a program with one for
+    each task have reports, drawings and plots of their own in subfolders, and an overview above them. Last comes
+    ``manifest.json``, which names every file.
 
     Args:
         solution: The solution.
@@ -79,7 +81,9 @@ def write_run(
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
+            phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
             beside = Beside(view=view_beside("") if view else "", files=tables)
+            beside |= _write_drawings(target, "", program_drawings(cell, phases))
             target.write_text("report.html", overview_page(record, cell=cell, **beside))
         target.write_text("cell.yaml", render_cell(cell))
         if has_tables:
@@ -117,9 +121,18 @@ def _write_report(
     plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
+    phase = DrawnPhase(cell, run.schedule, run.report)
+    beside |= _write_drawings(target, place, phase_drawings(phase, floor_plan=early.floor_plan))
     page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
     target.write_text(f"{place}report.html", page)
     return record
+
+
+def _write_drawings(target: RunFolder, place: str, drawings: Mapping[str, str]) -> Beside:
+    """Write the drawings of the cell; returns them by what a page calls them."""
+    for name, text in drawings.items():
+        target.write_text(f"{place}{name}", text)
+    return {"still": drawings[STILL], "floor_plan": drawings[FLOOR_PLAN]}
 
 
 def _write_tables(target: RunFolder, program: Program, folder: str) -> None:

@@ -24,6 +24,7 @@ COMMANDS = (
     "explain",
     "export",
     "fastest",
+    "floorplan",
     "layout",
     "map",
     "rehearse",

@@ -88,6 +88,14 @@ def test_equal_maps_have_equal_bytes(cell: Cell, found: Any, tmp_path: Path) -> 
     assert json.loads(files[0]["map.json"]) == json.loads(json.dumps(found))
 
 
+def test_the_picture_is_written_in_requested_formats_too(found: Any, tmp_path: Path) -> None:
+    write_base_map(found, tmp_path / "map", formats=["png"])
+    write_base_map(found, tmp_path / "map", formats=["pdf"])  # an earlier map is replaced
+
+    assert {each.name for each in (tmp_path / "map").iterdir()} == {"map.json", "map.html", "map.svg", "map.pdf"}
+    assert (tmp_path / "map" / "map.pdf").read_bytes().startswith(b"%PDF")
+
+
 def test_the_base_is_turned_to_the_part_on_request(cell: Cell) -> None:
     grid = BaseGrid(x=(1900, 1900), y=(0, 300), step=300, yaw="toward")
 

@@ -79,8 +79,9 @@ def test_the_command_prints_a_row_for_each_variant(tmp_path: Path, capsys: pytes
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "planar-pair: 2 of 2 variants passed"
     assert [line.split()[:2] for line in lines[2:4]] == [["1", "passed"], ["2", "passed"]]
-    assert run(["sweep", *arguments, "--resume", "--json", "--quiet"]) == 0
+    assert run(["sweep", *arguments, "--resume", "--plots", "png", "--json", "--quiet"]) == 0
     record = json.loads(capsys.readouterr().out)
+    assert {"study.svg", "study.png"} <= {path.name for path in (tmp_path / "s").iterdir()}
     assert record["exit"] == 0
     assert record["study"]["counts"] == {"passed": 2, "failed": 0, "no_solution": 0, "bad_input": 0, "crashed": 0}
 

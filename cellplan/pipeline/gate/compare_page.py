@@ -7,6 +7,8 @@ from cellplan.io.input.findings import listed, shown
 from cellplan.io.run.stored import StoredRun
 from cellplan.model.cell import Cell
 from cellplan.model.verified_run import VerifiedMotion
+from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL
+from cellplan.pipeline.gate.compare_drawings import CellDrawings, foreign_drawings, stored_drawings
 from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
@@ -28,7 +30,9 @@ def drawn_again(motions: Sequence[VerifiedMotion]) -> Drawings:
     return {motion.name or "": pictures(run_figures(motion.report, cell=motion.cell)) for motion in motions}
 
 
-def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
+def page_findings(
+    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings, drawings: CellDrawings
+) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
     Args:
@@ -36,7 +40,9 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
         cell: Its cell.
         motions: What was found.
         drawn: The pictures of it.
+        drawings: Its drawings of the cell.
     """
+    yield from foreign_drawings(stored, drawings)
     for motion in motions:
         place = motion.name or ""
         yield from _foreign_pieces(stored, place, drawn[place])
@@ -92,9 +98,11 @@ def _page_finding(
 
 
 def _beside(stored: StoredRun, place: str) -> Beside:
-    """What lies beside a page of the run: its files, and the 3-D page for a page that leads there."""
+    """What lies beside a page of the run: the 3-D page where it leads there, and the drawings of the cell on disk."""
     text = stored.content(place, PAGE).decode("utf-8", "replace")
-    return Beside(view=view_beside(place) if has_view_links(text) else "", files=tuple(stored.manifest.files))
+    found = stored_drawings(stored, place, (STILL, FLOOR_PLAN))
+    view = view_beside(place) if has_view_links(text) else ""
+    return {"view": view, "still": found[STILL], "floor_plan": found[FLOOR_PLAN], "files": tuple(stored.manifest.files)}
 
 
 def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:

@@ -17,6 +17,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedMotion, VerifiedRun
+from cellplan.pipeline.gate.compare_drawings import drawings_again, other_drawings
 from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
 from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
@@ -225,8 +226,9 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     if not _is_of_this_version(stored):
         return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
     drawn = drawn_again(motions)
-    _refuse_because(stored, list(page_findings(stored, cell, motions, drawn)))
-    other = list(other_pictures(stored, drawn))
+    drawings = drawings_again(cell, motions)
+    _refuse_because(stored, list(page_findings(stored, cell, motions, drawn, drawings)))
+    other = [*other_pictures(stored, drawn), *other_drawings(stored, drawings)]
     remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"
     return (remark,) if other else ()
 

@@ -71,7 +71,7 @@ def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> It
 def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
     """The scene of a cell whose robots stand still at their starts."""
     cell = scene.cell
-    q = np.concatenate([_standing(robot) for robot in cell.robots])
+    q = np.concatenate([standing(robot) for robot in cell.robots])
     touching = touching_pairs(scene, q)
     tasks, faults = task_records(cell)
     times = np.zeros(1)
@@ -98,7 +98,7 @@ def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
     }
 
 
-def _standing(robot: Robot) -> Array:
+def standing(robot: Robot) -> Array:
     """Where a robot stands: its start, its home, or the middle of its range."""
     for given in (robot.start, robot.home):
         if given is not None:

@@ -157,7 +157,7 @@ def task_records(cell: Cell) -> tuple[list[TaskViewRecord], list[str]]:
     records, faults = list[TaskViewRecord](), list[str]()
     for task in cell.tasks:
         try:
-            points = _points(cell, task)
+            points = path_points(cell, task)
         except InputError as error:
             points, fault = np.zeros((0, 3)), str(error)
             faults.append(fault)
@@ -172,8 +172,8 @@ def task_records(cell: Cell) -> tuple[list[TaskViewRecord], list[str]]:
     return records, faults
 
 
-def _points(cell: Cell, task: Task) -> Array:
-    """Points along the path of a task, shape (N, 3), corners among them."""
+def path_points(cell: Cell, task: Task) -> Array:
+    """Points along the path of a task in [m], shape (N, 3), corners among them, on the part or in the world."""
     toolpath = build_toolpath(task, cell.part)
     if toolpath.is_timed:
         return toolpath.spread(PATH_POINTS)[:, :3, 3]

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from cellplan.model.cell import Cell
-from cellplan.model.left_out import TITLES
+from cellplan.model.left_out import TITLES, LeftOutKind, left_out_lines
 from cellplan.model.units import MM
 from cellplan.report.page.checks import failure_groups
 from cellplan.report.page.filters import floored, small
 from cellplan.report.page.times import Shifts, phase_begins
 from cellplan.report.record.common import Entries, Record
 
+BY_NAME: Final = frozenset({LeftOutKind.EXCLUDED, LeftOutKind.SRDF})  # excluded by someone, not by their nature
 MAX_SPEEDS: Final = 4  # tasks on the first screen; all of them have a line in the table of process speeds
 
 
@@ -93,12 +94,7 @@ def not_judged(record: Record) -> list[tuple[str, str]]:
 def _not_judged(record: Record) -> Iterator[tuple[str, str]]:
     heads = dict.fromkeys(line.partition(": ")[0] for line in record["rests_on"]["lines"])
     yield from ((head, "#unstated") for head in heads)
-    kinds: dict[str, int] = {}
-    for each in record.get("left_out", ()):
-        kinds[each["kind"]] = kinds.get(each["kind"], 0) + 1
-    if kinds:
-        named = ", ".join(f"{count} {TITLES[kind]}" for kind in TITLES if (count := kinds.get(kind)))
-        yield f"{sum(kinds.values())} pairs with reduced checks ({named})", "#left-out"
+    yield from _reduced_checks(record)
     for each in record["accelerations"]["not_judged"]:
         of = f" of {each['robot']}" if each["robot"] else ""
         yield f"{each['what']}{of}", "#accelerations"
@@ -106,3 +102,15 @@ def _not_judged(record: Record) -> Iterator[tuple[str, str]]:
         yield f"{len(record['open_surfaces'])} meshes are not closed", "#open-surfaces"
     if record.get("clearance_proof", {}).get("not_certified"):
         yield "distances of some pairs between the samples", "#assumptions"
+
+
+def _reduced_checks(record: Record) -> Iterator[tuple[str, str]]:
+    """Pairs that were not checked in full: those that someone excluded by name, the others by their number."""
+    entries = [(each["kind"], tuple(each["bodies"]), each["reason"]) for each in record.get("left_out", ())]
+    by_name = [each for each in entries if each[0] in BY_NAME]
+    if by_name or not entries:
+        yield from ((line, "#left-out") for line in left_out_lines(by_name))
+    kinds = [kind for kind, _, _ in entries if kind not in BY_NAME]
+    if kinds:
+        named = ", ".join(f"{kinds.count(kind)} {TITLES[kind]}" for kind in TITLES if kind in kinds)
+        yield f"{len(kinds)} pairs with reduced checks ({named})", "#left-out"

@@ -45,6 +45,7 @@ def map_figure(record: Record) -> Figure:
         x=Axis(low=x[0] - half, high=x[-1] + half, label="x in mm", unit="mm"),
         panels=[panel],
         is_plane=True,
+        is_exact=True,
         legend=list(_legend(record)),
     )
 
@@ -115,8 +116,8 @@ def _best(record: Record) -> Iterator[Item]:
     for rank, each in enumerate(record["best"]):
         place = record["places"][each["place"]]
         colour = {"passed": PAPER, None: INK}.get((each["certified"] or {}).get("status"), LIMIT)
-        size = 6.5 if rank == 0 else 3.5
-        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=INK, is_star=rank == 0)
+        size, edge = 6.5 if rank == 0 else 3.5, INK if colour == PAPER else PAPER
+        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
 
 
 def _legend(record: Record) -> Iterator[Key]:

@@ -64,27 +64,37 @@ def paint(figure: Figure, kind: str) -> bytes:
     found, buffer = placed(figure), io.BytesIO()
     with style():
         canvas = Canvas(figsize=(found.width / INCH, found.height / INCH))
-        in_points = Affine2D().scale(1.0, -1.0).translate(0.0, found.height).scale(1.0 / INCH)
-        for artist in _artists(found):
-            artist.set_transform(in_points + canvas.dpi_scale_trans)
+        flipped = Affine2D().scale(1.0, -1.0).translate(0.0, found.height).scale(1.0 / INCH)
+        in_points = flipped + canvas.dpi_scale_trans
+        for artist, frame in _artists(found):
+            artist.set_transform(in_points)
             canvas.add_artist(artist)
+            if frame is not None:
+                corner = (frame.left, frame.top)
+                artist.set_clip_path(patches.Rectangle(corner, frame.width, frame.height, transform=in_points))
         canvas.savefig(buffer, format=kind, **_OPTIONS[kind])
     return buffer.getvalue()
 
 
-def _artists(found: Placed) -> Iterator[Artist]:
-    """Everything in a figure."""
+def _artists(found: Placed) -> Iterator[tuple[Artist, PlacedPanel | None]]:
+    """Everything in a figure, and the panel at whose frame it is cut off, if any."""
+    is_plane = found.figure.is_plane
     for x, y, colour in found.swatches:
-        yield patches.Rectangle((x, y), *SWATCH, color=colour, linewidth=0)
+        yield patches.Rectangle((x, y), *SWATCH, color=colour, linewidth=0), None
     for box in found.panels:
-        yield from _panel(box, is_plane=found.figure.is_plane)
+        for artist in _panel(box, is_plane=is_plane):
+            yield artist, None
+        for place, item in enumerate(box.panel.items):
+            for artist in _item(box, item, 2.0 + 1e-3 * place):
+                yield artist, box if is_plane else None
         for each in box.words:
-            yield _text(each._replace(x=each.x + box.left, y=each.y + box.top))
-    yield from map(_text, found.words)
+            yield _text(each._replace(x=each.x + box.left, y=each.y + box.top)), None
+    for each in found.words:
+        yield _text(each), None
 
 
 def _panel(box: PlacedPanel, *, is_plane: bool) -> Iterator[Artist]:
-    """Ranges, grid, items and frame of a panel."""
+    """Forbidden ranges, grid and frame of a panel."""
     for item in box.panel.items:
         if isinstance(item, Limit) and item.is_shaded and not item.is_vertical:
             at = float(np.clip(box.down(item.value), 0.0, box.height))
@@ -95,8 +105,6 @@ def _panel(box: PlacedPanel, *, is_plane: bool) -> Iterator[Artist]:
         yield _line(box, np.full(2, box.across(value)), np.array([0.0, box.height]), color=GRID, zorder=1.0)
     for value in () if is_plane else box.y_ticks:
         yield _line(box, np.array([0.0, box.width]), np.full(2, box.down(value)), color=GRID, zorder=1.0)
-    for place, item in enumerate(box.panel.items):
-        yield from _item(box, item, 2.0 + 1e-3 * place)
     colour = GREY if is_plane else FRAME
     corners = [(0.0, 0.0), (0.0, box.height), (box.width, box.height)]
     corners += [(box.width, 0.0), (0.0, 0.0)] if is_plane else []

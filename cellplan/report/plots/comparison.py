@@ -34,7 +34,11 @@ def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[
         record: As ``comparison_record`` returns it.
         curves: Curves of each variant; None for one without a motion.
     """
-    found = [{**each["figures"], "curves": its} for each, its in zip(record["variants"], curves, strict=True) if its]
+    found = [
+        {**each["figures"], "name": each["name"], "curves": its}
+        for each, its in zip(record["variants"], curves, strict=True)
+        if its
+    ]
     solved: dict[str, Any] = dict(zip(ROBOTS, found, strict=False))
     robots = drawn_robots(record)
     if not solved or not robots:
@@ -104,14 +108,17 @@ def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
 def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
     """Highest joint speed of one robot in every variant."""
     curves = {
-        colour: (each["curves"]["times_s"], PERCENT * np.array(each["curves"]["velocity_ratio"][robot]))
+        colour: (each["name"], each["curves"]["times_s"], PERCENT * np.array(each["curves"]["velocity_ratio"][robot]))
         for colour, each in solved.items()
         if robot in each["curves"]["velocity_ratio"]
     }
-    highest = max(float(values.max()) for _, values in curves.values())
+    highest = max(float(values.max()) for _, _, values in curves.values())
     top = min(TOP, highest)
     items: list[Item] = [Limit(PERCENT)] if top > PERCENT else []
-    items += [Curve("", np.array(times), np.minimum(values, top), pen) for pen, (times, values) in curves.items()]
+    items += [
+        Curve(name, np.array(times), np.minimum(values, top), colour)
+        for colour, (name, times, values) in curves.items()
+    ]
     note = f"up to {highest:.0f} %" if highest > TOP else ""
     return Panel(title=robot, note=note, y=value_axis(0.0, top, unit="%", is_floored=True), items=items)
 
@@ -119,17 +126,21 @@ def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
 def _clearance(solved: Mapping[str, Any]) -> Figure:
     """Smallest distance of all bodies over time."""
     curves = {
-        colour: (np.array(each["curves"]["clearance_times_s"]), np.array(each["curves"]["clearance_mm"]))
+        colour: (
+            each["name"],
+            np.array(each["curves"]["clearance_times_s"]),
+            np.array(each["curves"]["clearance_mm"]),
+        )
         for colour, each in solved.items()
         if each["curves"]["clearance_mm"]
     }
     end = max(each["cycle_time_s"] for each in solved.values())
     required = {each["required_clearance_mm"] for each in solved.values()}
-    highest = max(float(values.max()) for _, values in curves.values())
+    highest = max(float(values.max()) for _, _, values in curves.values())
     items: list[Item] = []
     if len(required) == 1:
         items.append(Limit(max(required), f"required: {max(required):g} mm", is_upper=False))
-    items += [Curve("", times, values, colour) for colour, (times, values) in curves.items()]
+    items += [Curve(name, times, values, colour) for colour, (name, times, values) in curves.items()]
     axis = value_axis(0.0, max(highest, *required), unit="mm", is_floored=True)
     title = "smallest distance of all bodies over time, certified between the rows"
     panel = Panel(title="distance, in mm", y=axis, items=items)

@@ -176,6 +176,7 @@ class Figure:
         row: Height of a row of panels in [inch].
         is_plane: Whether both axes are lengths in one scale, seen from above: a frame with ticks and no grid.
         legend: Texts to the right of the panels.
+        is_exact: Whether its colours are data, and stay as they are on a dark page.
         text: What the figure shows, for those who do not see it.
     """
 
@@ -187,4 +188,5 @@ class Figure:
     row: float = ROW
     is_plane: bool = False
     legend: Sequence[Key] = ()
+    is_exact: bool = False
     text: str = ""

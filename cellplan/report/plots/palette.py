@@ -55,8 +55,9 @@ def _colour(index: int) -> str:
 
 
 def dark_rules() -> str:
-    """Style rules that replace the colours of pictures where the reader prefers a dark page."""
+    """Style rules that replace the colours of figures where the reader prefers a dark page."""
     rules = "".join(
-        f'[fill="{light}"]{{fill:{dark}}}[stroke="{light}"]{{stroke:{dark}}}' for light, dark in ON_DARK.items()
+        f'.figure [fill="{light}"]{{fill:{dark}}}.figure [stroke="{light}"]{{stroke:{dark}}}'
+        for light, dark in ON_DARK.items()
     )
     return f"@media screen and (prefers-color-scheme:dark){{{rules}}}"

@@ -18,6 +18,7 @@ from cellplan.report.plots.placing import SWATCH, TICK, Placed, PlacedPanel, Wor
 from cellplan.report.plots.thinning import peaks_kept, straightened
 
 FINE: Final = 100  # coordinates to a point
+POINTS_DRAWN: Final = 1.5  # of a curve in a point of width: one per pixel, more would only enlarge the files
 THINNING_TOL: Final = 0.12 * FINE  # that a curve may lie beside its points: a tenth of its width
 FARTHEST: Final = 1e7  # of coordinates: what lies far outside its box
 FONT: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
@@ -48,14 +49,15 @@ def _head(found: Placed) -> Iterator[str]:
     """The opening tag, what the figure shows in words, its style for dark pages and its paper."""
     figure = found.figure
     size = f"{found.width:.6g} {found.height:.6g}"
-    title = figure.title or figure.panels[0].title
+    title, kind = figure.title or figure.panels[0].title, "exact" if figure.is_exact else "figure"
     yield (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" data-columns="{figure.columns}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" class="{kind}" '
         f'font-family="{FONT}" stroke-linejoin="round">'
     )
     yield f"<title>{escape(title)}</title>"
     yield f"<desc>{escape(figure.text or _description(figure))}</desc>"
-    yield f"<style>{dark_rules()}</style>"
+    if not figure.is_exact:
+        yield f"<style>{dark_rules()}</style>"
     yield f'<rect class="paper" width="{found.width:.6g}" height="{found.height:.6g}" fill="{PAPER}"/>'
 
 
@@ -67,11 +69,27 @@ def _description(figure: Figure) -> str:
 
 def _words(each: Words) -> str:
     """A line of text."""
-    place = f'x="{each.x:.2f}" y="{each.y:.2f}" font-size="{each.size:g}" fill="{each.colour}"'
+    place = f'x="{_short(each.x)}" y="{_short(each.y)}" font-size="{each.size:g}" fill="{each.colour}"'
     anchor = f' text-anchor="{each.anchor}"' if each.anchor != "start" else ""
     weight = ' font-weight="bold"' if each.is_bold else ""
     kind = f' class="{each.kind}"' if each.kind else ""
     return f"<text{kind} {place}{anchor}{weight}>{escape(each.text)}</text>"
+
+
+def _tick_labels(box: PlacedPanel) -> Iterator[str]:
+    """The numbers along both axes, a group for each."""
+    for kind in ("tick-y", "tick-x"):
+        labels = [each for each in box.words if each.kind == kind]
+        if labels:
+            first = labels[0]
+            pen = f'font-size="{first.size:g}" fill="{first.colour}" text-anchor="{first.anchor}"'
+            texts = (f'<text x="{_short(each.x)}" y="{_short(each.y)}">{escape(each.text)}</text>' for each in labels)
+            yield f'<g class="{kind}" {pen}>{"".join(texts)}</g>'
+
+
+def _short(length: float) -> str:
+    """A length with at most two decimals."""
+    return f"{length:.2f}".rstrip("0").rstrip(".")
 
 
 def _swatches(found: Placed) -> Iterator[str]:
@@ -94,7 +112,7 @@ def _panels(found: Placed) -> Iterator[str]:
         )
         width, height = round(FINE * box.width), round(FINE * box.height)
         size = f'width="{box.width:.6g}" height="{box.height:.6g}" viewBox="0 0 {width} {height}"'
-        yield f'<svg class="box" {size} overflow="visible" fill="none">'
+        yield f'<svg class="box" {size} overflow="{"hidden" if is_plane else "visible"}" fill="none">'
         yield from _forbidden(box)
         if not is_plane:
             yield f'<path class="grid" d="{_grid(box)}" stroke="{GRID}" stroke-width="80"/>'
@@ -103,7 +121,8 @@ def _panels(found: Placed) -> Iterator[str]:
         yield "</svg>"
         frame = _plane_frame(box) if is_plane else f"M0 0V{box.height:.6g}H{box.width:.6g}"
         yield f'<path class="frame" d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
-        yield from map(_words, box.words)
+        yield from _tick_labels(box)
+        yield from (_words(each) for each in box.words if not each.kind.startswith("tick"))
         yield "</g>"
 
 
@@ -142,7 +161,8 @@ def _item(box: PlacedPanel, item: object) -> Iterator[str]:
         (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
         place = f'x="{_fine(left)}" y="{_fine(top)}" width="{_fine(right) - _fine(left)}"'
         opacity = f' fill-opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
-        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" fill="{item.colour}"{opacity}/>'
+        fill = f'fill="{item.colour}"{opacity} shape-rendering="crispEdges"'
+        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" {fill}/>'
     elif isinstance(item, Limit):
         line = f"M{_fine(box.across(item.value))} 0V{round(FINE * box.height)}"
         if not item.is_vertical:
@@ -170,7 +190,7 @@ def _curve(box: PlacedPanel, curve: Curve) -> Iterator[str]:
 def _stretch(box: PlacedPanel, x: Array, y: Array, is_function: bool) -> str:
     """The path of a stretch without gaps: its first point, and from each point to the next."""
     if is_function:
-        kept = peaks_kept(y)
+        kept = peaks_kept(y, round(POINTS_DRAWN * box.width))
         x, y = x[kept], y[kept]
     points = np.stack([FINE * box.across(x), FINE * box.down(y)], axis=-1)
     points = np.rint(np.clip(points, -FARTHEST, FARTHEST))

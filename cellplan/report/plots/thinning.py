@@ -7,14 +7,18 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 
-CURVE_POINTS: Final = 600  # [-] about one point per pixel: more would only enlarge the files
 ROUND_SHARES: Final = tuple(
     4.0**k / 341.0 for k in range(5)
 )  # [-] of the tolerance in each round: steps of twice the length leave a bent curve four times as far
 
 
-def peaks_kept(values: Array, points: int = CURVE_POINTS) -> Indices:
-    """Indices of about ``points`` samples, among them the first, the last, and the extremes of every interval."""
+def peaks_kept(values: Array, points: int) -> Indices:
+    """Indices of some samples, among them the first, the last, and the extremes of every interval.
+
+    Args:
+        values: Shape (N,).
+        points: About how many there may be.
+    """
     n = len(values)
     if n <= points:
         return np.arange(n)

@@ -266,3 +266,16 @@ def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, own_cac
     write_run(solve(forged), copy / "run")
 
     assert "closest_pairs" in refusal(copy / "run", cell)
+
+
+def test_pictures_in_requested_formats_are_listed_and_held_to_their_digests(sound: Path, tmp_path: Path) -> None:
+    cell = sound / "cell" / "small.yaml"
+    write_run(solve(load_cell(cell)), tmp_path / "run", formats=["png"])
+    picture = tmp_path / "run" / "plots" / "clearance.png"
+
+    run = open_gate(tmp_path / "run", cell=cell)
+    assert run.remarks == ()
+    assert run.file_count == sum(path.is_file() for path in (tmp_path / "run").rglob("*")) - 1
+
+    picture.write_bytes(picture.read_bytes() + b"x")
+    assert "clearance.png" in refusal(tmp_path / "run", cell)

@@ -49,7 +49,8 @@ def test_all_phases_stand_in_one_table_per_robot_with_a_line_between_them(solved
     folder = solved[0].parent / "run"
     assert sorted(path.name for path in (folder / "tables").iterdir()) == ["clock.csv", "left.csv", "right.csv"]
     assert sorted(path.name for path in folder.iterdir()) == [
-        *("cell.yaml", "first", "manifest.json", "report.html", "report.json", "second", "tables"),
+        *("cell.yaml", "first", "floor_plan.svg", "manifest.json", "report.html", "report.json", "second"),
+        *("still.svg", "tables"),
     ]
     for robot in ("left", "right"):
         text = (folder / "tables" / f"{robot}.csv").read_text()

@@ -191,7 +191,7 @@ def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme
         const sizes = shown.map((each) => {
           const scale = each.getBoundingClientRect().width / each.viewBox.baseVal.width;
           const words = [...each.querySelectorAll("text")];
-          return scale * Math.min(...words.map((text) => Number(text.getAttribute("font-size"))));
+          return scale * Math.min(...words.map((text) => parseFloat(getComputedStyle(text).fontSize)));
         });
         const wide = shown.map((each) => each.getBoundingClientRect().right);
         const title = figure("joint margins").querySelector(".title");
@@ -208,19 +208,36 @@ def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme
 
 
 def test_print_shows_what_is_in_the_files(page: Path, browser: Browser) -> None:
+    """Given a narrow window and a zoom: then paper shows the whole motion in the width of the file."""
     browser.open(page, size=(390, 844))
-    file = re.search(r"<svg xmlns.*?viewBox=\"([^\"]+)\"", page.read_text(encoding="utf-8"))
-    assert file is not None
 
-    browser.command("Emulation.setEmulatedMedia", media="print")
-    printed = ask(
+    before, printed, after = ask(
         browser,
-        f"dispatchEvent(new Event('beforeprint')); tell(1.0); const svg = figure('{MARGINS}'); "
-        "return [svg.getAttribute('viewBox'), getComputedStyle(svg.querySelector('.cursor')).display];",
+        f"""
+        const svg = figure("{MARGINS}");
+        const shown = () =>
+          svg.getAttribute("viewBox") + [...svg.querySelectorAll(".curve")].map((each) => each.getAttribute("d"));
+        tell(1.0);
+        document.querySelector(".figure-tools button:nth-child(2)").click();
+        const before = shown();
+        dispatchEvent(new Event("beforeprint"));
+        const printed = shown();
+        dispatchEvent(new Event("afterprint"));
+        return [before, printed, shown()];""",
     )
+    browser.command("Emulation.setEmulatedMedia", media="print")
+    is_shown = browser.run("return getComputedStyle(document.querySelector('.figure-cursor')).display !== 'none';")
     browser.command("Emulation.setEmulatedMedia", media="")
 
-    assert printed == [file[1], "none"]
+    text = page.read_text(encoding="utf-8")
+    drawing = text[text.rindex("<svg", 0, text.index(f"<title>{MARGINS}")) :]
+    drawing = drawing[: drawing.index("</figure>")]
+    size = re.search(r'viewBox="([^"]+)"', drawing)
+    assert size is not None
+    curves = re.findall(r'class="curve"[^>]* d="([^"]+)"', drawing)
+    assert printed == size[1] + ",".join(curves)
+    assert before == after != printed
+    assert not is_shown
 
 
 def test_a_script_that_was_changed_does_not_run(page: Path, browser: Browser, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from cellplan.model.report import Check
 from cellplan.model.task import Process
 from cellplan.report.page.checks import FAILURES, MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
+from cellplan.report.page.render import report_page
 from cellplan.report.page.times import TimeLinks, page_begin
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
@@ -101,6 +102,27 @@ def test_what_was_not_judged_leads_to_its_full_lines(passed_run: Any) -> None:
     assert {text for text, place in found if place == "#unstated"} == {line.partition(":")[0] for line in lines}
 
 
+def test_pairs_that_someone_excluded_are_named_and_the_others_counted(passed_run: Any) -> None:
+    def entry(kind: str, *bodies: str) -> dict[str, Any]:
+        return {"kind": kind, "bodies": bodies, "reason": "because"}
+
+    record = record_of(passed_run)
+    left_out = [
+        entry("grip", "a", "part"),
+        entry("excluded", "b", "c"),
+        entry("mounted", "d", "e"),
+        entry("grip", "f", "g"),
+    ]
+
+    texts = [text for text, place in not_judged({**record, "left_out": left_out}) if place == "#left-out"]
+
+    assert texts == [
+        "not checked in full, excluded by the cell: b - c (because)",
+        "3 pairs with reduced checks (2 grip, 1 mounted on each other)",
+    ]
+    assert ("every pair was checked in full", "#left-out") in not_judged({**record, "left_out": []})
+
+
 @pytest.mark.parametrize("begin", [0.0, 4.98])
 def test_a_time_of_a_page_leads_to_that_of_the_program(begin: float) -> None:
     at = TimeLinks("../view.html", begin)
@@ -124,3 +146,21 @@ def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: An
     assert page_begin(record) == 0.0
     assert {row["run"] for row in rows} <= set(reports)
     assert all(row["message"] for row in rows)
+
+
+def test_a_picture_is_shown_even_if_nothing_has_a_time(passed_run: Any) -> None:
+    record = record_of(passed_run)
+    nowhere = {
+        kind: {**each, "minimum_mm": None, "pair": None, "at_s": None} for kind, each in record["clearance"].items()
+    }
+    record = {**record, "clearance": nowhere}
+    still = '<?xml version="1.0"?><svg viewBox="0 0 4 3"><title>picture</title></svg>'
+
+    page = report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}, still=still)
+
+    assert worst_instant(record) is None
+    assert page.count("<title>picture</title>") == 1
+    assert "<?xml" not in page
+    assert (
+        "picture" not in report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}).split("<main")[1]
+    )

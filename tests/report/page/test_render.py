@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cellplan.model.cell import LockedJoint
+from cellplan.model.phase import Phase, Work
 from cellplan.model.report import Check, JointDrift, Repeatability
 from cellplan.report.page import render
 from cellplan.report.page.render import overview_page, report_page
@@ -207,7 +208,13 @@ def hostile(run: Any) -> Any:
         speeds={renamed.get(name, name): replace(speed, axis=HOSTILE) for name, speed in report.speeds.items()},
         clearance=replace(report.clearance, exclusions=((HOSTILE, HOSTILE, HOSTILE),)),
     )
-    cell = replace(run.cell, robots=robots, inputs={HOSTILE: HOSTILE})
+    report = replace(
+        report,
+        accuracy=tuple(replace(each, task=HOSTILE) if each.task == "circle" else each for each in report.accuracy),
+        phases=(Phase(name=HOSTILE, roles={HOSTILE: Work(HOSTILE)}, end=4.0),),
+    )
+    tasks = tuple(replace(task, name=HOSTILE) if task.name == "circle" else task for task in run.cell.tasks)
+    cell = replace(run.cell, robots=robots, tasks=tasks, inputs={HOSTILE: HOSTILE})
     return replace(run, report=report, cell=cell)
 
 
@@ -219,6 +226,7 @@ def test_hostile_names_stay_text(passed_run: Any) -> None:
     assert "img" not in page.tags
     assert page.tags.count("script") == len(SCRIPTS)
     assert HOSTILE in "".join(page.words)
+    assert page.text.count(HOSTILE) > 20  # the cell, robots, tasks, phases, checks, pairs and files
     assert "49" not in page.text.partition("checks")[0]
 
 

@@ -180,7 +180,7 @@ def test_names_with_signs_of_markup_stay_text(passed_run: Any) -> None:
 
 @given(arrays(float, st.integers(1, 5000), elements=st.floats(-1e6, 1e6)))
 def test_thinning_keeps_ends_and_extremes(values: Any) -> None:
-    kept = peaks_kept(values)
+    kept = peaks_kept(values, 600)
     assert np.all(np.diff(kept) > 0)
     assert (kept[0], kept[-1]) == (0, len(values) - 1)
     assert values[kept].max() == values.max()

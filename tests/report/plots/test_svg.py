@@ -116,7 +116,7 @@ def test_a_picture_says_what_it_shows_and_reads_on_dark_pages() -> None:
 
     assert "<title>joints</title>" in text
     assert "<desc>A1, in deg: margin 3.0. Along: time in s.</desc>" in text
-    assert 'role="img"' in text
+    assert 'role="img" class="figure"' in text
     used = {piece[:7] for key in ("fill", "stroke") for piece in text.split(f' {key}="')[1:] if piece[0] == "#"}
     assert used <= set(ON_DARK)
     assert "<style>" not in inline_svg(text)

@@ -7,7 +7,7 @@
   const LEFT = 42, RIGHT = 11, HEAD = 33, FOOT = 20, NARROW = 560, PIXELS = 1.25; // points; pixels; pixels to a point
   const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   const figures = [];
-  let pinned = null, hovered = null, pixelsBefore = innerWidth;
+  let pinned = null, hovered = null, pixelsBefore = innerWidth, isPrinting = false;
 
   function make(name, attributes, parent, text = "") {
     const element = document.createElementNS(SVG, name);
@@ -31,9 +31,9 @@
     const box = group.querySelector("svg.box");
     const curves = [...box.querySelectorAll("path.curve")].map(readCurve);
     const marks = [...box.querySelectorAll("path.mark")].map((path) => ({ path, d: path.getAttribute("d") }));
-    const ends = [...group.children].filter((each) => each.getAttribute("text-anchor") === "end" && !each.matches(".tick-y"));
+    const ends = [...group.children].filter((each) => each.tagName === "text" && each.getAttribute("text-anchor") === "end");
     const [width, height] = numbers("size");
-    const cursor = make("g", { class: "cursor" }, group);
+    const cursor = make("g", { class: "figure-cursor" }, group);
     return {
       group, box, left, top, width, height, curves, marks, ends, cursor, frame: group.querySelector("path.frame"),
       x: numbers("x"), y: numbers("y"), view: numbers("x"), isLog: "log" in group.dataset, unit: group.dataset.unit ?? "",
@@ -158,7 +158,7 @@
   }
   function arrange(figure) {
     const pixels = figure.holder.clientWidth;
-    const isNarrow = pixels > 0 && pixels < NARROW && !matchMedia("print").matches;
+    const isNarrow = pixels > 0 && pixels < NARROW && !isPrinting;
     const width = isNarrow ? pixels / PIXELS : figure.width;
     let top = 30 + HEAD;
     if (figure.title) top += 13 * wrapped(figure.title, figure.name, isNarrow ? Math.floor(width / 6.6) : Infinity);
@@ -289,7 +289,11 @@
       selection?.element.remove();
       begun = selection = null;
     };
-    svg.addEventListener("pointercancel", finish);
+    svg.addEventListener("pointercancel", (event) => {
+      finish(event);
+      hovered = null; // the page scrolls
+      drawCursors();
+    });
     svg.addEventListener("pointerleave", (event) => {
       if (touches.size && event.pointerType !== "touch") return;
       hovered = null;
@@ -362,7 +366,7 @@
   status.className = "figure-status";
   status.setAttribute("role", "status");
   document.body.append(status);
-  for (const svg of document.querySelectorAll("figure > svg")) {
+  for (const svg of document.querySelectorAll("figure > svg.figure")) {
     const figure = readFigure(svg);
     if (!figure.panels.length) continue;
     figures.push(figure);
@@ -375,6 +379,18 @@
     if (innerWidth !== pixelsBefore) figures.forEach(draw);
     pixelsBefore = innerWidth;
   });
-  addEventListener("beforeprint", () => figures.forEach(draw));
-  addEventListener("afterprint", () => figures.forEach(draw));
+  const views = new Map();
+  addEventListener("beforeprint", () => {
+    isPrinting = true; // on paper figures are what they are in the files
+    for (const panel of figures.flatMap((figure) => figure.panels)) {
+      views.set(panel, panel.view);
+      panel.view = panel.x;
+    }
+    figures.forEach(draw);
+  });
+  addEventListener("afterprint", () => {
+    isPrinting = false;
+    for (const [panel, view] of views) panel.view = view;
+    figures.forEach(draw);
+  });
 })();

@@ -51,11 +51,11 @@
   });
   if (bar) bar.querySelector("button").addEventListener("click", () => tell(null));
   function showCursor(share) {
-    for (const old of strips.querySelectorAll(".cursor")) old.remove();
+    for (const old of strips.querySelectorAll(".strip-cursor")) old.remove();
     if (share === null) return;
     for (const strip of strips.querySelectorAll(".strip")) {
       const cursor = document.createElement("i");
-      cursor.className = "cursor";
+      cursor.className = "strip-cursor";
       cursor.style.left = `${100 * share}%`;
       strip.append(cursor);
     }
@@ -120,14 +120,14 @@
 
   // Boxes that scroll can be scrolled by keys; what an address leads to is unfolded.
   const wide = () => {
-    for (const box of document.querySelectorAll(".wide, .plot"))
+    for (const box of document.querySelectorAll(".wide, .plot, .floor-plan div"))
       if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
       else box.removeAttribute("tabindex");
   };
   addEventListener("resize", wide);
   wide();
   const unfold = () => {
-    const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const target = document.querySelector(":target");
     for (let each = target; each; each = each.parentElement) if (each.tagName === "DETAILS") each.open = true;
     if (target) target.scrollIntoView();
   };

@@ -1,0 +1,134 @@
+"""Write the floor plan of a run, or of a cell that was not solved, as SVG or DXF."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.io.cell.load import load_cell
+from cellplan.io.run.stored import read_stored_run
+from cellplan.model.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.pipeline.check import check
+from cellplan.pipeline.floor_plan import floor_plan, swept_state
+from cellplan.pipeline.gate.stored_cell import load_stored_cell
+from cellplan.pipeline.overrides import with_overrides
+from cellplan.pipeline.view.cell_scene import standing
+from cellplan.pipeline.view.describe import path_points
+from cellplan.pipeline.view.run_scene import stored_series
+from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf
+from cellplan.report.floor_plan.plan import FloorPlan
+from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
+from cellplan.study.folder import write_whole
+
+OWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
+
+
+class PlanFormat(StrEnum):
+    """Formats of a floor plan."""
+
+    SVG = "svg"
+    DXF = "dxf"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorPlanRequest:
+    """What is to be drawn.
+
+    Attributes:
+        path: A run folder or a cell file.
+        cell: The cell file of a run that depends on further files; None where the folder is enough.
+        settings: Values of a cell file, as ``KEY=VALUE``.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+    """
+
+    path: Path
+    cell: Path | None = None
+    settings: Sequence[str] = field(default=())
+    allow_dirs: Sequence[Path] = field(default=())
+
+
+def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = silent) -> FloorPlan:
+    """The floor plan of a run with what its motion sweeps, or of a cell file at its start.
+
+    Raises:
+        InputError: The path is neither a run nor a cell, or does not fit the options.
+    """
+    if request.path.is_dir():
+        if request.settings:
+            raise InputError(f"--set: expected a cell file with it, got the folder '{request.path}'")
+        return _of_run(request)
+    if request.cell is not None:
+        raise InputError(f"--cell: expected a run with it, got '{request.path}'")
+    cell = with_overrides(load_cell(request.path, allow_dirs=request.allow_dirs), request.settings)
+    return _of_cell(cell, progress)
+
+
+def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat) -> int:
+    """Write a floor plan whole or not at all; gives the size of the file in bytes.
+
+    Raises:
+        InputError: The place holds something else or cannot be written, or ``ezdxf`` is missing.
+    """
+    if target.is_symlink() or (target.exists() and not _is_floor_plan(target)):
+        raise InputError(f"{target}: holds something that is no floor plan; choose another file with -o")
+    content = (floor_plan_svg(plan) if form is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(target, content)
+    except OSError as error:
+        raise InputError(f"{target}: cannot write the floor plan: {(error.strerror or str(error)).lower()}") from error
+    return len(content)
+
+
+def _is_floor_plan(path: Path) -> bool:
+    """Whether a file is a floor plan that cellplan wrote."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        start = file.read(max(map(len, OWN_STARTS)))
+    return start.startswith(OWN_STARTS)
+
+
+def _of_run(request: FloorPlanRequest) -> FloorPlan:
+    """The floor plan of a run on disk."""
+    stored = read_stored_run(request.path)
+    cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs).cell
+    read = [stored_series(stored, place, cell) for place in stored.records]
+    motions = [_by_robot(cell, q) for _, q in read]
+    start = {name: q[0] for name, q in motions[0].items()}
+    whole = sum(float(times[-1]) for times, _ in read)
+    return floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
+
+
+def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:
+    """The floor plan of a cell that was not solved."""
+    try:
+        started, state = check(cell, progress=progress).cell, "Robots at the start"
+    except (InputError, NoSolutionError):
+        started, state = cell, "Robots where the cell puts them, as no start was found"
+    start = {robot.name: standing(robot) for robot in started.robots}
+    return floor_plan(started, start, [], _task_points(started), state=state)
+
+
+def _by_robot(cell: Cell, q: Array) -> Mapping[str, Array]:
+    """Stacked joint positions of shape (N, nq) by robot."""
+    return {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
+
+
+def _task_points(cell: Cell) -> dict[str, Array]:
+    """Points along the paths of all tasks; a path that cannot be built has none."""
+    found = {}
+    for task in cell.tasks:
+        try:
+            points = path_points(cell, task)
+        except InputError:
+            continue
+        if np.all(np.isfinite(points)):
+            found[task.name] = points
+    return found

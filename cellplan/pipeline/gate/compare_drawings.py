@@ -1,0 +1,99 @@
+"""Whether the drawings of a run on disk are those of what was found: figures may differ by rounding, words may not."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
+from xml.etree import ElementTree as ET
+
+from cellplan.io.input.findings import shown
+from cellplan.io.run.stored import StoredRun
+from cellplan.model.cell import Cell
+from cellplan.model.verified_run import VerifiedMotion
+from cellplan.pipeline.cell_drawings import DrawnPhase, phase_drawings, program_drawings
+
+CellDrawings = Mapping[str, Mapping[str, str]]
+
+PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
+COURSE: Final = re.compile(r'(?<= d=")[MLHVlhvz\d. -]*(?=")')  # of a line
+FIGURE: Final = re.compile(r"(?<![\w#-])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
+ROUNDING: Final = (
+    3.0  # units of a sheet, which are at most a tenth of a millimetre: what rounding to a whole one can do
+)
+
+
+def drawings_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> CellDrawings:
+    """The drawings of what was found, by the place of the run and by file name."""
+    phases = [DrawnPhase(motion.cell, motion.schedule, motion.report) for motion in motions]
+    found = {motion.name or "": phase_drawings(phase) for motion, phase in zip(motions, phases, strict=True)}
+    return found if "" in found else {**found, "": program_drawings(cell, phases)}
+
+
+def stored_drawings(stored: StoredRun, place: str, names: Iterable[str]) -> dict[str, str]:
+    """Drawings as they are on disk, by their names.
+
+    Raises:
+        InputError: One is missing, or was changed meanwhile.
+    """
+    return {name: stored.content(place, name).decode("utf-8", "replace") for name in names}
+
+
+def foreign_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
+    """Drawings that hold something that cellplan does not draw there: an element, an attribute, a word."""
+    for place, own in drawn.items():
+        on_disk = stored_drawings(stored, place, own)
+        for name, text in own.items():
+            foreign = foreign_piece(on_disk[name], text)
+            if foreign is not None:
+                file = stored.file(place, name)
+                yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
+
+
+def other_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
+    """Drawings of the run that are not those drawn anew, apart from rounding."""
+    for place, own in drawn.items():
+        on_disk = stored_drawings(stored, place, own)
+        for name, text in own.items():
+            if not is_same_drawing(on_disk[name], text):
+                yield f"{place}/{name}" if place else name
+
+
+def foreign_piece(got: str, drawn: str) -> str | None:
+    """The first piece of a drawing that the one drawn anew has nowhere, whatever its figures; None without any."""
+    known = {_without_figures(piece) for piece in PIECE.findall(drawn)}
+    foreign = next((piece for piece in PIECE.findall(got) if _without_figures(piece) not in known), None)
+    return next(_unbalanced(got), None) if foreign is None else shown(" ".join(foreign.split()))
+
+
+def is_same_drawing(got: str, drawn: str) -> bool:
+    """Whether two drawings are the same, but for figures of tags that differ by rounding."""
+    pieces, others = PIECE.findall(got), PIECE.findall(drawn)
+    return len(pieces) == len(others) and all(map(_is_same_piece, pieces, others))
+
+
+def _is_same_piece(got: str, drawn: str) -> bool:
+    """Whether two pieces are the same; figures of tags may differ by rounding."""
+    if got == drawn:
+        return True
+    one, other = (COURSE.sub(_apart, piece) for piece in (got, drawn))
+    if not drawn.startswith("<") or FIGURE.split(one) != FIGURE.split(other):
+        return False
+    figures = zip(FIGURE.findall(one), FIGURE.findall(other), strict=True)
+    return all(abs(float(first) - float(second)) <= ROUNDING for first, second in figures)
+
+
+def _apart(course: re.Match[str]) -> str:
+    """The course of a line with its letters set apart from its figures."""
+    return re.sub("[A-Za-z]", r" \g<0> ", course[0])
+
+
+def _without_figures(piece: str) -> str:
+    """A piece without the figures of a tag; words as they are."""
+    return FIGURE.sub("0", COURSE.sub("", piece)) if piece.startswith("<") else piece.strip()
+
+
+def _unbalanced(got: str) -> Iterator[str]:
+    """What keeps a drawing from being one whole element."""
+    try:
+        ET.fromstring(got)  # noqa: S314 - it holds no piece, and so no entity, that is not drawn here
+    except ET.ParseError as error:
+        yield f"a drawing that cannot be read ({error})"

@@ -1,0 +1,1 @@
+"""The picture of the instant that decides the verdict of a run."""

@@ -1,0 +1,172 @@
+"""The instant that decides the verdict of a run, and how it is called."""
+
+import textwrap
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.model.cell import Cell
+from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
+from cellplan.model.units import MM
+
+TITLES: Final = {
+    "collision": "Collision",
+    "grip_depth": "Holder too deep in the part",
+    "mount_depth": "Tool too deep in the arm",
+    "standing_depth": "Body too deep in its support",
+    "tool_depth": "Tool too deep in the part",
+    "joint_position": "Joint beyond its limit",
+    "locked_joint": "Failed joint moves",
+    "home": "Idle robot leaves its home",
+    "payload": "Payload exceeded",
+    "payload_centre": "Centre of mass of the load",
+    "payload_moment": "Moment of the load",
+    "payload_inertia": "Inertia of the load",
+    "clearance": "Clearance too small",
+    "joint_velocity": "Joint too fast",
+    "joint_acceleration": "Joint acceleration too high",
+    "joint_acceleration_between_phases": "Joint acceleration too high where phases meet",
+    "joint_acceleration_assumed": "Joint acceleration above its assumed limit",
+    "joint_jerk": "Joint jerk too high",
+    "part_acceleration": "Acceleration of the part too high",
+    "tool_speed": "Tool too fast",
+    "closure_position_error": "Co-holder off its grasp",
+    "closure_orientation_error": "Co-holder tilted on its grasp",
+    "closure_position_error_between_rows": "Co-holder off its grasp between the rows",
+    "closure_orientation_error_between_rows": "Co-holder tilted on its grasp between the rows",
+    "position_error": "Tool off its path",
+    "orientation_error": "Tool orientation off",
+    "position_error_between_rows": "Tool off its path between the rows",
+    "orientation_error_between_rows": "Tool orientation off between the rows",
+    "process_feed": "Feed not kept",
+    "process_on_delay": "Delay at the start of a process",
+    "process_off_delay": "Delay at the end of a process",
+    "joint_drift": "Joints do not return",
+}  # what failed checks are called, the gravest first
+NOTE_WIDTH: Final = 84  # [characters] of a line below the title
+MOST_NOTES: Final = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Instant:
+    """The instant that decides a verdict.
+
+    Attributes:
+        at_s: Its time in [s].
+        check: The check that failed then; None where all passed.
+        minimum: The smallest clearance, where that is what decides.
+        bodies: Names of the bodies that matter.
+        robot: The robot that matters; None where bodies do.
+        joint: Its joint.
+        task: The task that matters.
+        use: The joint that is nearest to a limit, where neither a failure nor a clearance decides.
+    """
+
+    at_s: float
+    check: Check | None = None
+    minimum: ClearanceMinimum | None = None
+    bodies: tuple[str, ...] = ()
+    robot: str | None = None
+    joint: str | None = None
+    task: str | None = None
+    use: JointUse | None = None
+
+
+def worst_instant(report: Report, cell: Cell) -> Instant:
+    """The instant of the gravest failure of a run, or of its smallest clearance where no failure has an instant.
+
+    Of failures of one kind that counts which exceeds its limit most.
+    """
+    failed = [check for check in report.checks if not check.passed and check.at_s is not None]
+    if failed:
+        return _of_check(min(failed, key=_gravity), report, cell)
+    timeless = next((check for check in report.checks if not check.passed), None)
+    known = [each for each in report.clearance.minima.values() if each.minimum is not None and each.at_s is not None]
+    if not known:
+        return _narrowest(report, timeless)
+    smallest = min(known, key=lambda each: each.minimum or 0.0)
+    return Instant(at_s=smallest.at_s or 0.0, check=timeless, minimum=smallest, bodies=smallest.pair or ())
+
+
+def _narrowest(report: Report, check: Check | None) -> Instant:
+    """The instant at which a joint is nearest to one of its limits, as a share of its range."""
+    uses = [use for use in report.joints if np.isfinite(use.margin) and np.isfinite(use.upper - use.lower)]
+    if not uses:
+        return Instant(at_s=float(report.times[0]), check=check)
+    use = min(uses, key=lambda each: each.margin / max(each.upper - each.lower, 1e-12))
+    return Instant(at_s=use.margin_at_s, check=check, use=use)
+
+
+def is_exact(minimum: ClearanceMinimum) -> bool:
+    """Whether a smallest distance is known, rather than a bound of it."""
+    return minimum.certified and minimum.exact
+
+
+def graver(instant: Instant) -> tuple[float, ...]:
+    """Order of the worst times of several runs, the gravest first: failures, then the smallest clearances."""
+    if instant.check is not None:
+        return (0.0, *_gravity(instant.check))
+    distance = np.inf if instant.minimum is None else float(instant.minimum.minimum or 0.0)
+    return (1.0, distance)
+
+
+def _gravity(check: Check) -> tuple[float, float]:
+    """Order of failed checks, the gravest first: by kind, then by the excess over the limit."""
+    kinds = list(TITLES)
+    kind = kinds.index(check.name) if check.name in TITLES else len(kinds)
+    if check.name == "collision":
+        excess = check.value  # time in contact
+    elif check.name in {"clearance", "joint_position"}:
+        excess = abs(check.value - check.limit)
+    else:
+        excess = abs(check.value / check.limit) if check.limit else abs(check.value)
+    return float(kind), -excess
+
+
+def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
+    """The instant of a failed check, with what it is about."""
+    at_s = check.at_s or 0.0
+    names = tuple(check.subject.split(" - "))
+    if check.name == "clearance" and len(names) == 1:
+        found = next((each for kind, each in report.clearance.minima.items() if str(kind) == check.subject), None)
+        if found is not None and found.at_s is not None:
+            return Instant(at_s=found.at_s, check=check, minimum=found, bodies=found.pair or ())
+    if len(names) == 2:
+        return Instant(at_s=at_s, check=check, bodies=names)
+    robot, _, joint = check.subject.partition("/")
+    if robot in {each.name for each in cell.robots}:
+        known = joint if joint in cell.robot(robot).model.joint_names else None
+        return Instant(at_s=at_s, check=check, robot=robot, joint=known)
+    task = next((each for each in cell.tasks if each.name == check.subject), None)
+    if task is not None:
+        return Instant(at_s=at_s, check=check, robot=task.robot, task=task.name)
+    return Instant(at_s=at_s, check=check)
+
+
+def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
+    """Title and the lines below it."""
+    at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
+    if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
+        title = f"{TITLES.get(instant.check.name, 'Failed')} {at}"
+        return title, _wrapped(instant.check.message)
+    if instant.minimum is not None and instant.minimum.pair is not None:
+        distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
+        least = "" if is_exact(instant.minimum) else "at least "
+        title = f"Smallest clearance {least}{distance:.1f} mm {at}"
+        failed = () if instant.check is None else (instant.check.message,)
+        return title, _wrapped(" to ".join(instant.minimum.pair), *failed)
+    if instant.use is not None:
+        unit, scale = instant.use.display_unit
+        return f"Smallest joint margin {scale * instant.use.margin:.4g} {unit} {at}", (
+            f"{instant.use.robot}/{instant.use.joint}",
+        )
+    return f"{report.cell} {at}", ()
+
+
+def _wrapped(*texts: str) -> tuple[str, ...]:
+    """Texts in lines of a width; what is too long ends with an ellipsis."""
+    lines = [line for text in texts for line in textwrap.wrap(text, NOTE_WIDTH, break_on_hyphens=False)]
+    if len(lines) > MOST_NOTES:
+        lines = [*lines[: MOST_NOTES - 1], f"{lines[MOST_NOTES - 1][: NOTE_WIDTH - 2]} …"]
+    return tuple(lines)

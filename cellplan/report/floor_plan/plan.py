@@ -1,0 +1,170 @@
+"""What a floor plan shows, as plain data: lengths in [mm], places in the world."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+
+SAME_PLACE = 0.5  # [mm] lines of a chain of dimensions that are nearer are one
+
+
+class Layer(StrEnum):
+    """What a line of the plan belongs to."""
+
+    SURROUNDINGS = "surroundings"
+    REACH = "reach"
+    SWEPT = "swept"
+    ROBOTS = "robots"
+    PART = "part"
+    PATHS = "paths"
+    DIMENSIONS = "dimensions"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanOutline:
+    """Outline of a body: its name, its layer, the robot that it belongs to, and corners, shape (N, 2).
+
+    Attributes:
+        name: Name of the body.
+        layer: Its layer.
+        robot: Name of its robot; None for the surroundings and a fixed part.
+        is_base: Whether it is part of a robot and never moves.
+        corners: Its corners, shape (N, 2).
+    """
+
+    name: str
+    layer: Layer
+    robot: str | None
+    is_base: bool
+    corners: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanPath:
+    """Path of a task at the start: its name, its robot and points, shape (N, 2)."""
+
+    task: str
+    robot: str
+    points: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanWall:
+    """A level line that all is on one side of: a point of it, shape (2,), and the direction to the free side."""
+
+    name: str
+    point: Array
+    normal: Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanRobot:
+    """A robot of the plan.
+
+    Attributes:
+        name: Its name.
+        model: Its model.
+        colour: Its colour.
+        base: Coordinates of the base, shape (3,).
+        turn_deg: Direction of the x axis of the base, from that of the world.
+        centre: Where its first axis stands, shape (2,).
+        reach: Largest distance of the flange from there.
+        swept: Contours of what links and tools cover during the motion; none without a motion.
+    """
+
+    name: str
+    model: str
+    colour: str
+    base: Array
+    turn_deg: float
+    centre: Array
+    reach: float
+    swept: tuple[Array, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Dimension:
+    """A dimension along x (0) or y (1).
+
+    Attributes:
+        axis: The axis.
+        first: Where it begins along the axis, at the smaller coordinate.
+        second: Where it ends.
+        row: Number of its row, counted from the plan outwards.
+    """
+
+    axis: int
+    first: float
+    second: float
+    row: int
+
+    @property
+    def length(self) -> float:
+        """Its length in [mm]."""
+        return self.second - self.first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FloorPlan:
+    """A floor plan.
+
+    Attributes:
+        cell: Name of the cell.
+        state: What the robots are shown at, and the motion of what is swept.
+        robots: All robots.
+        outlines: Outlines of all bodies.
+        paths: Paths of all tasks.
+        walls: Vertical half-spaces among the surroundings.
+        whole: Contours of what the whole cell covers during the motion.
+        square: Edge of the squares that swept areas are made of; None without a motion.
+    """
+
+    cell: str
+    state: str
+    robots: tuple[PlanRobot, ...]
+    outlines: tuple[PlanOutline, ...]
+    paths: tuple[PlanPath, ...]
+    walls: tuple[PlanWall, ...]
+    whole: tuple[Array, ...]
+    square: float | None
+
+    @property
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """Distances between the bases along x and along y, and to the ends of the surroundings where there are any."""
+        return tuple(each for axis in (0, 1) for each in self._dimensions(axis))
+
+    def _dimensions(self, axis: int) -> Iterator[Dimension]:
+        """One chain from base to base, and one round it from end to end."""
+        places = distinct([float(robot.base[axis]) for robot in self.robots])
+        around = [each.corners[:, axis] for each in self.outlines if each.layer is Layer.SURROUNDINGS]
+        ends = [float(min(map(np.min, around))), float(max(map(np.max, around)))] if around else []
+        chain = distinct([*places, *ends])
+        for first, second in pairwise(chain):
+            yield Dimension(axis=axis, first=first, second=second, row=0)
+        if len(chain) > 2:
+            yield Dimension(axis=axis, first=chain[0], second=chain[-1], row=1)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates of everything but walls, shape (2,) each."""
+        points = [each.corners for each in self.outlines] + [each.points for each in self.paths]
+        points += [line for robot in self.robots for line in robot.swept] + [
+            robot.base[None, :2] for robot in self.robots
+        ]
+        circles = [(robot.centre, robot.reach) for robot in self.robots]
+        points += [np.stack([centre - radius, centre + radius]) for centre, radius in circles]
+        every = np.concatenate(points)
+        return every.min(axis=0), every.max(axis=0)
+
+
+def distinct(places: list[float]) -> list[float]:
+    """Places in ascending order, those that are one once."""
+    found: list[float] = []
+    for place in sorted(places):
+        if not found or place - found[-1] > SAME_PLACE:
+            found.append(place)
+    return found

@@ -1,0 +1,257 @@
+"""The floor plan on a sheet of paper, as SVG text: to scale when it is printed without scaling."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from html import escape
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall
+from cellplan.report.floor_plan.style import style
+
+SVG_START: Final = '<svg class="plan-sheet"'
+WIDTH_MM, HEIGHT_MM = 297, 210  # A4 across
+UNIT: Final = 10.0  # units of the sheet per [mm] of paper
+MARGIN, COLUMN, GAP = 90, 640, 60  # units: border, width of the table, distance between it and the plan
+HEADING: Final = 150  # units above the plan
+BAND, ROW = 70, 75  # units from the plan to the first row of dimensions, and from row to row
+ROWS: Final = 2
+SCALES: Final = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200, 250, 300, 400, 500)
+BARS: Final = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)  # [mm] lengths of a scale bar
+LONGEST_BAR: Final = 480  # units
+TEXT: Final = 34  # units between lines of the table
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sheet:
+    """How a plan lies on the paper.
+
+    Attributes:
+        scale: How many [mm] of the cell one [mm] of paper stands for.
+        middle: Point of the cell in [mm] in the middle of the plan, shape (2,).
+        low: Left upper corner of the plan in units, shape (2,).
+        high: Right lower corner, shape (2,).
+    """
+
+    scale: float
+    middle: Array
+    low: Array
+    high: Array
+
+    def place(self, points: Array) -> Array:
+        """Points of the cell in [mm], shape (..., 2), in units of the sheet: x to the right and y down."""
+        return 0.5 * (self.low + self.high) + UNIT / self.scale * (points - self.middle) * (1.0, -1.0)
+
+
+def laid_out(plan: FloorPlan) -> Sheet:
+    """The largest usual scale at which a plan fits."""
+    band = BAND + ROWS * ROW
+    low = np.array([MARGIN + band, MARGIN + HEADING])
+    high = np.array([UNIT * WIDTH_MM - MARGIN - COLUMN - GAP, UNIT * HEIGHT_MM - MARGIN - band])
+    least, most = plan.bounds
+    needed = float((UNIT * (most - least) / (high - low)).max())
+    scale = next((each for each in SCALES if each >= needed), 100 * int(np.ceil(needed / 100.0)))
+    return Sheet(scale=float(scale), middle=0.5 * (least + most), low=low, high=high)
+
+
+def floor_plan_svg(plan: FloorPlan) -> str:
+    """A floor plan as the text of an SVG element that stands alone or in a page; equal plans give equal text."""
+    sheet = laid_out(plan)
+    numbers = {robot.name: index for index, robot in enumerate(plan.robots)}
+    robots = ", ".join(f"{robot.name} at x {robot.base[0]:.1f} mm, y {robot.base[1]:.1f} mm" for robot in plan.robots)
+    body = [
+        f'{SVG_START} xmlns="http://www.w3.org/2000/svg" width="{WIDTH_MM}mm" height="{HEIGHT_MM}mm" '
+        f'viewBox="0 0 {UNIT * WIDTH_MM:.0f} {UNIT * HEIGHT_MM:.0f}" role="img" '
+        'aria-labelledby="floor-plan-title floor-plan-desc">',
+        f'<title id="floor-plan-title">Floor plan of {escape(plan.cell)}, scale 1:{sheet.scale:g}</title>',
+        f'<desc id="floor-plan-desc">{escape(plan.state)}. {escape(robots)}.</desc>',
+        f"<style>{style([robot.colour for robot in plan.robots])}</style>",
+        f'<rect class="sheet" width="{UNIT * WIDTH_MM:.0f}" height="{UNIT * HEIGHT_MM:.0f}"/>',
+        *_heading(plan, sheet),
+        *_areas(plan, sheet, numbers),
+        *_bodies(plan, sheet, numbers),
+        *_bases(plan, sheet, numbers),
+        *(line for each in plan.dimensions for line in _dimension(each, sheet)),
+        *_table(plan, sheet, numbers),
+        "</svg>\n",
+    ]
+    return "\n".join(body)
+
+
+def _heading(plan: FloorPlan, sheet: Sheet) -> Iterator[str]:
+    """Title and state above the plan."""
+    yield _text("title", MARGIN, MARGIN + 40, f"Floor plan of {plan.cell}")
+    yield _text("soft", MARGIN, MARGIN + 88, f"{plan.state}; scale 1:{sheet.scale:g} on A4, lengths in mm")
+
+
+def _areas(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
+    """What lies below: reach, swept areas and walls."""
+    for wall in plan.walls:
+        yield f'<path class="wall" d="{_wall(wall, sheet)}"><title>{escape(wall.name)}</title></path>'
+    for robot in plan.robots:
+        (x, y), radius = sheet.place(robot.centre), UNIT * robot.reach / sheet.scale
+        yield (
+            f'<circle class="reach r{numbers[robot.name]}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}">'
+            f"<title>{escape(robot.name)}: reach {robot.reach:.0f} mm</title></circle>"
+        )
+    for robot in plan.robots:
+        if robot.swept:
+            path = _closed(sheet.place(line) for line in robot.swept)
+            name = escape(robot.name)
+            yield f'<path class="swept r{numbers[robot.name]}" d="{path}"><title>{name}: swept area</title></path>'
+    if plan.whole:
+        yield f'<path class="whole" d="{_closed(sheet.place(line) for line in plan.whole)}"/>'
+
+
+def _bodies(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
+    """Outlines of the surroundings, of robots at the start and of the part, and the paths."""
+    for layer in (Layer.SURROUNDINGS, Layer.ROBOTS, Layer.PART):
+        for each in (one for one in plan.outlines if one.layer is layer):
+            kind = "" if each.robot is None or layer is Layer.PART else f" r{numbers[each.robot]}"
+            base = " base" if each.is_base else ""
+            path = _closed([sheet.place(each.corners)])
+            yield f'<path class="{layer}{kind}{base}" d="{path}"><title>{escape(each.name)}</title></path>'
+            if layer is Layer.SURROUNDINGS:
+                x, y = sheet.place(each.corners.mean(axis=0))
+                yield _text("thing", x, y + 9, each.name)
+    for line in plan.paths:
+        points = _points(sheet.place(line.points))
+        kind = f"path r{numbers[line.robot]}"
+        yield f'<path class="{kind}" d="M{points}"><title>{escape(line.task)}</title></path>'
+
+
+def _bases(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
+    """Places and names of the bases, and the direction of their x axes."""
+    for robot in plan.robots:
+        x, y = sheet.place(robot.base[:2])
+        turn = np.radians(robot.turn_deg)
+        u, v = x + 75 * np.cos(turn), y - 75 * np.sin(turn)
+        cross = f"M{x - 22:.1f} {y:.1f}H{x + 22:.1f}M{x:.1f} {y - 22:.1f}V{y + 22:.1f}M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}"
+        yield f'<path class="cross" d="{cross}"/>'
+        yield _text(f"name n{numbers[robot.name]}", x, y + 60, robot.name)
+
+
+def _dimension(each: Dimension, sheet: Sheet) -> Iterator[str]:
+    """A dimension below the plan, or to its left."""
+    bounds = np.array([[each.first, each.first], [each.second, each.second]])
+    (a, d), (b, c) = sheet.place(bounds)
+    if each.axis == 0:
+        at = sheet.high[1] + BAND + ROW * each.row
+        lines = f"M{a:.1f} {at - 45:.1f}V{at + 12:.1f}M{b:.1f} {at - 45:.1f}V{at + 12:.1f}M{a:.1f} {at:.1f}H{b:.1f}"
+        ticks = "".join(f"M{x - 9:.1f} {at + 9:.1f}L{x + 9:.1f} {at - 9:.1f}" for x in (a, b))
+        yield f'<path class="dimension" d="{lines}{ticks}"/>'
+        yield _text("length", 0.5 * (a + b), at - 10, _length(each.length))
+        return
+    at = sheet.low[0] - BAND - ROW * each.row
+    lines = f"M{at + 45:.1f} {d:.1f}H{at - 12:.1f}M{at + 45:.1f} {c:.1f}H{at - 12:.1f}M{at:.1f} {d:.1f}V{c:.1f}"
+    ticks = "".join(f"M{at - 9:.1f} {y + 9:.1f}L{at + 9:.1f} {y - 9:.1f}" for y in (d, c))
+    yield f'<path class="dimension" d="{lines}{ticks}"/>'
+    x, y = at - 10, 0.5 * (c + d)
+    yield (
+        f'<text class="length" x="{x:.1f}" y="{y:.1f}" transform="rotate(-90 {x:.1f} {y:.1f})">'
+        f"{_length(each.length)}</text>"
+    )
+
+
+def _length(length: float) -> str:
+    """A length in [mm] as text."""
+    return f"{length:.1f}".removesuffix(".0")
+
+
+def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
+    """Directions, scale bar, coordinates of the bases and what the lines mean."""
+    left, top = UNIT * WIDTH_MM - MARGIN - COLUMN, MARGIN + HEADING
+    yield from _directions(left + 40, top + 130)
+    bar = max((each for each in BARS if UNIT * each / sheet.scale <= LONGEST_BAR), default=BARS[0])
+    length, x, y = UNIT * bar / sheet.scale, left + 250.0, top + 105
+    yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
+    yield _text("key", x, y + 40, f"{bar:g} mm")
+    y = top + 230
+    columns = (("robot", 0), ("x", 285), ("y", 375), ("z", 450), ("turn", 550), ("reach", 640))
+    for word, offset in columns:
+        yield _text("head" if not offset else "head right", left + offset, y, word)
+    yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'
+    for robot in plan.robots[: _most_rows(y)]:
+        y += TEXT
+        yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
+        yield _text("key", left + 28, y, robot.name)
+        cells = (*(_length(float(each)) for each in robot.base), f"{robot.turn_deg:.1f}°".replace(".0°", "°"))
+        for text, (_, offset) in zip((*cells, f"{robot.reach:.0f}"), columns[1:], strict=True):
+            yield _text("key right", left + offset, y, text)
+    if len(plan.robots) > _most_rows(top + 230):
+        y += TEXT
+        yield _text("key", left + 28, y, f"and {len(plan.robots) - _most_rows(top + 230)} more robots")
+    yield from _legend(plan, left, y + 90)
+
+
+def _most_rows(top: float) -> int:
+    """Robots that the table has room for."""
+    return int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
+
+
+def _directions(x: float, y: float) -> Iterator[str]:
+    """Axes of the world."""
+    yield f'<path class="axes" d="M{x} {y}h90m-14 -9l14 9l-14 9M{x} {y}v-90m-9 14l9 -14l9 14"/>'
+    yield _text("key", x + 104, y + 9, "x")
+    yield _text("key", x - 8, y - 104, "y")
+
+
+def _legend(plan: FloorPlan, left: float, top: float) -> Iterator[str]:
+    """What the lines mean."""
+    entries = [
+        ("robots base", "base, stands still"),
+        ("robots", "links and tools at the start"),
+        ("part", "part at the start"),
+    ]
+    if any(each.layer is Layer.SURROUNDINGS for each in plan.outlines) or plan.walls:
+        entries.append(("surroundings", "surroundings"))
+    entries.append(("reach", "reach of the flange"))
+    if plan.square is not None:
+        entries += [
+            ("swept", f"swept area, in squares of {plan.square:g} mm"),
+            ("whole", "swept area of the whole cell"),
+        ]
+    entries.append(("path", "paths of the tasks"))
+    for number, (kind, words) in enumerate(entries):
+        y = top + TEXT * number
+        yield f'<path class="{kind} n0k" d="M{left} {y - 6}h44v-16h-44z"/>'
+        yield _text("key", left + 64, y - 4, words)
+
+
+def _wall(wall: PlanWall, sheet: Sheet) -> str:
+    """Path of the part of a wall that crosses the plan."""
+    along = np.array([-wall.normal[1], wall.normal[0]])
+    reach = float(np.linalg.norm(sheet.high - sheet.low)) * sheet.scale / UNIT
+    nearest = wall.point + along * float((sheet.middle - wall.point) @ along)
+    ends = np.array([nearest - along * reach, nearest + along * reach])
+    low, high = sheet.low - 0.5 * BAND, sheet.high + 0.5 * BAND
+    first, second = sheet.place(ends)
+    step = second - first
+    step = np.where(np.abs(step) < 1e-9, 1e-9, step)
+    shares = np.sort(np.stack([(low - first) / step, (high - first) / step]), axis=0)
+    enters, leaves = max(0.0, float(shares[0].max())), min(1.0, float(shares[1].min()))
+    if enters >= leaves:
+        return ""
+    return f"M{_points(np.array([first + enters * step, first + leaves * step]))}"
+
+
+def _closed(lines: Iterable[Array]) -> str:
+    """Path of closed lines in units."""
+    return "".join(f"M{_points(line)}z" for line in lines)
+
+
+def _points(line: Array) -> str:
+    """Points in units, those that are one once."""
+    found: list[str] = []
+    for x, y in line.tolist():
+        text = f"{x:.1f} {y:.1f}"
+        if not found or found[-1] != text:
+            found.append(text)
+    return "L".join(found)
+
+
+def _text(kind: str, x: float, y: float, words: str) -> str:
+    """A line of text."""
+    return f'<text class="{kind}" x="{x:.1f}" y="{y:.1f}">{escape(words)}</text>'

@@ -1,0 +1,198 @@
+"""Solids and lines as SVG paths, the farthest first; facets that face away are left out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.transforms import transform_points
+from cellplan.report.still.camera import Camera
+from cellplan.report.still.facets import facets, sides
+from cellplan.report.still.picture import ShownLine, ShownSolid
+from cellplan.report.still.shading import LINE, tones
+
+FACING: Final = 1e-6  # [-] facets that are seen more sharply edge-on are left out: rounding
+DEPTH_STEP: Final = 1e-5  # [m] depths that differ by less are equal, so that rounding does not decide
+CREASE: Final = 0.8  # [-] cosine between neighbouring facets below which their common edge is drawn
+MOST_FACETS: Final = 2800  # [-] of a picture, those that face away among them; with more solids each has fewer
+DEVIATION: Final = 12.0  # units of the sheet by which a round solid may differ from its facets
+COARSEST: Final = 64.0  # [-] times that
+SHORTEST_EDGE: Final = 24  # units of the sheet along both axes together: shorter ones do not show
+LIFT: Final = 0.012  # [m] by which a line is nearer than the surface that it lies on
+RUN: Final = 8  # [-] pieces of a line that are painted together
+SAME_POINT: Final = 6  # decimals of corners in [m] that are one corner
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh2D:
+    """Facets of all solids on the sheet.
+
+    Attributes:
+        corners: Corners on the sheet with their depths, shape (K, 4, 3).
+        normals: Unit normals along right, up and towards the viewer, shape (K, 3).
+        solids: Number of the solid of each, shape (K,).
+    """
+
+    corners: Array
+    normals: Array
+    solids: Indices
+
+
+@dataclass(slots=True)
+class Painter:
+    """Paints with one camera.
+
+    Attributes:
+        camera: The camera.
+        low: Left upper corner of what is shown of the sheet, shape (2,).
+        high: Right lower corner, shape (2,).
+        classes: Names of the classes of materials and tones, filled while painting.
+    """
+
+    camera: Camera
+    low: Array
+    high: Array
+    classes: dict[tuple[str, int], str] = field(default_factory=dict)
+
+    def paths(self, solids: Sequence[ShownSolid], lines: Sequence[ShownLine]) -> str:
+        """SVG of solids and lines."""
+        mesh = self._mesh(solids)
+        edges = drawn_edges(mesh)
+        depths = [mesh.corners[:, :, 2].mean(axis=1)]
+        pieces = [piece for line in lines for piece in self._pieces(line)]
+        depths.append(np.array([depth for depth, _ in pieces]))
+        order = np.argsort(np.round(np.concatenate(depths) / DEPTH_STEP), kind="stable")
+        corners = np.rint(mesh.corners[:, :, :2]).astype(np.int64)
+        names = [
+            self._class(solids[solid].material, tone)
+            for solid, tone in zip(mesh.solids.tolist(), tones(mesh.normals).tolist(), strict=True)
+        ]
+        found = _Paths()
+        texts = _polygons(corners)
+        for index in order.tolist():
+            if index >= len(names):
+                found.add_piece(pieces[index - len(names)][1])
+                continue
+            found.add(names[index], texts[index])
+            for first, second in edges.get(index, ()):
+                (x, y), (u, v) = corners[index, first].tolist(), corners[index, second].tolist()
+                if abs(u - x) + abs(v - y) > SHORTEST_EDGE:
+                    found.add("e", f"M{x} {y}l{u - x} {v - y}")
+        return found.text()
+
+    def _mesh(self, solids: Sequence[ShownSolid]) -> Mesh2D:
+        """Facets that face the viewer and lie within what is shown."""
+        coarser, placed = 1.0, self._facets(solids, 1.0)
+        while sum(map(len, placed)) > 4 * MOST_FACETS and coarser < COARSEST:
+            coarser *= 2.0
+            placed = self._facets(solids, coarser)
+        counts = [len(each) // 4 for each in placed]
+        world = np.concatenate([np.zeros((0, 3)), *placed]).reshape(-1, 4, 3)
+        owners = np.repeat(np.arange(len(solids)), counts)
+        normals = np.cross(world[:, 2] - world[:, 0], world[:, 3] - world[:, 1]) @ self.camera.axes.T
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-15)
+        corners = self.camera.project(world)
+        seen = normals[:, 2] > FACING
+        seen &= (corners[:, :, :2].max(axis=1) >= self.low).all(axis=1)
+        seen &= (corners[:, :, :2].min(axis=1) <= self.high).all(axis=1)
+        return Mesh2D(corners[seen], normals[seen], owners[seen])
+
+    def _facets(self, solids: Sequence[ShownSolid], coarser: float) -> list[Array]:
+        """Corners of the facets of each solid in the world, shape (4 K, 3)."""
+        deviation = coarser * DEVIATION / self.camera.scale
+        return [
+            transform_points(each.X_WS, facets(each.shape, sides(each.shape, deviation)).reshape(-1, 3))
+            for each in solids
+        ]
+
+    def _pieces(self, line: ShownLine) -> list[tuple[float, str]]:
+        """Depth and path of pieces of a line."""
+        seen = self.camera.project(line.points)
+        name, found = self._class(line.material, LINE), []
+        for first in range(0, max(1, len(seen) - 1), RUN):
+            own = seen[first : first + RUN + 1]
+            if (own[:, :2].max(axis=0) < self.low).any() or (own[:, :2].min(axis=0) > self.high).any():
+                continue
+            points = " ".join(f"{x} {y}" for x, y in np.rint(own[:, :2]).astype(np.int64).tolist())
+            width = round(10.0 * line.width)
+            text = f'<path class="{name}" style="stroke-width:{width}" d="M{points}"/>'
+            found.append((float(own[:, 2].mean()) + LIFT, text))
+        return found
+
+    def _class(self, material: str, tone: int) -> str:
+        """Name of the class of a material in a tone."""
+        key = (material, tone)
+        if key not in self.classes:
+            self.classes[key] = f"{'l' if tone == LINE else 'c'}{len(self.classes)}"
+        return self.classes[key]
+
+
+@dataclass(slots=True)
+class _Paths:
+    """Path elements in their order; neighbours of one class are one element."""
+
+    elements: list[str] = field(default_factory=list)
+    name: str = ""
+    parts: list[str] = field(default_factory=list)
+
+    def add(self, name: str, path: str) -> None:
+        """Add a path of a class."""
+        if name != self.name:
+            self._close()
+            self.name = name
+        self.parts.append(path)
+
+    def add_piece(self, element: str) -> None:
+        """Add a whole element."""
+        self._close()
+        self.elements.append(element)
+
+    def text(self) -> str:
+        """All elements."""
+        self._close()
+        return "\n".join(self.elements)
+
+    def _close(self) -> None:
+        """End the element that is being collected."""
+        if self.parts:
+            self.elements.append(f'<path class="{self.name}" d="{"".join(self.parts)}"/>')
+        self.parts, self.name = [], ""
+
+
+def _polygons(corners: Indices) -> list[str]:
+    """Paths of quadrilaterals with corners on the grid of the sheet, shape (K, 4, 2)."""
+    steps = np.diff(corners, axis=1).reshape(-1, 6)
+    first = corners[:, 0]
+    rows = np.concatenate([first, steps], axis=1).tolist()
+    return [
+        f"M{x} {y}l{a} {b} {c} {d}z" if not (e or f) else f"M{x} {y}l{a} {b} {c} {d} {e} {f}z"
+        for x, y, a, b, c, d, e, f in rows
+    ]
+
+
+def drawn_edges(mesh: Mesh2D) -> Mapping[int, list[tuple[int, int]]]:
+    """Edges where a solid ends on the sheet or has a crease: by facet, the numbers of both corners."""
+    if not len(mesh.corners):
+        return {}
+    count = len(mesh.corners)
+    points = np.round(mesh.corners, 2).reshape(-1, 3)
+    keys = points @ np.array([1.0, 7919.37, 104729.73]) + 1e8 * np.repeat(mesh.solids, 4)
+    _, ids = np.unique(np.round(keys, 1), return_inverse=True)
+    ids = ids.reshape(count, 4)
+    ends = np.sort(np.stack([ids, np.roll(ids, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    edge = ends[:, 0] * (ids.max() + 1) + ends[:, 1]
+    is_edge = ends[:, 0] != ends[:, 1]
+    order = np.argsort(edge, kind="stable")
+    order = order[is_edge[order]]
+    same = edge[order[1:]] == edge[order[:-1]]
+    lone = np.ones(len(order), dtype=bool)
+    lone[1:] &= ~same
+    lone[:-1] &= ~same
+    first, second = order[:-1][same], order[1:][same]
+    bent = np.einsum("ij,ij->i", mesh.normals[first // 4], mesh.normals[second // 4]) < CREASE
+    found: dict[int, list[tuple[int, int]]] = {}
+    for place in [*order[lone].tolist(), *first[bent].tolist()]:
+        found.setdefault(place // 4, []).append((place % 4, (place + 1) % 4))
+    return found

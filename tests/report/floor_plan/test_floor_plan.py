@@ -1,0 +1,127 @@
+"""The floor plan as SVG and as DXF: to scale, with the coordinates and dimensions of its cell."""
+
+import re
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import ezdxf
+import numpy as np
+import pytest
+from ezdxf.audit import Auditor
+
+from cellplan import load_cell
+from cellplan.geometry.shapes import HalfSpace
+from cellplan.geometry.transforms import pose
+from cellplan.kinematics.reach import arm_reach
+from cellplan.model.cell import Cell, Obstacle
+from cellplan.pipeline.floor_plan import floor_plan
+from cellplan.report.floor_plan.dxf import floor_plan_dxf
+from cellplan.report.floor_plan.plan import FloorPlan
+from cellplan.report.floor_plan.sheet import UNIT, floor_plan_svg, laid_out
+
+NS = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def cell(cells: Path) -> Cell:
+    loaded = load_cell(cells / "four_robots.yaml")
+    wall = Obstacle(name="wall", shape=HalfSpace(), X_WS=pose((0.0, 1.6, 0.0), (np.pi / 2, 0.0, 0.0)))
+    return replace(loaded, obstacles=(*loaded.obstacles, wall))
+
+
+@pytest.fixture(scope="module")
+def plan(cell: Cell) -> FloorPlan:
+    start = {robot.name: robot.start for robot in cell.robots}
+    turned = {name: np.linspace(q, q + np.eye(6)[0] * 0.5, 40) for name, q in start.items()}
+    path = {"circle": np.array([[0.0, 0.0, 0.25], [0.1, 0.0, 0.25], [0.1, 0.1, 0.25]])}
+    return floor_plan(cell, start, [turned], path, state="Robots at the start")
+
+
+def drawing(plan: FloorPlan) -> ezdxf.document.Drawing:
+    return ezdxf.read(StringIO(floor_plan_dxf(plan)))
+
+
+def test_dimensions_are_the_differences_of_the_coordinates_of_the_bases(plan: FloorPlan) -> None:
+    found = {(each.axis, each.row): [] for each in plan.dimensions}
+    for each in plan.dimensions:
+        found[each.axis, each.row].append(each.length)
+
+    assert found == {(0, 0): [1175.0, 200.0, 875.0], (0, 1): [2250.0], (1, 0): [1025.0, 225.0, 550.0], (1, 1): [1800.0]}
+
+
+def test_the_sheet_is_to_scale(plan: FloorPlan) -> None:
+    sheet, root = laid_out(plan), ET.fromstring(floor_plan_svg(plan))  # noqa: S314 - our own text
+
+    circles = root.findall(f"{NS}circle")
+    centres = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in circles])
+    bases = np.array([robot.base[:2] for robot in plan.robots])
+    apart = UNIT / sheet.scale * (bases - bases[0]) * (1.0, -1.0)
+    np.testing.assert_allclose(centres - centres[0], apart, atol=0.11)  # first axes stand above the bases
+    radii = [float(each.get("r")) * sheet.scale / UNIT for each in circles]
+    np.testing.assert_allclose(radii, [robot.reach for robot in plan.robots], atol=0.05 * sheet.scale / UNIT + 1e-9)
+    assert (root.get("width"), root.get("viewBox").split()[2]) == (
+        "297mm",
+        "2970",
+    )  # ten units are a millimetre of paper
+
+
+def test_everything_is_on_the_paper(plan: FloorPlan) -> None:
+    root = ET.fromstring(floor_plan_svg(plan))  # noqa: S314 - our own text
+
+    for path in root.iter(f"{NS}path"):
+        for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", path.get("d")):
+            assert 0.0 <= float(x) <= 2970.0
+            assert 0.0 <= float(y) <= 2100.0
+    assert {"kuka", "1175", "2250", "1800"} <= {"".join(each.itertext()) for each in root.iter(f"{NS}text")}
+
+
+def test_a_swept_area_holds_the_outlines_at_both_ends(plan: FloorPlan) -> None:
+    for robot in plan.robots:
+        covered = np.concatenate(robot.swept)
+        for each in plan.outlines:
+            if each.robot == robot.name and not each.is_base:
+                assert (each.corners.min(axis=0) >= covered.min(axis=0) - 20.0).all()  # to a square
+                assert (each.corners.max(axis=0) <= covered.max(axis=0) + 20.0).all()
+
+
+def test_the_drawing_has_no_faults_and_is_in_millimetres(plan: FloorPlan) -> None:
+    document = drawing(plan)
+    auditor = Auditor(document)
+    auditor.run()
+
+    assert not auditor.errors
+    assert not auditor.fixes
+    assert document.header["$INSUNITS"] == 4
+    layers = {layer.dxf.name for layer in document.layers}
+    assert {"robots", "reach", "swept", "part", "surroundings", "dimensions", "paths", "names"} <= layers
+
+
+def test_the_drawing_read_back_has_the_bases_reaches_and_dimensions_of_the_cell(plan: FloorPlan, cell: Cell) -> None:
+    space = drawing(plan).modelspace()
+
+    points = [tuple(each.dxf.location) for each in space.query("POINT[layer=='robots']")]
+    np.testing.assert_allclose(points, [1e3 * robot.X_WB[:3, 3] for robot in cell.robots], atol=1e-3)
+    circles = space.query("CIRCLE[layer=='reach']")
+    reaches = [1e3 * arm_reach(robot.model) for robot in cell.robots]
+    np.testing.assert_allclose([each.dxf.radius for each in circles], reaches, rtol=2e-3)  # of a search with few rounds
+    dimensions = space.query("DIMENSION[layer=='dimensions']")
+    assert sorted(each.dxf.actual_measurement for each in dimensions) == sorted(each.length for each in plan.dimensions)
+    for each in dimensions:
+        along = np.array([np.cos(np.radians(each.dxf.angle)), np.sin(np.radians(each.dxf.angle)), 0.0])
+        apart = np.array(each.dxf.defpoint3) - np.array(each.dxf.defpoint2)
+        assert float(along @ apart) == pytest.approx(each.dxf.actual_measurement)
+        assert each.get_geometry_block().query("TEXT").first.dxf.text == f"{each.dxf.actual_measurement:g}"
+
+
+def test_a_wall_is_a_line_where_it_stands(plan: FloorPlan) -> None:
+    (line,) = drawing(plan).modelspace().query("LINE[layer=='surroundings']")
+
+    assert line.dxf.start.y == pytest.approx(1600.0)
+    assert line.dxf.end.y == pytest.approx(1600.0)
+    assert 'class="wall"' in floor_plan_svg(plan)
+
+
+def test_equal_plans_give_equal_bytes(plan: FloorPlan) -> None:
+    assert floor_plan_dxf(plan) == floor_plan_dxf(plan)
