@@ -54,6 +54,9 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
         "cellplan.report.plots.svg": ("svg_text",),
         "cellplan.report.plots.rendering": ("pictures",),
     },
+    "picture of the worst instant, floor plan": {
+        "cellplan.pipeline.cell_drawings": ("phase_drawings", "phase_floor_plan"),
+    },
     "report.json": {
         "cellplan.report.record.run": ("run_record",),
         "cellplan.report.record.series": ("series_head", "series_json"),
