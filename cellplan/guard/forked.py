@@ -7,6 +7,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -87,7 +88,11 @@ class ForkedWork:
         come, go = os.pipe()
         held = signal.pthread_sigmask(signal.SIG_BLOCK, HELD)
         try:
-            process = os.fork()
+            with warnings.catch_warnings():
+                warnings.simplefilter(
+                    "ignore", DeprecationWarning
+                )  # threads of the linear algebra, which can be copied
+                process = os.fork()
             if process == 0:
                 self._work(function, arguments, go)
             self._running[process] = os.fdopen(come, "rb")

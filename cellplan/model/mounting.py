@@ -111,7 +111,7 @@ class Wedge(Column):
 
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:
         """The solid below a base and its pose in B; None where it would have no height; see `Pedestal.solid`."""
-        x, y = self._outline()
+        x, y = self.outline()
         heading = _heading(X_WB)
         X_WS = pose((float(X_WB[0, 3]), float(X_WB[1, 3]), self.floor), (0.0, 0.0, heading))
         normal = X_WS[:3, :3].T @ X_WB[:3, 2]
@@ -121,8 +121,8 @@ class Wedge(Column):
         corners = np.concatenate([np.stack([x, y, np.zeros_like(x)], axis=1), np.stack([x, y, top], axis=1)])
         return Mesh(corners, _prism_faces(len(x)), self.name, is_closed=True), inverse(X_WB) @ X_WS
 
-    def _outline(self) -> tuple[Array, Array]:
-        """Corners of the base area, counter-clockwise, x and y."""
+    def outline(self) -> tuple[Array, Array]:
+        """Corners of the base area in [m], counter-clockwise, x and y in the frame below the base, shape (n,) each."""
         if self.size is not None:
             return 0.5 * self.size[0] * np.array([1.0, -1, -1, 1]), 0.5 * self.size[1] * np.array([1.0, 1, -1, -1])
         angles = np.arange(SIDE_COUNT) * (2.0 * np.pi / SIDE_COUNT)

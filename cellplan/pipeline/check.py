@@ -51,8 +51,13 @@ class CellCheck:
         return all(check.passed for check in self.checks)
 
 
-def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
+def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent) -> CellCheck:
     """Project the paths onto the part, examine or find the start postures, and look for collisions and loads there.
+
+    Args:
+        cell: The cell.
+        scene: Its scene, where that is at hand.
+        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A path misses the part, or a given start is out of limits or off its task.
@@ -60,7 +65,7 @@ def check(cell: Cell, *, progress: Progress = silent) -> CellCheck:
     """
     if cell.program is not None:
         return _check_program(cell, progress)
-    return _check_together(Scene.from_cell(cell), progress)
+    return _check_together(scene or Scene.from_cell(cell), progress)
 
 
 def _check_program(cell: Cell, progress: Progress) -> CellCheck:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import Report
+from cellplan.pipeline.cell_drawings import DrawnPhase, phase_floor_plan
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.plots.run import CLEARANCE, run_figures
 from cellplan.report.plots.svg import svg_text
@@ -20,12 +21,14 @@ class EarlyFiles(NamedTuple):
         motion: Its motion.
         drawn: Its figures as SVG, but for that of the clearance, by name.
         series: The beginning of ``series.json``.
+        floor_plan: Its floor plan.
     """
 
     report: Report
     motion: Motion
     drawn: dict[str, str]
     series: str
+    floor_plan: str
 
 
 def with_early_files(solution: Solution) -> Solution:
@@ -39,14 +42,15 @@ def early_files(run: Run) -> EarlyFiles:
     early = run.early
     if early is not None and early.motion is run.motion and _is_same(early.report, run.report):
         return early
-    return EarlyFiles(run.report, run.motion, {}, "")
+    return EarlyFiles(run.report, run.motion, {}, "", "")
 
 
 def _made(run: Run, cell: Cell) -> EarlyFiles:
     """The files of one run."""
     figures = run_figures(run.report, cell=cell)
     drawn = {name: svg_text(figure) for name, figure in figures.items() if name != CLEARANCE}
-    return EarlyFiles(run.report, run.motion, drawn, series_head(run.report, run.motion))
+    floor_plan = phase_floor_plan(DrawnPhase(cell, run.schedule, run.report))
+    return EarlyFiles(run.report, run.motion, drawn, series_head(run.report, run.motion), floor_plan)
 
 
 def _is_same(one: Report, other: Report) -> bool:

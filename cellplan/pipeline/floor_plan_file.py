@@ -100,9 +100,9 @@ def _of_run(request: FloorPlanRequest) -> FloorPlan:
     stored = read_stored_run(request.path)
     cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs).cell
     read = [stored_series(stored, place, cell) for place in stored.records]
-    motions = [_by_robot(cell, each["q"]) for each in read]
+    motions = [_by_robot(cell, q) for _, q in read]
     start = {name: q[0] for name, q in motions[0].items()}
-    whole = sum(float(each["times"][-1]) for each in read)
+    whole = sum(float(times[-1]) for times, _ in read)
     return floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
 
 

@@ -121,7 +121,8 @@ def _write_report(
     plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    beside |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
+    phase = DrawnPhase(cell, run.schedule, run.report)
+    beside |= _write_drawings(target, place, phase_drawings(phase, floor_plan=early.floor_plan))
     page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
     target.write_text(f"{place}report.html", page)
     return record

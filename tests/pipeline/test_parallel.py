@@ -62,4 +62,4 @@ def test_what_was_made_of_another_motion_is_not_taken(cell: Cell) -> None:
         replace(run, motion=replace(run.motion)),
     ):
         early = early_files(other)
-        assert (early.drawn, early.series) == ({}, "")
+        assert (early.drawn, early.series, early.floor_plan) == ({}, "", "")

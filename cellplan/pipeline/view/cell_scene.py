@@ -1,6 +1,7 @@
 """The scene of a cell that was not solved: at its start postures, or as near to them as can be said."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,8 +38,9 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
         progress: Called with the stage and the fraction done.
     """
     failures: list[tuple[str, str]] = []  # subject and message
+    scene = Scene.from_cell(cell)
     try:
-        found = check(cell, progress=progress)
+        found = check(cell, scene=scene, progress=progress)
         started = found.cell
         failures += [(each.subject, each.message) for each in found.checks if not each.passed]
         facts = [["start", (found.choice or "given").removeprefix("start ")]]
@@ -46,7 +48,7 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
         started = cell
         failures += [("", line) for line in str(error).splitlines()]
         facts = [["start", "none found: robots are where the cell puts them"]]
-    record = standing_scene(Scene.from_cell(started), geometries)
+    record = standing_scene(replace(scene, cell=started), geometries)
     return {
         **record,
         "facts": facts,

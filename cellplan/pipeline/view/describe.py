@@ -9,7 +9,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import rpy_from_rotation
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.mounting import Hanger, Mount, Pedestal
+from cellplan.model.mounting import Hanger, Mount, Pedestal, Wedge
 from cellplan.model.task import Frame, Task
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.view.geometries import Geometries
@@ -103,7 +103,8 @@ def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries
             "pose": pose_numbers(body.X_BS),
             "accuracy": body.accuracy,
             "replaced": body.kind is Kind.LINK and body.name in replaced,
-            "stands": _stands(cell.robot(body.robot).pedestal) if body.robot and body.kind is Kind.PEDESTAL else {},
+            "stands": _stands(_mount(cell, body)),
+            "outline": _outline(_mount(cell, body)),
         }
         for body in bodies
     ]
@@ -122,11 +123,21 @@ def visual_records(cell: Cell, geometries: Geometries) -> list[VisualRecord]:
     return records
 
 
+def _mount(cell: Cell, body: SceneBody) -> Mount | None:
+    """What a robot stands on or hangs from, if a body is that."""
+    return cell.robot(body.robot).pedestal if body.robot and body.kind is Kind.PEDESTAL else None
+
+
 def _stands(mount: Mount | None) -> dict[str, float]:
     """Where an upright column begins or ends, whatever the height of the base on it."""
     if isinstance(mount, Hanger):
         return {"ceiling": mount.ceiling}
-    return {"floor": mount.floor} if isinstance(mount, Pedestal) else {}
+    return {"floor": mount.floor} if isinstance(mount, Pedestal | Wedge) else {}
+
+
+def _outline(mount: Mount | None) -> list[float]:
+    """Corners of a column that is cut off along the plane of the base, seen from above."""
+    return point_numbers(np.stack(mount.outline(), axis=1)) if isinstance(mount, Wedge) else []
 
 
 def place_record(cell: Cell, begin: float) -> PlaceRecord:

@@ -141,9 +141,9 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
     """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
     if "" in stored.records:
-        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, **stored_series(stored, "", cell))
+        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, **_series(stored, "", cell))
         return
-    read = {name: stored_series(stored, name, cell) for name in stored.records}
+    read = {name: _series(stored, name, cell) for name in stored.records}
     for phase in phases:
         if phase["name"] not in read:
             file = stored.file("", "report.json")
@@ -154,13 +154,26 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
         yield Played(name=phase["name"], place=phase["name"], begin=begin, number=number, **(own | shifted))
 
 
-def stored_series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
-    """Times in [s], stacked joint positions in [rad] or [m], and what is kept of distances of one run, from its series.
+def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
+    """Times and stacked joint positions of one run and what it keeps of distances, from its series."""
+    tree, file = stored.series(place), stored.file(place, SERIES)
+    times, q = _positions(tree, file, cell)
+    kept_times, kept = _kept_distances(tree.get("clearance", {}), file)
+    return {"times": times, "q": q, "kept_times": kept_times, "kept": kept}
+
+
+def stored_series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
+    """Times in [s] and stacked joint positions in [rad] or [m] of one run, from its series.
 
     Raises:
         InputError: The series do not fit the cell.
     """
-    tree, columns = stored.series(place), list[Array]()
+    return _positions(stored.series(place), stored.file(place, SERIES), cell)
+
+
+def _positions(tree: Record, file: str, cell: Cell) -> tuple[Array, Array]:
+    """Times and stacked joint positions in a series."""
+    columns = list[Array]()
     try:
         times = np.array(tree["times_s"], dtype=np.float64)
         for robot in cell.robots:
@@ -173,10 +186,8 @@ def stored_series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]
     except (KeyError, TypeError, ValueError):
         is_sound = False
     if not is_sound:
-        file = stored.file(place, SERIES)
         raise InputError(f"{file}: joints: expected positions of all joints of the cell, got others; solve again")
-    kept_times, kept = _kept_distances(tree.get("clearance", {}), stored.file(place, SERIES))
-    return {"times": times, "q": q, "kept_times": kept_times, "kept": kept}
+    return times, q
 
 
 def _joined(played: Sequence[Played]) -> tuple[Array, Array, list[int]]:

@@ -82,6 +82,7 @@ class BodyViewRecord(TypedDict):
     accuracy: Annotated[float | None, "how far the real thing may stick out of it"]
     replaced: Annotated[bool, "whether the robot's file draws its link otherwise"]
     stands: Annotated[dict[str, float], "of an upright column: height of the `floor` or of the `ceiling`"]
+    outline: Annotated[Numbers, "of a column cut off along the plane of a base: its corners seen from above, x and y"]
 
 
 class VisualRecord(TypedDict):

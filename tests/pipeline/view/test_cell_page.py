@@ -14,6 +14,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.pipeline.view.write import ViewRequest, view
 from cellplan.scene.scene import Scene
 
+EXCLUDED = "checks: {exclude: [{bodies: [idle/mount, idle/A], reason: its first link lies on it}]}\n"
 BOX = "  crate: {box: {size_mm: [400, 400, 400]}, at: {xyz_mm: [0, 4000, 500]}}\n"  # round the idle robot
 
 
@@ -59,6 +60,23 @@ def test_a_moved_base_moves_what_stands_on_it(start: dict[str, Any], cell: Path)
     for body, old, new in zip(moved["bodies"], before, after, strict=True):
         shift = [0.7, 0.0, 0.0] if body["name"].startswith("idle/") else [0.0, 0.0, 0.0]
         assert new[:3, 3] - old[:3, 3] == pytest.approx(shift, abs=1e-9)
+
+
+def test_a_wedge_below_a_leaning_base_has_its_outline_and_its_floor(cell: Path) -> None:
+    leaning = "[0, 4000, 500], rpy_deg: [0, 20, 30]}\n    mount: {tilted: {box: {size_mm: [260, 200]}}}"
+    path = beside(cell, "tilted.yaml", cell.read_text().replace("[0, 4000, 500]}", leaning) + EXCLUDED)
+    record = view(ViewRequest(path=path))[0]
+    bodies = {body["name"]: body for body in record["scenes"][0]["bodies"]}
+    path.unlink()
+
+    wedge = bodies["idle/mount"]
+    corners = np.reshape(wedge["outline"], (4, 2))
+    assert np.array_equal(np.abs(corners), [[0.13, 0.1]] * 4)
+    assert len({tuple(corner) for corner in corners.tolist()}) == 4
+    assert wedge["stands"] == {"floor": 0.0}
+    low = record["geometries"][wedge["geometry"]]["low"]
+    assert low == pytest.approx([-0.13, -0.1, 0.0])
+    assert all(body["outline"] == [] for name, body in bodies.items() if name != "idle/mount")
 
 
 def test_what_touches_at_the_start_is_named_once_with_its_bodies(cell: Path) -> None:

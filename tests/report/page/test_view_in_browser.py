@@ -9,12 +9,14 @@ import pytest
 from builders.browser import Browser
 from builders.view_pages import body_poses, data_of, rows_of
 
+from cellplan import load_cell
 from cellplan.pipeline.view.write import ViewRequest, view, write_view
 
 pytestmark = pytest.mark.slow
 
 FIGURES = ("cycle_s", "margin_deg", "clearance_mm", "change")
 STAGE = np.s_[60:690, 5:925]  # of a window of 1280 by 800: the picture, without the lists
+EXCLUDED = "checks: {exclude: [{bodies: [idle/mount, idle/A], reason: its first link lies on it}]}\n"
 BOX = "  crate: {box: {size_mm: [400, 400, 400]}, at: {xyz_mm: [500, 4000, 500]}}\n"  # round an arm of the idle robot
 
 
@@ -198,6 +200,46 @@ def test_moved_bases_become_options_and_yaml(browser: Browser, folder: Path) -> 
     assert options.endswith("/cell/small.yaml --set motion.step_s=0.05 --set robots.right.base.x_mm=1950")
     assert yaml == "robots:\n  right:\n    base: {xyz_mm: [1950, 300, 480], rpy_deg: [0, 0, 180]}"
     assert x == pytest.approx(1.95)
+
+
+@pytest.mark.parametrize("column", ["box: {size_mm: [260, 200]}", "cylinder: {radius_mm: 120}"])
+def test_a_wedge_below_a_moved_base_is_cut_off_as_the_cell_has_it(
+    browser: Browser, sound: Path, tmp_path: Path, column: str
+) -> None:
+    leaning = "base: {xyz_mm: [0, 4000, 500], rpy_deg: [0, 20, 30]}\n    mount: {tilted: {COLUMN}}"
+    text = (sound / "cell" / "small.yaml").read_text()
+    path = sound / "cell" / "tilted.yaml"
+    path.write_text(text.replace("base: {xyz_mm: [0, 4000, 500]}", leaning.replace("COLUMN", column)) + EXCLUDED)
+    write_view(view(ViewRequest(path=path))[0], tmp_path / "tilted.html")
+    moved = {"x_mm": 150.0, "z_mm": 620.0, "roll_deg": -5.0, "pitch_deg": 35.0, "yaw_deg": 80.0}
+    cell = load_cell(path).with_values({f"robots.idle.base.{key}": value for key, value in moved.items()})
+    path.unlink()
+
+    browser.open(tmp_path / "tilted.html")
+    drawn = browser.run(f"""
+      const fields = byId("bases").querySelectorAll("fieldset")[2].querySelectorAll("input");
+      const changes = {json.dumps(moved)};
+      COMPONENTS.forEach((component, i) => {{
+        if (!(component in changes)) return;
+        fields[i].value = changes[component];
+        fields[i].dispatchEvent(new Event("input"));
+      }});
+      await drawn();
+      const index = app.stage.scene.bodies.findIndex((body) => body.name === "idle/mount");
+      const geometry = app.stage.geometries[app.stage.scene.bodies[index].geometry];
+      const place = multiply(app.stage.bodyPose(index, app.stage.at(0).links, 0), geometry.place);
+      const found = [];
+      for (let i = 0; i < geometry.points.length; i += 3) {{
+        found.push(moved(place, Array.from(geometry.points.slice(i, i + 3), (step) => step / GRID_STEPS)));
+      }}
+      return found;
+    """)
+
+    robot = cell.robot("idle")
+    solid, X_BS = robot.pedestal.solid(robot.X_WB)
+    X_WS = robot.X_WB @ X_BS
+    assert np.abs(np.array(drawn) - (solid.vertices @ X_WS[:3, :3].T + X_WS[:3, 3])).max() < 2e-5  # a grid of 16 bit
+    assert browser.console == []
 
 
 def test_a_failure_is_shown_with_its_bodies(browser: Browser, folder: Path) -> None:

@@ -42,6 +42,7 @@ class Bases {
       const v = this.values[index];
       stage.bases[base.robot] = poseOf(times(v.slice(0, 3), 1e-3), v.slice(3).map(radians));
     });
+    stage.fitWedges(this.app.view);
     const changes = this.changes();
     byId("set-text").value = changes.length ? this.command(changes) : "";
     byId("yaml-text").value = this.yaml();

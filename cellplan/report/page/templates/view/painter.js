@@ -7,6 +7,11 @@ class PaintedView {
     this.geometries = geometries;
   }
 
+  /** Take another shape for a geometry. */
+  replace(index, geometry) {
+    this.geometries[index] = geometry;
+  }
+
   draw(frame, camera, background) {
     const { context, canvas } = this;
     const matrix = camera.matrix();

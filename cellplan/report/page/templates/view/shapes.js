@@ -3,6 +3,8 @@
 const SIDES = 28; // of a round shape
 const RINGS = 5; // of a half ball
 const GRID_STEPS = 65535;
+const STEEPEST = 0.05; // cosine of the lean of a base on a wedge
+const THINNEST = 1e-4; // height in m of what would have none
 
 /** A geometry of the page: points, triangles, and the matrix that brings the points to their places in m. */
 function builtGeometry(record) {
@@ -45,6 +47,21 @@ function boxSurface([x, y, z]) {
   }
   const sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
   return { points, triangles: sides.flatMap(([a, b, c, d]) => [a, b, c, a, c, d]) };
+}
+
+/** An upright prism from the floor to the plane of a base, from its corners seen from above and the pose of the base. */
+function wedgeSurface(outline, base) {
+  const count = outline.length / 2;
+  const lower = Array.from({ length: count }, (_, i) => [outline[2 * i], outline[2 * i + 1], 0]);
+  const [x, y, z] = base.slice(8, 11);
+  const top = (corner) => base[14] - (x * corner[0] + y * corner[1]) / Math.max(z, STEEPEST);
+  const upper = lower.map((corner) => [corner[0], corner[1], Math.max(top(corner), THINNEST)]);
+  const triangles = lower.flatMap((_, i) => {
+    const next = (i + 1) % count;
+    const sides = [i, next, next + count, i, next + count, i + count];
+    return i > 0 && next > 0 ? [...sides, 0, next, i, count, i + count, next + count] : sides;
+  });
+  return { points: [...lower, ...upper], triangles };
 }
 
 /** Radius and height along the outline of a cylinder, from its lower to its upper end. */

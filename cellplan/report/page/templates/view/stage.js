@@ -56,6 +56,7 @@ class Stage {
       const X_PS = multiply(inverseRigid(fromRows(first.pose)), this.poses[index]);
       return multiply(carriedPose(links, place, fromRows(place.pose)), X_PS);
     }
+    if (body.outline.length) return this.wedgePose(index);
     if (body.stands.floor !== undefined || body.stands.ceiling !== undefined) return this.columnPose(index);
     return carriedPose(links, body, this.poses[index]);
   }
@@ -69,6 +70,25 @@ class Stage {
     const heading = Math.atan2(now[1], now[0]);
     const place = poseOf([now[12], now[13], (now[14] + end) / 2], [0, 0, heading]);
     return multiply(place, scaling([1, 1, Math.max(stretch, 1e-4)]));
+  }
+
+  /** Below a base, on the floor, as the outline of a wedge has it. */
+  wedgePose(index) {
+    const { robot, stands } = this.scene.bodies[index];
+    const now = this.bases[robot];
+    return poseOf([now[12], now[13], stands.floor], [0, 0, Math.atan2(now[1], now[0])]);
+  }
+
+  /** Cut wedges off along the planes of their bases where these are now; each gets a geometry of its own. */
+  fitWedges(view) {
+    this.scene.bodies.forEach((body, index) => {
+      if (!body.outline.length) return;
+      if (body.own === undefined) body.own = this.geometries.push(null) - 1;
+      body.geometry = body.own;
+      const below = multiply(inverseRigid(this.wedgePose(index)), this.bases[body.robot]);
+      this.geometries[body.own] = gridded(wedgeSurface(body.outline, below));
+      view.replace(body.own, this.geometries[body.own]);
+    });
   }
 
   /** Bodies that touch what they must not. */

@@ -84,15 +84,26 @@ class WebglView {
     const gl = this.gl;
     const array = gl.createVertexArray();
     gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    const buffers = [gl.createBuffer(), gl.createBuffer()];
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers[0]);
     gl.bufferData(gl.ARRAY_BUFFER, geometry.points, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 3, gl.UNSIGNED_SHORT, true, 6, 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers[1]);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, geometry.triangles, gl.STATIC_DRAW);
     gl.bindVertexArray(null);
     const kind = geometry.triangles.BYTES_PER_ELEMENT === 4 ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT;
-    return { array, kind, count: geometry.triangles.length };
+    return { array, buffers, kind, count: geometry.triangles.length };
+  }
+
+  /** Take another shape for a geometry. */
+  replace(index, geometry) {
+    const old = this.geometries[index];
+    if (old) {
+      this.gl.deleteVertexArray(old.array);
+      old.buffers.forEach((buffer) => this.gl.deleteBuffer(buffer));
+    }
+    this.geometries[index] = this.upload(geometry);
   }
 
   /** Draw one picture; see `Stage.frame` for what it consists of. */
