@@ -1,0 +1,38 @@
+"""What failed checks are called, and which of them is graver than another."""
+
+from typing import Final
+
+FAILURES: Final = {
+    "collision": "Collision",
+    "grip_depth": "Holder too deep in the part",
+    "mount_depth": "Tool too deep in the arm",
+    "standing_depth": "Body too deep in its support",
+    "tool_depth": "Tool too deep in the part",
+    "joint_position": "Joint beyond its limit",
+    "locked_joint": "Failed joint moves",
+    "home": "Idle robot leaves its home",
+    "payload": "Payload exceeded",
+    "payload_centre": "Centre of mass of the load",
+    "payload_moment": "Moment of the load",
+    "payload_inertia": "Inertia of the load",
+    "clearance": "Clearance too small",
+    "joint_velocity": "Joint too fast",
+    "joint_acceleration": "Joint acceleration too high",
+    "joint_acceleration_between_phases": "Joint acceleration too high where phases meet",
+    "joint_acceleration_assumed": "Joint acceleration above its assumed limit",
+    "joint_jerk": "Joint jerk too high",
+    "part_acceleration": "Acceleration of the part too high",
+    "tool_speed": "Tool too fast",
+    "closure_position_error": "Co-holder off its grasp",
+    "closure_orientation_error": "Co-holder tilted on its grasp",
+    "closure_position_error_between_rows": "Co-holder off its grasp between the rows",
+    "closure_orientation_error_between_rows": "Co-holder tilted on its grasp between the rows",
+    "position_error": "Tool off its path",
+    "orientation_error": "Tool orientation off",
+    "position_error_between_rows": "Tool off its path between the rows",
+    "orientation_error_between_rows": "Tool orientation off between the rows",
+    "process_feed": "Feed not kept",
+    "process_on_delay": "Delay at the start of a process",
+    "process_off_delay": "Delay at the end of a process",
+    "joint_drift": "Joints do not return",
+}  # the gravest first
