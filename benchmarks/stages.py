@@ -2,7 +2,7 @@
 
 The command runs several times in a process of its own in which the functions of the stages are timed. What a stage
 spends in another one counts for that other one alone, and so does what it spends in importing libraries; what is left
-counts as the rest. The work of child processes is not counted: it goes on meanwhile.
+counts as the rest. The work of child processes, which goes on meanwhile, is counted as a whole.
 """
 
 import argparse
@@ -27,6 +27,7 @@ CELL = "cells/four_robots.yaml"
 BEGUN = "CELLPLAN_BENCHMARK_BEGUN"  # the moment in [s] at which the process was asked for
 
 STARTING, IMPORTS, REST = "starting Python", "importing libraries", "the rest"
+CHILDREN = "in child processes, meanwhile"
 STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     "reading the cell and its robots": {"cellplan.io.cell.load": ("load_cell",)},
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
@@ -44,9 +45,19 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     },
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
-    "laying out the plots": {"cellplan.report.plots.run": ("motion_sheets", "clearance_sheets")},
-    "waiting for the painted plots": {"concurrent.futures": ("Future.result",)},
-    "report.json": {"cellplan.report.record.run": ("run_record",), "cellplan.report.record.series": ("series_json",)},
+    "copying the process, waiting for the copy": {
+        "cellplan.guard.forked": ("ForkedWork.begin",),
+        "cellplan.pipeline.early_clearance": ("EarlyClearance.of",),
+    },
+    "plots": {
+        "cellplan.report.plots.run": ("run_figures",),
+        "cellplan.report.plots.svg": ("svg_text",),
+        "cellplan.report.plots.rendering": ("pictures",),
+    },
+    "report.json": {
+        "cellplan.report.record.run": ("run_record",),
+        "cellplan.report.record.series": ("series_head", "series_json"),
+    },
     "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {
         "cellplan.io.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
@@ -165,7 +176,7 @@ def solve_timed(cell: str, folder: str) -> dict[str, Seconds]:
     if run(["solve", cell, "--quiet", "-o", folder]) not in (0, 1):
         sys.exit(f"benchmark: solving {cell} failed")
     with clock.stage(REST):
-        return {STARTING: started, **clock.spent}
+        return {STARTING: started, **clock.spent, CHILDREN: (0.0, sum(os.times()[2:4]))}
 
 
 def measured(cell: str, rounds: int) -> tuple[dict[str, Seconds], float]:
@@ -187,7 +198,7 @@ def measured(cell: str, rounds: int) -> tuple[dict[str, Seconds], float]:
             sys.exit(run.stderr)
         found.append(json.loads(run.stdout.splitlines()[-1]))
     medians = {}
-    for name in (STARTING, IMPORTS, *STAGES, REST):
+    for name in (STARTING, IMPORTS, *STAGES, REST, CHILDREN):
         walls, cpus = zip(*(each.get(name, (0.0, 0.0)) for each in found), strict=True)
         medians[name] = statistics.median(walls), statistics.median(cpus)
     return medians, statistics.median(whole)

@@ -133,6 +133,8 @@ In the mode `pairwise` every task has a folder with a report of its own. The `re
 | `conditioning.manipulability` | K | likewise |
 | `joints.ROBOT.JOINT.position_deg` or `position_mm` | K | joint position |
 | `joints.ROBOT.JOINT.speed_deg_s` or `speed_mm_s` | K - 1 | joint velocity |
+| `clearance.times_s` | M | middles of some 200 blocks of the motion, its ends and the times of the minima |
+| `clearance.CLASS_mm` | M | distance that a class (`robot_robot`, …) keeps all through the block that holds the time |
 | `iterations` | K - 1 | evaluations of the tasks per step; `null` in the accurate mode |
 | `slack` | K - 1 | norm of the twist residual; `null` if the method has none |
 

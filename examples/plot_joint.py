@@ -1,4 +1,4 @@
-"""Plot the positions of one joint over time, with its limits, from a solved cell."""
+"""Plot the positions of one joint over time, with its limits, from a solved cell; needs cellplan[plots]."""
 
 from pathlib import Path
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
-from builders import picture_memo
 from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -19,12 +18,11 @@ settings.register_profile("full", max_examples=200, deadline=None, derandomize=T
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Give the session a folder of its own: for caches, which are neither the user's nor left behind, and pictures."""
+    """Give the session a folder of its own: for caches, which are neither the user's nor left behind."""
     if SESSION not in os.environ:
         os.environ[SESSION] = tempfile.mkdtemp(prefix="cellplan-tests-")
         config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(SESSION), ignore_errors=True))
     os.environ["CELLPLAN_CACHE"] = str(Path(os.environ[SESSION]) / "cache")
-    picture_memo.install(Path(os.environ[SESSION]) / "pictures")
     settings.load_profile("quick" if config.option.markexpr == "not slow" else "full")
 
 
@@ -39,15 +37,15 @@ def shared_solutions() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def one_processor() -> Iterator[None]:
-    """Commands draw their plots in this process: a child would import the plotting library for each of them."""
-    with mock.patch("cellplan.guard.background.processors", return_value=1):
+    """Commands do all in this process, whose solutions a session shares."""
+    with mock.patch("cellplan.guard.forked.processors", return_value=1):
         yield
 
 
 @pytest.fixture
 def two_processors(one_processor: None) -> Iterator[None]:
-    """Plots may be drawn in a child."""
-    with mock.patch("cellplan.guard.background.processors", return_value=2):
+    """Work may be done in copies of this process."""
+    with mock.patch("cellplan.guard.forked.processors", return_value=2):
         yield
 
 
@@ -88,13 +86,6 @@ def kept_solutions() -> Iterator[None]:
         yield
 
 
-@pytest.fixture(scope="module")
-def sketched_pictures() -> Iterator[None]:
-    """Pictures of runs are no more than the digest of what they would show; tests of plots paint them."""
-    with picture_memo.sketching(is_sketching=True):
-        yield
-
-
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Folder of a cache that only this test uses, empty at first."""
@@ -112,6 +103,6 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from builders.stored_cells import solve_into, write_cell
 
     folder = tmp_path_factory.mktemp("sound")
-    with shared_solutions(), picture_memo.sketching(is_sketching=False):
+    with shared_solutions():
         solve_into(write_cell(folder / "cell"), folder / "run")
     return folder

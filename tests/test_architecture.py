@@ -175,10 +175,10 @@ def is_door(path: Path, engine: str, doors: dict[str, list[str]]) -> bool:
 
 
 def test_every_engine_is_a_declared_dependency() -> None:
-    """Those that read xacro files and talk to a cluster are extras: whoever has no such thing needs none."""
+    """Extras read xacro files, talk to a cluster and write plots as PNG and PDF: only who does so needs them."""
     project = CONFIGURATION["project"]
     extras = project["optional-dependencies"]
-    requirements = [*project["dependencies"], *extras["xacro"], *extras["cluster"]]
+    requirements = [*project["dependencies"], *extras["xacro"], *extras["cluster"], *extras["plots"]]
     declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in requirements}
     package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml", "pydantic_core": "pydantic"}
     package_of["collada"] = "pycollada"

@@ -8,8 +8,6 @@ import pytest
 import cellplan.planning.methods
 from cellplan.pipeline.export import EXPORTERS
 
-pytestmark = pytest.mark.usefixtures("sketched_pictures")
-
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 PRINTED = {
     "batch_of_cells": ["examples/plate.yaml: passed; smallest joint margin", "examples/missing.yaml: ", "no such file"],

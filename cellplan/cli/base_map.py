@@ -7,7 +7,7 @@ import typer
 
 from cellplan.cli.completion import robot_names
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, PlotFormats, Quiet, Settings
 from cellplan.cli.output import json_failure, say, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -64,6 +64,7 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
     workers: WorkerCount = None,
     resume: Resume = False,
     status: Status = False,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -93,6 +94,7 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
             allow_dirs=tuple(allow_dir or ()),
             settings=tuple(settings or ()),
             mode=mode,
+            formats=tuple(plots or ()),
         )
         folder = output or Path("outputs") / f"{requested_cell(request).name}-map-{robot}"
         if status:

@@ -8,7 +8,7 @@ import typer
 
 from cellplan.cli.completion import cell_files
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, Quiet, Settings, TaskName
+from cellplan.cli.options import AllowDirs, AsJson, PlotFormats, Quiet, Settings, TaskName
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.cli.sweep import KeepRuns, Resume, Workers
@@ -39,6 +39,7 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
     workers: Workers = None,
     resume: Resume = False,
     keep_runs: KeepRuns = False,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -59,6 +60,7 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
             allow_dirs=tuple(allow_dir or ()),
             settings=tuple(settings or ()),
             task=task,
+            formats=tuple(plots or ()),
         )
         folder = output or Path("outputs") / f"{first_name(job)}-compare"
         job = replace(job, runs=folder if keep_runs else None)

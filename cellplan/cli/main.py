@@ -1,5 +1,6 @@
 """The program ``cellplan``: its commands, and the one place where errors become lines and exit statuses."""
 
+import gc
 import signal
 import sys
 import threading
@@ -35,6 +36,7 @@ from cellplan.errors import ExitStatus
 INTERRUPTIONS: Final = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]  # a background job ignores the first of them
+GARBAGE_THRESHOLD: Final = 200_000  # objects: by default all are searched for cycles many times while modules load
 REPEAT_DELAY_S: Final = 0.02  # [s] delay after which the callback that lost the interruption has ended
 
 app = typer.Typer(
@@ -109,11 +111,14 @@ def _usage_status(error: BaseException) -> int | None:
 
 def main() -> NoReturn:
     """Entry point of the console; termination signals and a closed terminal interrupt the program, as Ctrl-C does."""
+    gc.set_threshold(GARBAGE_THRESHOLD)
     for number in INTERRUPTIONS:
         if signal.getsignal(number) == signal.SIG_DFL:  # nohup keeps its way
             signal.signal(number, signal.default_int_handler)
     sys.unraisablehook = _repeat_interruption
-    sys.exit(run())
+    status = run()
+    gc.freeze()  # the end of the process frees everything, without a search for cycles
+    sys.exit(status)
 
 
 def _repeat_interruption(lost: "sys.UnraisableHookArgs") -> None:

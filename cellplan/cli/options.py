@@ -74,6 +74,15 @@ Settings = Annotated[
         show_default=False,
     ),
 ]
+PlotFormats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plots",
+        metavar="FORMAT",
+        help="Write the plots as png or pdf too; SVG is always written. May be repeated. Needs cellplan[plots].",
+        show_default=False,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Watch = Annotated[

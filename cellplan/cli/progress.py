@@ -11,6 +11,7 @@ from cellplan.cli.errors import tell
 from cellplan.cli.verbosity import STAGES, StageTimes
 
 LINE_EVERY_S = 10.0  # [s] between two lines of a log
+DRAW_EVERY_S = 0.1  # [s] between two drawings of a bar
 
 Listener = Callable[[str, float], None]
 
@@ -42,16 +43,26 @@ def _is_screen() -> bool:
 
 @contextlib.contextmanager
 def _bar() -> Iterator[Listener]:
-    """A bar that disappears at the end; colours follow NO_COLOR."""
+    """A bar that disappears at the end; colours follow NO_COLOR.
+
+    It is drawn where progress is made, not by a thread of its own: beside threads a process may not be copied.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True) as bar:
+    with Progress(
+        *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True, auto_refresh=False
+    ) as bar:
         task = bar.add_task("starting", total=1.0)
+        last, drawn = "", 0.0
 
         def listen(stage: str, share: float) -> None:
+            nonlocal last, drawn
             bar.update(task, description=stage, completed=share)
+            if stage != last or time.monotonic() - drawn >= DRAW_EVERY_S:
+                bar.refresh()
+                last, drawn = stage, time.monotonic()
 
         yield listen
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.completion import cell_files
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Quiet, Settings
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, PlotFormats, Quiet, Settings
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -49,6 +49,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
     seed: Seed = None,
     settings: Settings = None,
     output: Output = None,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -65,8 +66,10 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.overrides import with_draws, with_overrides
         from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
         from cellplan.pipeline.rehearsal.write import write_rehearsal
+        from cellplan.report.plots.rendering import require_formats
         from cellplan.report.text.rehearsal import summary_lines
 
+        require_formats(plots or ())
         changed = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ())
         stated = with_draws(load_errors(errors, changed), trials=trials, seed=seed)
         folder = output or Path("outputs") / changed.name / REHEARSAL
@@ -75,7 +78,7 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
             rehearsal = rehearse_cell(
                 changed, stated, feedback=feedback, in_pass=in_pass, rounds=rounds, progress=progress
             )
-            record = write_rehearsal(rehearsal, folder, progress=progress)
+            record = write_rehearsal(rehearsal, folder, formats=plots or (), progress=progress)
     status = ExitStatus.PASSED if rehearsal.passed else ExitStatus.CHECK_FAILED
     if as_json:
         place = {"folder": str(folder), "report_path": str(folder / "rehearsal.html")}

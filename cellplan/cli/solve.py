@@ -17,6 +17,7 @@ from cellplan.cli.options import (
     Integrator,
     Method,
     Mode,
+    PlotFormats,
     Quiet,
     Settings,
     TaskName,
@@ -28,7 +29,6 @@ from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
     from cellplan.model.cell import Cell
-    from cellplan.pipeline.background_plots import BackgroundPlots
     from cellplan.pipeline.solution import Solution
     from cellplan.report.record.common import Record
 
@@ -61,6 +61,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     keep_rejected: KeepRejected = False,
     with_view: WithView = False,
     watch: Watch = False,
+    plots: PlotFormats = None,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
@@ -84,6 +85,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         task=task,
         keep_rejected=keep_rejected,
         with_view=with_view,
+        plot_formats=tuple(plots or ()),
         allow_dirs=tuple(allow_dir or ()),
     )
     if watch:
@@ -105,30 +107,27 @@ class _Request:
     task: str | None
     keep_rejected: bool
     with_view: bool
+    plot_formats: tuple[str, ...]
     allow_dirs: tuple[Path, ...]
 
 
 def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Solve and write; ``follow`` is called with the cell as soon as it is read."""
-    from cellplan.guard import BackgroundProcess
+    from cellplan.io.cell.load import load_cell
+    from cellplan.io.run.folder import refuse_unless_replaceable
+    from cellplan.pipeline.overrides import require_task, with_overrides
+    from cellplan.pipeline.parallel import solve_in_parallel
+    from cellplan.report.plots.rendering import require_formats
 
-    with BackgroundProcess() as background:
-        from cellplan.pipeline.background_plots import BackgroundPlots
-
-        plots = BackgroundPlots(background)  # the child imports matplotlib while this process imports the rest
-        from cellplan.io.cell.load import load_cell
-        from cellplan.io.run.folder import refuse_unless_replaceable
-        from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.pipeline.solve import solve_with_plots
-
-        given = load_cell(request.cell, allow_dirs=request.allow_dirs)
-        follow(given)
-        changed = with_overrides(given, request.settings, **request.overrides)
-        require_task(changed, request.task)
-        folder = request.output or Path("outputs") / changed.name
-        refuse_unless_replaceable(folder)
-        solution = solve_with_plots(changed, plots, task=request.task, progress=progress)
-        record = _written(solution, folder, request, plots, progress)
+    require_formats(request.plot_formats)
+    given = load_cell(request.cell, allow_dirs=request.allow_dirs)
+    follow(given)
+    changed = with_overrides(given, request.settings, **request.overrides)
+    require_task(changed, request.task)
+    folder = request.output or Path("outputs") / changed.name
+    refuse_unless_replaceable(folder)
+    solution = solve_in_parallel(changed, task=request.task, progress=progress)
+    record = _written(solution, folder, request, progress)
     return _result(request, changed, solution, record, folder)
 
 
@@ -152,14 +151,17 @@ def _result(request: _Request, changed: "Cell", solution: "Solution", record: "R
     return Result(status, lines, {**about, "report": record}, folder)
 
 
-def _written(
-    solution: "Solution", folder: Path, request: _Request, plots: "BackgroundPlots", progress: Listener
-) -> "Record":
+def _written(solution: "Solution", folder: Path, request: _Request, progress: Listener) -> "Record":
     """Write a run folder, with its 3-D page where that is desired."""
     from cellplan.pipeline.write_run import write_run
 
     record = write_run(
-        solution, folder, keep_rejected=request.keep_rejected, plots=plots, view=request.with_view, progress=progress
+        solution,
+        folder,
+        keep_rejected=request.keep_rejected,
+        formats=request.plot_formats,
+        view=request.with_view,
+        progress=progress,
     )
     if request.with_view:
         from cellplan.pipeline.view.write import write_view_of_run

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from cellplan.cli.errors import InterruptedWorkError
-from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, Quiet, Settings, TaskName
+from cellplan.cli.options import AllowDirs, AsJson, CellFile, Mode, PlotFormats, Quiet, Settings, TaskName
 from cellplan.cli.output import json_failure, say_json, show
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -44,6 +44,7 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
     workers: Workers = None,
     resume: Resume = False,
     keep_runs: KeepRuns = False,
+    plots: PlotFormats = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
@@ -71,6 +72,7 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
             settings=(*of_mode, *(settings or ())),
             task=task,
             runs=folder if keep_runs else None,
+            formats=tuple(plots or ()),
         )
         with progress_listener(quiet=quiet) as progress:
             try:

@@ -1,11 +1,11 @@
 """Guard: foreign files, which could crash the program, are processed in a child process with limits.
 
-The same mechanism runs work of our own in the background.
+Work of our own is done beside this process by copies of it.
 """
 
-from cellplan.guard.background import BackgroundProcess, processors
+from cellplan.guard.forked import ForkedWork, processors
 from cellplan.guard.isolated_call import in_child
 from cellplan.guard.stock import ChildStock
 from cellplan.guard.worker_process import Guard
 
-__all__ = ["BackgroundProcess", "ChildStock", "Guard", "in_child", "processors"]
+__all__ = ["ChildStock", "ForkedWork", "Guard", "in_child", "processors"]

@@ -28,6 +28,7 @@ from cellplan.pipeline.overrides import require_task, with_overrides
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.comparison import comparison_files
+from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.comparison import ComparisonRecord, comparison_record
 from cellplan.report.record.run import run_record
@@ -53,6 +54,7 @@ class CompareJob:
         settings: Values set in every cell, each as ``KEY=VALUE``.
         task: Name of the only task to work on; None for all.
         runs: Folder of the study in which the run of every cell that is solved is kept; None to keep none.
+        formats: Formats of the plots beside SVG.
     """
 
     subjects: tuple[Path, ...]
@@ -60,6 +62,7 @@ class CompareJob:
     settings: tuple[str, ...] = ()
     task: str | None = None
     runs: Path | None = None
+    formats: tuple[str, ...] = ()
 
 
 def compare(
@@ -88,6 +91,7 @@ def compare(
             cannot be used.
         KeyboardInterrupt: It was interrupted; says how many variants are recorded.
     """
+    require_formats(job.formats)
     _refuse_unfitting(job)
     sources = [_source(job, path) for path in job.subjects]
     is_modes = len(sources) == 1
@@ -108,7 +112,7 @@ def compare(
     trials = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress).trials
     curves = [trial["figures"].pop("curves", None) for trial in trials]
     record = comparison_record(header, trials, found)
-    write_results(folder, comparison_files(record, curves))
+    write_results(folder, comparison_files(record, curves, job.formats))
     return record
 
 

@@ -3,12 +3,14 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from cellplan.errors import InputError
 from cellplan.io.cell.changes import read_setting
 from cellplan.model.cell import Cell
-from cellplan.model.cell_errors import CellErrors
+
+if TYPE_CHECKING:
+    from cellplan.model.cell_errors import CellErrors
 
 ADDRESSES: Final[Mapping[str, str]] = {
     "mode": "motion.mode",
@@ -38,7 +40,7 @@ def with_overrides(cell: Cell, settings: Iterable[str] = (), **options: str | fl
     return cell.with_values(values) if values else cell
 
 
-def with_draws(errors: CellErrors, *, trials: int | None = None, seed: int | None = None) -> CellErrors:
+def with_draws(errors: "CellErrors", *, trials: int | None = None, seed: int | None = None) -> "CellErrors":
     """The errors with another number of trials or another seed; None leaves that of the file.
 
     Raises:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program, Schedule
@@ -9,6 +10,9 @@ from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
 from cellplan.model.report import Report
 from cellplan.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from cellplan.pipeline.early_files import EarlyFiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,6 +27,7 @@ class Run:
         report: Result of the checks on these rows.
         rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
         scene: The scene that it is judged in, with the cell as it is in this phase; None for that of the whole program.
+        early: Files that were made before the clearance was known; None without any. See ``early_files``.
     """
 
     phase: Phase
@@ -32,6 +37,7 @@ class Run:
     report: Report
     rungs: Mapping[str, str] = field(default_factory=dict)
     scene: Scene | None = None
+    early: "EarlyFiles | None" = None
 
     def cell_of(self, whole: Cell) -> Cell:
         """The cell as it is in this phase.

@@ -15,7 +15,7 @@ from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.pipeline.background_plots import BackgroundPlots
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
@@ -23,7 +23,6 @@ from cellplan.pipeline.plan.retiming import retimed
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.plan.start import chosen_start
-from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
@@ -50,25 +49,8 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
     return certified(solution, scene, progress=progress)
 
 
-def solve_with_plots(
-    cell: Cell, plots: BackgroundPlots, *, task: str | None = None, progress: Progress = silent
-) -> Solution:
-    """Solve as ``solve`` does, while the plots of the motion are drawn in the background during the clearance check.
-
-    Args:
-        cell: The cell, as ``load_cell`` gives it.
-        plots: Takes the reports of all runs as soon as all of them is known but the clearance.
-        task: Name of the only task to work on; the other operators stay at their homes.
-        progress: Called with the stage and the fraction done.
-    """
-    scene, solution = solve_motion(cell, task=task, progress=progress)
-    for run in solution.runs:
-        plots.begin(run.report, cell=run.cell_of(solution.cell))
-    return certified(solution, scene, progress=progress)
-
-
 def solve_motion(
-    cell: Cell, *, task: str | None, progress: Progress, quick: QuickClearance | None = None
+    cell: Cell, *, task: str | None, progress: Progress, early: EarlyClearance | None = None
 ) -> tuple[Scene, Solution]:
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
@@ -76,11 +58,11 @@ def solve_motion(
         cell: The cell.
         task: Name of the only task to work on.
         progress: Called with the stage and the fraction done.
-        quick: Begins with the clearance of each phase as soon as its rows are known.
+        early: Begins with the clearance of each phase as soon as its rows are known.
     """
     refuse_clock_name(cell)
     if cell.program is not None:
-        return _solve_program(cell, task=task, progress=progress)
+        return _solve_program(cell, task=task, early=early, progress=progress)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
@@ -95,11 +77,13 @@ def solve_motion(
     scene = replace(scene, cell=solved)
     nominal = [replace(run.motion, q=standing(solved, run.phase, run.motion.q)) for run in planned]
     clock = ProgramClock.of(solved, plan, [run.schedule for run in planned])
-    motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), quick=quick, progress=progress)
+    motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), early=early, progress=progress)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
-def _solve_program(cell: Cell, *, task: str | None, progress: Progress) -> tuple[Scene, Solution]:
+def _solve_program(
+    cell: Cell, *, task: str | None, early: EarlyClearance | None, progress: Progress
+) -> tuple[Scene, Solution]:
     """The stages of a program from home to home, verified but for their clearance, and the scene with the part held."""
     from cellplan.pipeline.plan.sequence import plan_program  # with all transfer moves, which few cells have
     from cellplan.planning.sequence.only_task import with_only_task
@@ -109,7 +93,7 @@ def _solve_program(cell: Cell, *, task: str | None, progress: Progress) -> tuple
     plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
     clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
     motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
-    motion, runs = _runs(planned.cell, clock, motions, scenes, progress=progress)
+    motion, runs = _runs(planned.cell, clock, motions, scenes, early=early, progress=progress)
     runs = tuple(replace(run, rungs=each.rungs, scene=each.scene) for run, each in zip(runs, stages, strict=True))
     remark = "; ".join(planned.remarks) or None
     return replace(planned.scenes.held, cell=planned.cell), Solution(
@@ -117,27 +101,27 @@ def _solve_program(cell: Cell, *, task: str | None, progress: Progress) -> tuple
     )
 
 
-def certified(solution: Solution, scene: Scene, *, progress: Progress, quick: QuickClearance | None = None) -> Solution:
+def certified(solution: Solution, scene: Scene, *, progress: Progress, early: EarlyClearance | None = None) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables.
 
     Args:
         solution: The solution of ``solve_motion``.
         scene: Its scene.
         progress: Called with the stage and the fraction done.
-        quick: Has the clearance, without curves.
+        early: Has the clearance.
     """
-    reports = [_with_clearance(run, run.scene or scene, quick, progress) for run in solution.runs]
+    reports = [_with_clearance(run, run.scene or scene, early, progress) for run in solution.runs]
     reports = with_joins(solution.cell, reports)
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
 
 
-def _with_clearance(run: Run, scene: Scene, quick: QuickClearance | None, progress: Progress) -> Report:
+def _with_clearance(run: Run, scene: Scene, early: EarlyClearance | None, progress: Progress) -> Report:
     """The report of a run, completed by its clearance."""
-    if quick is None:
+    if early is None:
         return with_clearance(run.report, scene, run.schedule, progress=progress)
-    return completed(run.report, quick.of(scene, run.schedule, stacked(scene.cell, run.report.q), progress))
+    return completed(run.report, early.of(scene, run.schedule, stacked(scene.cell, run.report.q), progress))
 
 
 def _runs(
@@ -146,7 +130,7 @@ def _runs(
     nominal: Sequence[Motion],
     scenes: Sequence[Scene],
     *,
-    quick: QuickClearance | None = None,
+    early: EarlyClearance | None = None,
     progress: Progress,
 ) -> tuple[Motion, tuple[Run, ...]]:
     """The motion of the program, and its phases verified on the rows that would be written, but for their clearance.
@@ -164,8 +148,8 @@ def _runs(
     for place in range(len(motions) // (1 if cell.program is None else cell.program.cycles)):
         schedule, own = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
-        if quick is not None:
-            quick.begin(scenes[place], schedule, stacked(cell, {table.robot: table.q for table in rows}))
+        if early is not None:
+            early.begin(scenes[place], schedule, stacked(cell, {table.robot: table.q for table in rows}))
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
         runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))

@@ -16,6 +16,7 @@ from cellplan.pipeline.overrides import require_task, with_overrides
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.study import study_files
+from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.key_figures import KeyFigures, key_figures
 from cellplan.report.record.study import StudyRecord, study_record
 from cellplan.study.folder import run_folder, write_results
@@ -34,6 +35,7 @@ class SweepJob:
         settings: Values set in it for all variants, each as ``KEY=VALUE``.
         task: Name of the only task to work on; None for all.
         runs: Folder of the study in which the run of every variant is kept; None to keep none.
+        formats: Formats of the plot beside SVG.
     """
 
     cell: Path
@@ -41,6 +43,7 @@ class SweepJob:
     settings: tuple[str, ...] = ()
     task: str | None = None
     runs: Path | None = None
+    formats: tuple[str, ...] = ()
 
 
 def sweep(
@@ -69,6 +72,7 @@ def sweep(
         InputError: The cell cannot be read, an address does not exist, or the folder cannot be used.
         KeyboardInterrupt: It was interrupted; says how many variants are recorded.
     """
+    require_formats(job.formats)
     base = _base_cell(job)
     require_task(base, job.task)
     variants = combinations(axes)
@@ -86,7 +90,7 @@ def sweep(
     study = Study.of_variants(folder, header, variants)
     trials = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress).trials
     record = study_record(header, trials)
-    write_results(folder, study_files(record))
+    write_results(folder, study_files(record, job.formats))
     return record
 
 

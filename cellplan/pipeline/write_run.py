@@ -1,5 +1,6 @@
 """Write a solution: report, plots, the resolved cell and, when every check passed, the joint tables."""
 
+from collections.abc import Collection
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Final
@@ -13,9 +14,11 @@ from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.background_plots import BackgroundPlots
+from cellplan.pipeline.early_files import early_files, with_early_files
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import overview_page, report_page, view_beside
+from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
+from cellplan.report.plots.rendering import pictures, require_formats
+from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
@@ -37,7 +40,7 @@ def write_run(
     *,
     keep_rejected: bool = False,
     progress: Progress = silent,
-    plots: BackgroundPlots | None = None,
+    formats: Collection[str] = (),
     view: bool = False,
 ) -> Record:
     """Write a run folder; it appears whole or not at all.
@@ -51,32 +54,36 @@ def write_run(
         folder: The run folder; an older run there is replaced.
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Called with the stage and the fraction done.
-        plots: Renders the plots; plots that it has begun are not rendered again.
+        formats: Further formats of the plots beside SVG: ``png``, ``pdf``; both need matplotlib.
         view: Whether the pages lead to the 3-D page, which ``write_view`` adds.
 
     Returns:
         The record in the ``report.json`` of the folder.
 
     Raises:
-        InputError: The folder cannot be written, or contains something other than a run.
+        InputError: The folder cannot be written, or contains something other than a run; a format cannot be written.
     """
-    background = plots or BackgroundPlots()
+    require_formats(formats)
     cell, program = solution.cell, solution.program
     provenance = Provenance(versions=versions(), digests={"program": program_digest(program.tables)})
+    released = "tables" if solution.passed else "rejected"
+    has_tables = solution.passed or keep_rejected
+    tables = [f"{released}/{name}.csv" for name in (*program.tables, CLOCK)] if has_tables else []
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            page = view_beside(run.name or "") if view else ""
-            record = _write_report(target, run.cell_of(cell), run, provenance, background, page)
+            beside = Beside(view=view_beside(run.name or "") if view else "", files=tables)
+            record = _write_report(target, run.cell_of(cell), run, provenance, formats, beside)
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
-            target.write_text("report.html", overview_page(record, cell=cell, view=view_beside("") if view else ""))
+            beside = Beside(view=view_beside("") if view else "", files=tables)
+            target.write_text("report.html", overview_page(record, cell=cell, **beside))
         target.write_text("cell.yaml", render_cell(cell))
-        if solution.passed or keep_rejected:
-            _write_tables(target, program, "tables" if solution.passed else "rejected")
+        if has_tables:
+            _write_tables(target, program, released)
         manifest = render_manifest(cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
     return record
@@ -93,19 +100,24 @@ def versions() -> dict[str, str]:
     return found
 
 
+def prepared(solution: Solution) -> Solution:
+    """The solution with what of its run folder does not depend on its clearance, which need not be known yet."""
+    versions()  # looked up here for the first time
+    return with_early_files(solution)
+
+
 def _write_report(
-    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, plots: BackgroundPlots, view: str
+    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], beside: Beside
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
-    place = "" if run.name is None else f"{run.name}/"
-    begun = plots.pictures(run.report, cell=cell)
+    place, early = "" if run.name is None else f"{run.name}/", early_files(run)
     record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
     target.write_text(f"{place}report.json", as_json(record))
-    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
-    pictures = begun()
-    for name, picture in pictures.items():
+    target.write_text(f"{place}series.json", series_json(run.report, run.motion, head=early.series))
+    plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)
+    for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    page = report_page(record, run.report.checks, cell=cell, plots=pictures, view=view)
+    page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
     target.write_text(f"{place}report.html", page)
     return record
 

@@ -3,29 +3,27 @@
 from typing import Any
 
 from builders.run_edits import edit_json, first_row, pick, seal
-from cellplan.report.page.render import inline_svg
+from cellplan.report.plots.svg import inline_svg
 
 
 def words_in_a_picture(rng, copy):
     """A picture, in its file and on the page alike, that says or does more than the one that is drawn."""
-    pictures = sorted((copy.run / "plots").glob("*.svg"))
-    picture, page = pick(rng, pictures), copy.run / "report.html"
-    drawing = picture.read_text(encoding="utf-8")
+    page = copy.run / "report.html"
+    text = page.read_text(encoding="utf-8")
+    drawn = {path: path.read_text(encoding="utf-8") for path in sorted((copy.run / "plots").glob("*.svg"))}
+    picture, drawing = pick(rng, [(path, drawing) for path, drawing in drawn.items() if inline_svg(drawing) in text])
     old, new = pick(
         rng,
         (
             ("</svg>", "<text>clearance 500 mm</text></svg>"),
             ("</svg>", "<script>document.title = 'safe'</script></svg>"),
             ("</svg>", "</svg><h1>released at full speed</h1>"),
-            ('<path d="', '<path onclick="alert()" d="'),
+            ("<path ", '<path onclick="alert()" '),
         ),
     )
-    forged, text = drawing.replace(old, new, 1), page.read_text(encoding="utf-8")
-    for i in range(len(pictures)):
-        text = text.replace(inline_svg(drawing, prefix=f"p{i}-"), inline_svg(forged, prefix=f"p{i}-"))
-    assert text != page.read_text(encoding="utf-8")
+    forged = drawing.replace(old, new, 1)
     picture.write_text(forged, encoding="utf-8")
-    page.write_text(text, encoding="utf-8")
+    page.write_text(text.replace(inline_svg(drawing), inline_svg(forged)), encoding="utf-8")
     seal(copy)
 
 

@@ -28,7 +28,7 @@ from cellplan.pipeline.solution import Solution
 Events = list[tuple[Any, ...]]  # what was said of the progress, call by call
 Names = dict[tuple[str, str], object]  # what each name of the package stands for
 HARMLESS = {  # names whose replacement changes no figure: where plots and trials run, how often a line is printed
-    ("cellplan.guard.background", "processors"),
+    ("cellplan.guard.forked", "processors"),
     ("cellplan.study.session", "Workers"),
     ("cellplan.cli.progress", "LINE_EVERY_S"),
 }
@@ -103,9 +103,9 @@ def _install() -> None:
 def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
     """The first part of ``solve``; a known solution takes the place of the scene."""
 
-    def solve_motion(cell: Cell, *, task: str | None, progress: Progress, quick: Any = None) -> tuple[Any, Solution]:
-        if quick is not None:  # begins with what is asked for afterwards
-            return real(cell, task=task, progress=progress, quick=quick)
+    def solve_motion(cell: Cell, *, task: str | None, progress: Progress, early: Any = None) -> tuple[Any, Solution]:
+        if early is not None:  # begins with what is asked for afterwards
+            return real(cell, task=task, progress=progress, early=early)
         _state.making = entry = None if _state.folder is None or _is_patched() else _entry(cell, task, _state.folder)
         if entry is None:
             return real(cell, task=task, progress=progress)
@@ -122,12 +122,12 @@ def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
 def _clearance(real: Callable[..., Any]) -> Callable[..., Any]:
     """The second part of ``solve``."""
 
-    def with_clearance(solution: Solution, scene: Any, *, progress: Progress, quick: Any = None) -> Solution:
+    def with_clearance(solution: Solution, scene: Any, *, progress: Progress, early: Any = None) -> Solution:
         if isinstance(scene, Solved):
             _say(scene.clearance_events, progress)
             return scene.whole
-        if quick is not None:  # without curves
-            return real(solution, scene, progress=progress, quick=quick)
+        if early is not None:  # without curves
+            return real(solution, scene, progress=progress, early=early)
         entry = _state.making
         if entry is None or entry.motion is not solution:
             return real(solution, scene, progress=progress)

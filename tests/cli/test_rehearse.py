@@ -61,11 +61,11 @@ def test_feedback_brings_it_back_and_hands_over_corrected_tables(pair: str, caps
     page = Path("out/rehearsal.html").read_text(encoding="utf-8")
     assert "<svg" in page
     assert "http://" not in page.replace("http://www.w3.org", "")  # no network
-    assert {path.name for path in Path("out/plots").glob("*.png")} == {
-        "before_circle.png",
-        "after_circle.png",
-        "in_pass_circle.png",
-        "rounds_circle.png",
+    assert {path.name for path in Path("out/plots").glob("*.svg")} == {
+        "before_circle.svg",
+        "after_circle.svg",
+        "in_pass_circle.svg",
+        "rounds_circle.svg",
     }
 
 

@@ -3,6 +3,8 @@
 import json
 import math
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ import pytest
 from cellplan.cli import progress
 from cellplan.cli.main import run
 
-pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 
 @pytest.fixture
@@ -226,3 +228,43 @@ def test_the_lines_to_type_next_do_what_they_say(
     for step in steps[:3]:
         assert run([*shlex.split(step), "-q"]) == 0, step
     assert steps[3] == "fastest hasty.yaml --set motion.duration_s=0.4 --set motion.step_s=0.0005"
+
+
+def test_plots_are_vector_pictures_unless_others_are_requested(
+    coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["solve", str(coarse_cell), "--task", "circle", "-q", "-o"]
+    run([*options, str(tmp_path / "plain")])
+    run([*options, str(tmp_path / "more"), "--plots", "png", "--plots", "pdf"])
+
+    plain = {path.name for path in (tmp_path / "plain" / "plots").iterdir()}
+    assert {Path(name).suffix for name in plain} == {".svg"}
+    more = {path.name for path in (tmp_path / "more" / "plots").iterdir()}
+    assert more == plain | {Path(name).with_suffix(ending).name for name in plain for ending in (".png", ".pdf")}
+    page = (tmp_path / "more" / "report.html").read_bytes()
+    assert page == (tmp_path / "plain" / "report.html").read_bytes()
+    listed = json.loads((tmp_path / "more" / "manifest.json").read_text(encoding="utf-8"))["files"]
+    assert {f"plots/{name}" for name in more} <= set(listed)
+    capsys.readouterr()
+
+
+def test_an_unknown_format_of_plots_is_refused_before_the_cell_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = run(["solve", str(tmp_path / "missing.yaml"), "--plots", "gif"])
+
+    assert status == 2
+    assert "plots: expected one of png, pdf, got 'gif'" in capsys.readouterr().err
+
+
+def test_solving_imports_no_plotting_library(cells: Path, tmp_path: Path) -> None:
+    program = (
+        "import sys; from cellplan.cli.main import run; "
+        f"status = run(['solve', {str(cells / 'planar_pair.yaml')!r}, '-q', '-o', {str(tmp_path / 'run')!r}]); "
+        "sys.exit(status or 'matplotlib' in sys.modules)"
+    )
+
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+    assert found.returncode == 0, found.stderr
+    assert list((tmp_path / "run" / "plots").glob("*.svg"))

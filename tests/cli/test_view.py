@@ -85,7 +85,7 @@ def test_a_solved_cell_brings_its_page_and_stays_verifiable(
 
     assert f"3-D page: {tmp_path / 'run' / 'view.html'}" in capsys.readouterr().out
     report = (tmp_path / "run" / "report.html").read_text()
-    assert '<a href="view.html">3-D page</a>' in report
+    assert '<a class="view-link" href="view.html"' in report
     assert 'href="view.html#t=' in report
     assert (tmp_path / "run" / "view.html").is_file()
     assert run(["verify", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0

@@ -88,6 +88,7 @@ def test_both_pages_follow_each_save_and_the_run_is_whole_in_the_end(
     until(lambda: shows_cycle(browser, 12), "no report")
     until(lambda: in_frame(browser, "view.html", "document.body.dataset.ready") == "true", "no 3-D page")
     in_frame(browser, "view.html", "location.hash = 't=0.5'")
+    in_frame(browser, "report.html", "scrollTo({top: 400, behavior: 'instant'})")
 
     cell.write_text("cellplan: 1\nname: <b>\n", encoding="utf-8")
     until(lambda: browser.run(PHASE) == "✗ no result", "no error")
@@ -96,6 +97,7 @@ def test_both_pages_follow_each_save_and_the_run_is_whole_in_the_end(
     until(lambda: browser.run(PHASE) == "✓ passed", "no second result")
     until(lambda: shows_cycle(browser, 15), "the old report")
     until(lambda: in_frame(browser, "view.html", "document.body.dataset.ready") == "true", "no second 3-D page")
+    until(lambda: in_frame(browser, "report.html", "scrollY") == 400, "the report is not at its place")
     hash_after = in_frame(browser, "view.html", "location.hash")
     last = in_frame(browser, "view.html", "document.getElementById('time').max")
 

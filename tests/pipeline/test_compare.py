@@ -170,7 +170,7 @@ def test_the_page_is_whole_and_needs_nothing_else(
     tags = Tags()
     tags.feed(page)
     assert tags.open == []
-    assert tags.seen.count("svg") == 3
+    assert page.count("<svg xmlns=") == 3
     assert "://" not in page.replace("http://www.w3.org", "")
     record = modes if study == "modes" else mixed
     assert all(each["name"] in page for each in record["variants"])

@@ -14,10 +14,6 @@ from cellplan import load_cell, solve, write_run
 
 DAMAGED = "damaged"  # run before which every file of the cache loses its last byte
 
-class Blank:
-    def pictures(self, report, *, cell):
-        return dict
-
 for place in range(2, len(sys.argv), 2):
     run, cache = Path(sys.argv[place]), sys.argv[place + 1]
     for path in Path(cache).iterdir() if run.name == DAMAGED else ():
@@ -25,7 +21,7 @@ for place in range(2, len(sys.argv), 2):
     child = os.fork()
     if child == 0:
         os.environ["CELLPLAN_CACHE"] = cache
-        write_run(solve(load_cell(sys.argv[1])), run, plots=Blank())
+        write_run(solve(load_cell(sys.argv[1])), run)
         sys.exit()
     if os.waitpid(child, 0)[1] != 0:
         sys.exit(1)
@@ -35,7 +31,7 @@ for place in range(2, len(sys.argv), 2):
 def solve_each(cell: Path, caches: dict[Path, str]) -> None:
     """Write runs, by folder, each with a cache and in a process that has read nothing before.
 
-    Pictures show nothing that is not in the report; the processes share the imports, which take long.
+    The processes share the imports, which take long.
     """
     pairs = [text for folder, cache in caches.items() for text in (str(folder), cache)]
     subprocess.run(

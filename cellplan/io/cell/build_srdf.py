@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -12,12 +12,14 @@ from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.write import in_file_units
 from cellplan.io.input.findings import unknown_name
 from cellplan.io.robots.rules import start_keys
-from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies, unknown_links
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
 from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
+
+if TYPE_CHECKING:  # read only for a cell that names an SRDF
+    from cellplan.io.robots.urdf.srdf import Srdf
 
 AUTO: Final = "auto"
 
@@ -42,6 +44,8 @@ def apply_srdfs(
         srdf = None if entry.srdf is None else sources.srdf(name, entry.srdf)
         try:
             if srdf is not None:
+                from cellplan.io.robots.urdf.srdf import disabled_bodies, unknown_links
+
                 found[name] = replace(model, disabled=disabled_bodies(srdf, model))
                 remark = unknown_links(srdf, model)
                 sources.remarks += [(f"robots.{name}.srdf", remark)] if remark else []
@@ -63,7 +67,7 @@ class _Configurations:
 
     name: str
     model: RobotModel
-    srdf: Srdf | None
+    srdf: "Srdf | None"
     sources: Sources
     document: YamlDocument
 
@@ -84,6 +88,8 @@ class _Configurations:
             text = f"expected {POSITION_WORDS}, got '{word}' without the key srdf"
             self.sources.findings.append(self.document.finding(path, text))
             return None
+        from cellplan.io.robots.urdf.srdf import configuration_of
+
         try:
             q = configuration_of(self.srdf, word, self.model, added=added)
         except InputError as error:

@@ -5,6 +5,7 @@ import posixpath
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from functools import partial
 from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
 
 from cellplan.cache import as_here
 from cellplan.errors import InputError
@@ -18,10 +19,7 @@ from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
 from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
-from cellplan.io.robots.urdf.gripper import GripperState
-from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot, load_urdf
-from cellplan.io.robots.urdf.srdf import Srdf, read_srdf
-from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX
+from cellplan.io.robots.urdf import XACRO_SUFFIX
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.path import CsvEntry
 from cellplan.io.schema.robot import RobotEntry
@@ -29,6 +27,11 @@ from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import SampledPath, TimedPath
+
+if TYPE_CHECKING:  # read only for a cell that names such a file
+    from cellplan.io.robots.urdf.gripper import GripperState
+    from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot
+    from cellplan.io.robots.urdf.srdf import Srdf
 
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
 TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
@@ -110,8 +113,10 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
-    def srdf(self, name: str, written: str) -> Srdf | None:
+    def srdf(self, name: str, written: str) -> "Srdf | None":
         """SRDF of a robot; None after a finding."""
+        from cellplan.io.robots.urdf.srdf import read_srdf
+
         place = self._file(written, ("robots", name, "srdf"))
         if place is None:
             return None
@@ -180,6 +185,8 @@ class Sources:
 
     def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
         """Model from a URDF and its meshes."""
+        from cellplan.io.robots.urdf.load import UrdfOptions
+
         path = ("robots", name, "model")
         place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
         if place is None or folders is None:
@@ -228,8 +235,10 @@ class Sources:
         return tuple(found) if len(found) == len(entry.package_dirs) else None
 
 
-def _read_urdf(known: dict[Hashable, UrdfRobot], written: str, place: Path, *, options: UrdfOptions) -> UrdfRobot:
+def _read_urdf(known: "dict[Hashable, UrdfRobot]", written: str, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":
     """Robot of a URDF; robots that say the same of the same file share one."""
+    from cellplan.io.robots.urdf.load import load_urdf
+
     locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
     limits, arguments = _items(options.limits), _items(options.xacro_args)
     key = (written, place, options.flange, options.package_dirs, limits, locked, arguments)
@@ -244,8 +253,10 @@ def argument_text(value: str | float) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _gripper_state(entry: GripperEntry | None) -> GripperState | None:
+def _gripper_state(entry: GripperEntry | None) -> "GripperState | None":
     """How far a gripper is open; None where the cell does not say it."""
+    from cellplan.io.robots.urdf.gripper import GripperState
+
     if entry is None or (entry.opening_mm is None and entry.angle_deg is None):
         return None
     return GripperState(joints=entry.joints, opening=si_or_none(entry.opening_mm), angle=si_or_none(entry.angle_deg))

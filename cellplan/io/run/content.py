@@ -18,8 +18,8 @@ MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
 OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # their content is compared file by file
 USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hold that lists no files
-    r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export|fastest|advice)\.(json|html)|map\.(json|html|svg|png)|curve\.csv|(demand|best)\.yaml"
-    r"|plots/[^/]+\.(svg|png)|(tables|rejected)/([^/]+/)?[^/]+\.csv"
+    r"cell\.yaml|(manifest|series)\.json|view\.html|(report|rehearsal|export|fastest|advice)\.(json|html)|map\.(json|html|svg|png|pdf)|curve\.csv|(demand|best)\.yaml"
+    r"|plots/[^/]+\.(svg|png|pdf)|(tables|rejected)/([^/]+/)?[^/]+\.csv"
 )
 
 

@@ -64,10 +64,32 @@ class ValidEntries:
 
 
 def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Finding]]:
-    """Validate a cell file entry by entry; the findings name what is invalid."""
+    """Validate a cell file, and entry by entry where anything of it is invalid; the findings name what is."""
     whole, findings = validate(CellDocument, document)
+    names = {key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")}
+    if whole is None:
+        return _by_entry(document, names), findings
     valid = ValidEntries(
         whole=whole,
+        robots=whole.robots,
+        tasks=whole.tasks,
+        environment=whole.environment,
+        part=whole.part,
+        motion=whole.motion,
+        solver=whole.solver,
+        checks=whole.checks,
+        layout=whole.layout,
+        program=whole.program,
+        acceleration=whole.acceleration,
+        names=names,
+    )
+    return valid, findings
+
+
+def _by_entry(document: YamlDocument, names: Mapping[str, tuple[str, ...]]) -> ValidEntries:
+    """What is valid of an invalid cell file."""
+    return ValidEntries(
+        whole=None,
         robots=_named(RobotEntry, document, "robots"),
         tasks=_named(TaskEntry, document, "tasks"),
         environment=_named(ObstacleEntry, document, "environment"),
@@ -77,10 +99,9 @@ def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Findi
         checks=_single(ChecksEntry, document, "checks"),
         layout=_single(LayoutEntry, document, "layout"),
         program=_single(ProgramEntry, document, "program"),
-        acceleration=None if whole is None else whole.acceleration,
-        names={key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")},
+        acceleration=None,
+        names=names,
     )
-    return valid, findings
 
 
 def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:

@@ -1,6 +1,6 @@
 """Map of a base: what becomes of the whole job of a cell when one of its robots stands elsewhere in the plane."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -94,18 +94,19 @@ def finished_record(
     )
 
 
-def write_base_map(record: Record, folder: Path) -> None:
-    """Write ``map.json``, ``map.html``, ``map.svg`` and ``map.png`` into a folder, which appears whole or not at all.
+def write_base_map(record: Record, folder: Path, *, formats: Collection[str] = ()) -> None:
+    """Write ``map.json``, ``map.html`` and ``map.svg`` into a folder, which appears whole or not at all.
 
     Args:
         record: As ``base_map`` returns it.
         folder: The folder; an earlier map there is replaced.
+        formats: Formats of the picture beside SVG: ``png``, ``pdf``; both need matplotlib.
 
     Raises:
         InputError: The folder cannot be written, or holds something that cellplan did not write.
     """
     with RunFolder(folder) as target:
-        for name, content in map_files(record).items():
+        for name, content in map_files(record, formats).items():
             target.write_bytes(name, content)
 
 

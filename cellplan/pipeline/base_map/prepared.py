@@ -42,6 +42,7 @@ class MapRequest:
         allow_dirs: Further folders that the files it names may lie in.
         settings: Values set in the cell, each as ``KEY=VALUE``.
         mode: Mode of the motion; None for that of the cell.
+        formats: Formats of the picture beside SVG.
     """
 
     cell: Path
@@ -50,6 +51,7 @@ class MapRequest:
     allow_dirs: tuple[Path, ...] = ()
     settings: tuple[str, ...] = ()
     mode: str | None = None
+    formats: tuple[str, ...] = ()
 
     @property
     def anywhere(self) -> "MapRequest":

@@ -14,6 +14,7 @@ from cellplan.pipeline.base_map.prepared import MapRequest, prepared_request
 from cellplan.pipeline.base_map.tiles import Tiles, evaluate
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.base_map import map_files
+from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Record, as_json
 from cellplan.study.folder import RESULT, SCHEMA, write_results
 from cellplan.study.status import Best
@@ -58,6 +59,7 @@ def map_study(
         StartNotFoundError: A start posture is to be found, and there is none at the present base.
         KeyboardInterrupt: It was interrupted; says how many tiles are recorded.
     """
+    require_formats(request.formats)
     sent = request.anywhere
     with ExitStack() as opened:
         pool = workers
@@ -86,7 +88,7 @@ def map_study(
         finished = study.run(partial(evaluate, sent), workers=pool, limits=limits, resume=resume, progress=progress)
         trials = finished.trials
         record = finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
-    files = map_files(record)
+    files = map_files(record, request.formats)
     listed = [{"name": name, "sha256": digest(content)} for name, content in files.items()]
     tried = [{"trial": each["trial"], "status": each["status"], "reason": each["reason"]} for each in trials]
     result = {"schema": SCHEMA, **header, "trials": tried, "files": listed}

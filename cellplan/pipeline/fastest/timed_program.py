@@ -11,8 +11,8 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, joint_at
 from cellplan.model.progress import Progress
 from cellplan.model.report import TaskAccuracy
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.plan.retiming import RowLimits, row_limits
-from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.pipeline.solve import certified, solve_motion
 from cellplan.report.record.load_figures import LoadFigures, load_figures
@@ -92,7 +92,7 @@ class TimedProgram:
         *,
         task: str | None,
         progress: Progress,
-        quick: QuickClearance | None = None,
+        early: EarlyClearance | None = None,
     ) -> Self:
         """The program of a cell with other values, verified but for its clearance.
 
@@ -102,9 +102,9 @@ class TimedProgram:
             values: Values by address.
             task: Name of the only task to work on.
             progress: Called with the stage and the fraction done.
-            quick: Begins with its clearance at once.
+            early: Begins with its clearance at once.
         """
-        scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, quick=quick)
+        scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
         scaled = [run for run in solution.runs if _is_scaled(run, cell)]
         rows = [_rows(run.scene or scene, run) for run in scaled]
         return cls(
@@ -116,9 +116,9 @@ class TimedProgram:
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
-    def certified(self, progress: Progress, quick: QuickClearance | None = None) -> Self:
-        """The same program with the clearance of every phase checked; ``quick`` has it without curves."""
-        return replace(self, solution=certified(self.solution, self.scene, progress=progress, quick=quick))
+    def certified(self, progress: Progress, early: EarlyClearance | None = None) -> Self:
+        """The same program with the clearance of every phase checked; ``early`` has it without curves."""
+        return replace(self, solution=certified(self.solution, self.scene, progress=progress, early=early))
 
     @property
     def figures(self) -> LoadFigures:

@@ -10,10 +10,9 @@ from cellplan.model.verified_run import VerifiedMotion
 from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
-from cellplan.report.page.render import has_view_links, overview_page, report_page, view_beside
+from cellplan.report.page.render import Beside, has_view_links, overview_page, report_page, view_beside
 from cellplan.report.plots.rendering import pictures
-from cellplan.report.plots.run import clearance_sheets, motion_sheets
-from cellplan.report.plots.sheet import Sheet
+from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
@@ -26,7 +25,7 @@ EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 def drawn_again(motions: Sequence[VerifiedMotion]) -> Drawings:
     """The pictures of what was found, by the place of the run and by file name."""
-    return {motion.name or "": pictures(_sheets(motion, motion.cell)) for motion in motions}
+    return {motion.name or "": pictures(run_figures(motion.report, cell=motion.cell)) for motion in motions}
 
 
 def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings) -> Iterator[str]:
@@ -49,7 +48,7 @@ def page_findings(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotio
         reports = {str(motion.name): motion.report for motion in motions}
         expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
         record = _of_the_run(stored, "", expected)
-        yield from _difference(stored, "", overview_page(record, cell=cell, view=_view(stored, "")))
+        yield from _difference(stored, "", overview_page(record, cell=cell, **_beside(stored, "")))
 
 
 def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
@@ -73,23 +72,18 @@ def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -
                 yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
 
 
-def _sheets(motion: VerifiedMotion, cell: Cell) -> dict[str, Sheet]:
-    """The plots of one run by name, in their order."""
-    return motion_sheets(motion.report, cell=cell) | clearance_sheets(motion.report, cell=cell)
-
-
 def _page_finding(
     stored: StoredRun, place: str, *, cell: Cell, motion: VerifiedMotion, record: Record
 ) -> Iterator[str]:
     """What is wrong with the page of one run."""
-    desired, drawings = [f"{name}.svg" for name in _sheets(motion, cell)], stored.drawings(place)
+    desired, drawings = [f"{name}.svg" for name in run_figures(motion.report, cell=cell)], stored.drawings(place)
     if sorted(drawings) != sorted(desired):
         names = f"expected the pictures {listed(desired)}, got {listed(drawings)}"
         yield f"{stored.file(place, 'plots')}: {names}; solve the cell again"
         return
     in_order = {name: drawings[name] for name in desired}
     try:
-        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, view=_view(stored, place))
+        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, **_beside(stored, place))
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
         file = stored.file(place, "report.json")
         yield f"{file}: solver: expected the form that cellplan writes; solve the cell again"
@@ -97,10 +91,10 @@ def _page_finding(
     yield from _difference(stored, place, page)
 
 
-def _view(stored: StoredRun, place: str) -> str:
-    """Where the 3-D page lies for a page of the run that leads there; empty for one that does not."""
+def _beside(stored: StoredRun, place: str) -> Beside:
+    """What lies beside a page of the run: its files, and the 3-D page for a page that leads there."""
     text = stored.content(place, PAGE).decode("utf-8", "replace")
-    return view_beside(place) if has_view_links(text) else ""
+    return Beside(view=view_beside(place) if has_view_links(text) else "", files=tuple(stored.manifest.files))
 
 
 def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:

@@ -1,20 +1,20 @@
 """Whether a picture of a run holds nothing but what cellplan draws: curves may differ by rounding, words may not."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Final
 from xml.etree import ElementTree as ET
 
 from cellplan.io.input.findings import shown
 
-ELEMENTS: Final = frozenset({"svg", "metadata", "defs", "style", "g", "path", "text", "use"})
-ATTRIBUTES: Final = frozenset({"id", "style", "x", "y", "transform", "d", "xlink:href"})
+ELEMENTS: Final = frozenset({"svg", "g", "path", "rect", "text"})
 SVG_START: Final = "<svg"
 PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
 TAG: Final = re.compile(r'</?([\w:]+)((?:\s+[\w:-]+="[^"<>]*")*)\s*/?>')
 ATTRIBUTE: Final = re.compile(r'([\w:-]+)="([^"]*)"')
-FIGURE: Final = re.compile(r"[-−+]?[\d.,]+(?:e[-−+]?\d+)?")
-LOCAL_VALUE: Final = re.compile(r"(?!.*(?:url\((?!#)|[&\\@]|:/)).*", re.DOTALL)  # an attribute that leads nowhere else
+FIGURE: Final = re.compile(r"[-−+]?[\d.,]+(?:e[-−+]?\d+)?|10[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")
+MEASURES: Final = frozenset({"x", "y", "width", "height", "d", "data-y"})  # attributes whose values are measures alone
+MEASURE: Final = re.compile(r"[-\d.e MLHVZhvl]*")
 
 
 def foreign_piece(got: str, drawn: str) -> str | None:
@@ -33,23 +33,27 @@ def foreign_piece(got: str, drawn: str) -> str | None:
         return shown(" ".join(head.split()) or "nothing")
     known = frozenset(PIECE.findall(SVG_START + other_body))
     words = frozenset(piece.strip() for piece in known)
+    attributes = frozenset(ATTRIBUTE.findall(SVG_START + other_body))
     for piece in PIECE.findall(SVG_START + body):
-        if piece not in known and piece.strip() not in words and _is_foreign(piece):
+        if piece not in known and piece.strip() not in words and _is_foreign(piece, attributes):
             return shown(" ".join(piece.split()))
     return next(_unbalanced(got), None)
 
 
-def _is_foreign(piece: str) -> bool:
-    """Whether a piece that the picture drawn anew does not hold is more than a figure or a course of its own."""
+def _is_foreign(piece: str, known: Collection[tuple[str, str]]) -> bool:
+    """Whether a piece that the picture drawn anew does not hold is more than a figure or a course of its own.
+
+    Args:
+        piece: A tag, or the text between two.
+        known: Name and value of all attributes that were drawn.
+    """
     if not piece.startswith(("<", ">")):
         return not FIGURE.fullmatch(piece.strip())
     tag = TAG.fullmatch(piece)
     if tag is None or tag[1] not in ELEMENTS:
         return True
     return any(
-        name not in ATTRIBUTES
-        or not LOCAL_VALUE.fullmatch(value)
-        or (name == "xlink:href" and not value.startswith("#"))
+        (name, value) not in known and not (name in MEASURES and MEASURE.fullmatch(value))
         for name, value in ATTRIBUTE.findall(tag[2])
     )
 

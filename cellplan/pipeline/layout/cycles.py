@@ -4,10 +4,10 @@ from typing import Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.search.programs.objective import Objective, Timing
 
 DURATIONS: Final = 4  # [-] durations tried until the limits hold
@@ -29,7 +29,7 @@ def is_scaled(ready: Prepared) -> bool:
 
 
 def draft(
-    ready: Prepared, cell: Cell, cycle: float, progress: Progress, quick: QuickClearance | None = None
+    ready: Prepared, cell: Cell, cycle: float, progress: Progress, early: EarlyClearance | None = None
 ) -> TimedProgram:
     """The program of a layout in a cycle, or at the duration of the cell, or retimed; verified but for its clearance.
 
@@ -38,16 +38,16 @@ def draft(
         cell: The cell of the layout.
         cycle: Its cycle in [s], if that may change.
         progress: Called with the stage and the fraction done.
-        quick: Begins with its clearance at once, unless its duration may still change.
+        early: Begins with its clearance at once, unless its duration may still change.
     """
     is_cycle = ready.request.objective is Objective.CYCLE
     if ready.request.timing is Timing.RETIMED:
         timing: object = "fastest" if is_cycle else {"cycle_s": ready.duration}
         law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
         values = {"motion.timing": timing}
-        return TimedProgram.solved(cell, law, values, task=None, progress=progress, quick=quick)
+        return TimedProgram.solved(cell, law, values, task=None, progress=progress, early=early)
     if not is_cycle:
-        return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=progress, quick=quick)
+        return TimedProgram.solved(cell, Law.AS_WRITTEN, {}, task=None, progress=progress, early=early)
     return scaled(cell, whole_steps(cell, cycle / ready.duration), progress)
 
 

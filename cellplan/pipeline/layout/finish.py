@@ -17,12 +17,12 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.timed_program import TimedProgram
 from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, kept_demands, prepared, values_of
-from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
@@ -122,7 +122,7 @@ class _Timed:
     start: Array
     standing: Standing
     demands: Demands
-    quick: QuickClearance
+    early: EarlyClearance
     program: TimedProgram | None = None
     reason: str = ""
 
@@ -170,7 +170,7 @@ class Finish:
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
             self.solves += 1
             if program is not None:
-                program = program.certified(self.progress, timed.quick)
+                program = program.certified(self.progress, timed.early)
                 reason = rejection_of(program, self.ready.variables) or too_singular(
                     self.ready, timed.standing, program
                 )
@@ -208,11 +208,11 @@ class Finish:
         x, start, standing, demands = self._improved(x, start, room, is_first=is_first)
         is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
         helping = self.workers if isinstance(self.workers, Workers) else None
-        quick = QuickClearance(helping.begin if is_once and helping is not None else None)
-        found = _Timed(x=x, start=start, standing=standing, demands=demands, quick=quick)
+        early = EarlyClearance(helping.begin if is_once and helping is not None else None)
+        found = _Timed(x=x, start=start, standing=standing, demands=demands, early=early)
         try:
             cell = self._cell(x, start)
-            program = draft(self.ready, cell, standing.measures.cycle, self.progress, quick)
+            program = draft(self.ready, cell, standing.measures.cycle, self.progress, early)
             return replace(found, program=program)
         except (InputError, NoSolutionError) as error:
             return replace(found, reason=str(error).splitlines()[0])

@@ -15,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.layout import Misplacement
 from cellplan.model.seeds import generator
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.cycles import DURATIONS, load_of, scaled, time_asked
@@ -33,7 +34,6 @@ from cellplan.pipeline.layout.finish import (
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import NODES as FEW_NODES
 from cellplan.pipeline.layout.proposals import BESTS, SAME
-from cellplan.pipeline.quick_clearance import QuickClearance
 from cellplan.report.record.common import number
 from cellplan.report.record.misplacement import CornerRecord, MisplacementRecord, ToleranceRecord
 from cellplan.search.misplacement.corners import Corner
@@ -203,7 +203,7 @@ class MisplacedFinish(Finish):
             if factor is None or most <= 1.0:
                 break
             factor = whole_steps(cells[0], factor * most, longer_than=factor)
-        programs = [program.certified(self.progress, QuickClearance()) for program in programs]
+        programs = [program.certified(self.progress, EarlyClearance()) for program in programs]
         reasons = [rejection_of(program, self.ready.variables) for program in programs]
         corners = [
             _corner(what, of.names, corner.d, (program, reason))

@@ -1,5 +1,6 @@
 """Write a rehearsal: record, page, plots, and the corrected joint tables when there are any that may be used."""
 
+from collections.abc import Collection
 from pathlib import Path
 
 from cellplan.io.cell.write import render_cell
@@ -9,12 +10,15 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import Rehearsal
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.render import rehearsal_page
-from cellplan.report.plots.rehearsal import draw_rehearsal
+from cellplan.report.plots.rehearsal import rehearsal_figures
+from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.rehearsal import rehearsal_record
 
 
-def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = silent) -> Record:
+def write_rehearsal(
+    rehearsal: Rehearsal, folder: Path, *, formats: Collection[str] = (), progress: Progress = silent
+) -> Record:
     """Write the folder of a rehearsal; it appears whole or not at all.
 
     It has ``rehearsal.json``, ``rehearsal.html``, ``plots/`` and ``cell.yaml``. Corrected tables stand under
@@ -23,17 +27,19 @@ def write_rehearsal(rehearsal: Rehearsal, folder: Path, *, progress: Progress = 
     Args:
         rehearsal: The rehearsal.
         folder: The folder; an older rehearsal there is replaced.
+        formats: Further formats of the plots beside SVG: ``png``, ``pdf``; both need matplotlib.
         progress: Called with the stage and the fraction done.
 
     Returns:
         The record in the ``rehearsal.json`` of the folder.
 
     Raises:
-        InputError: The folder cannot be written, or holds something that cellplan did not write.
+        InputError: The folder cannot be written, or holds something that cellplan did not write; a format cannot be
+            written.
     """
     progress("writing the rehearsal", 1.0)
     provenance = Provenance(versions=versions(), digests=_digests(rehearsal))
-    plots = draw_rehearsal(rehearsal)
+    plots = pictures(rehearsal_figures(rehearsal), formats)
     record = rehearsal_record(rehearsal, provenance=provenance)
     with RunFolder(folder) as target:
         for name, picture in plots.items():

@@ -85,6 +85,7 @@ def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
         "tasks": tasks,
         "motion": motion_record(times, q[None], []),
         "nearest": nearest_record([Stretch(scene, 0, 1)], times, q[None], np.zeros(1, dtype=np.intp)),
+        "certified": {"times": [], "distances": []},
         "contacts": [
             {"bodies": list(pair), "first": 0.0, "last": 0.0, "allowed": False, "text": _pair_text(scene, pair)}
             for pair in touching

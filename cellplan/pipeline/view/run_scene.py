@@ -24,7 +24,9 @@ from cellplan.pipeline.view.describe import (
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
 from cellplan.report.record.common import Record
+from cellplan.report.record.common import number as plain
 from cellplan.report.record.view import (
+    ClearanceCurveRecord,
     ContactViewRecord,
     FailureRecord,
     MotionViewRecord,
@@ -35,6 +37,8 @@ from cellplan.report.record.view import (
 from cellplan.scene.scene import Scene
 
 MOST_NUMBERS: Final = 800_000  # [-] joint positions of a page: 4.3 MB in base64
+TIME_DECIMALS: Final = 6  # of [s]
+DISTANCE_DECIMALS: Final = 4  # of [mm]
 SAME_TIME: Final = 1e-9  # [s] within which the end of a phase is the begin of the next
 
 
@@ -49,6 +53,8 @@ class Played:
         number: Number among the phases of one cycle.
         times: Times of its rows on the clock of the program in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        kept_times: Times on the clock of the program for which the report certifies a distance in [s], shape (M,).
+        kept: What all pairs keep about each of them in [mm], shape (M,); what is not finite is not known.
     """
 
     name: str
@@ -57,6 +63,8 @@ class Played:
     number: int
     times: Array
     q: Array
+    kept_times: Array
+    kept: Array
 
 
 def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:
@@ -96,6 +104,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
         "tasks": tasks,
         "motion": motion_record(times, q, _phases(stored.record)),
         "nearest": nearest_record(stretches, times, q, sampled_rows(times, further)),
+        "certified": _certified(played),
         "contacts": contacts,
         "failures": failures,
         "excluded": excluded_records(_with_most_pairs(scenes)),
@@ -132,27 +141,21 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
     """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
     if "" in stored.records:
-        times, q = _series(stored, "", cell)
-        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, times=times, q=q)
+        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, **_series(stored, "", cell))
         return
     read = {name: _series(stored, name, cell) for name in stored.records}
     for phase in phases:
         if phase["name"] not in read:
             file = stored.file("", "report.json")
             raise InputError(f"{file}: phases: expected the runs {', '.join(read)}, got '{phase['name']}'")
-        begin, (times, q) = float(phase["begin_s"]), read[phase["name"]]
-        yield Played(
-            name=phase["name"],
-            place=phase["name"],
-            begin=begin,
-            number=labels.index(phase["name"]) if phase["name"] in labels else 0,
-            times=begin + times,
-            q=q,
-        )
+        begin, own = float(phase["begin_s"]), read[phase["name"]]
+        shifted = {key: begin + own[key] for key in ("times", "kept_times")}
+        number = labels.index(phase["name"]) if phase["name"] in labels else 0
+        yield Played(name=phase["name"], place=phase["name"], begin=begin, number=number, **(own | shifted))
 
 
-def _series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
-    """Times and stacked joint positions of one run, from its series."""
+def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
+    """Times and stacked joint positions of one run and what it keeps of distances, from its series."""
     tree, columns = stored.series(place), list[Array]()
     try:
         times = np.array(tree["times_s"], dtype=np.float64)
@@ -168,7 +171,8 @@ def _series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
     if not is_sound:
         file = stored.file(place, SERIES)
         raise InputError(f"{file}: joints: expected positions of all joints of the cell, got others; solve again")
-    return times, q
+    kept_times, kept = _kept_distances(tree.get("clearance", {}), stored.file(place, SERIES))
+    return {"times": times, "q": q, "kept_times": kept_times, "kept": kept}
 
 
 def _joined(played: Sequence[Played]) -> tuple[Array, Array, list[int]]:
@@ -198,6 +202,29 @@ def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceR
         if not places or any(place[key] != places[-1][key] for key in ("robot", "link", "pose")):
             places.append(place)
     return places
+
+
+def _certified(played: Sequence[Played]) -> ClearanceCurveRecord:
+    """The smallest distance of all classes over time, as the runs certify it."""
+    times, kept = np.concatenate([one.kept_times for one in played]), np.concatenate([one.kept for one in played])
+    return {
+        "times": np.round(times, TIME_DECIMALS).tolist(),
+        "distances": [plain(each) for each in np.round(kept, DISTANCE_DECIMALS).tolist()],
+    }
+
+
+def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
+    """Times in [s] and what all pairs keep in [mm], shape (M,) each; what is not finite is not known."""
+    try:
+        classes = [np.array(values, dtype=np.float64) for name, values in tree.items() if name != "times_s"]
+        times = np.array(tree["times_s"] if tree else [], dtype=np.float64)
+        kept = np.fmin.reduce([np.full(times.shape, np.inf), *classes])
+        is_sound = times.ndim == 1 and times.shape == kept.shape and bool(np.all(np.isfinite(times)))
+    except (AttributeError, KeyError, TypeError, ValueError):
+        is_sound = False
+    if not is_sound:
+        raise InputError(f"{file}: clearance: expected times and as many distances of each class, got something else")
+    return times, kept
 
 
 def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]) -> Iterator[ContactViewRecord]:
@@ -248,9 +275,9 @@ def _named(check: Record, record: Record, index: dict[str, int]) -> list[int]:
 def _joint(subject: str, cell: Cell) -> list[int]:
     """Numbers of the robot and the joint that a check is about."""
     robot, _, joint = subject.partition("/")
-    for number, each in enumerate(cell.robots):
+    for place, each in enumerate(cell.robots):
         if each.name == robot and joint in each.model.joint_names:
-            return [number, each.model.joint_names.index(joint)]
+            return [place, each.model.joint_names.index(joint)]
     return []
 
 

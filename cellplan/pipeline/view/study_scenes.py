@@ -144,7 +144,7 @@ def _moving(standing: SceneViewRecord, scene: Scene) -> SceneViewRecord:
     every = sampled_rows(times, (), DISTANCES)
     return {
         **standing,
-        "facts": [["shown at", f"{times[-1]:.4g} s"]],
+        "facts": [["shown at", f"{times[-1]:.4g} s"], ["motion", "planned for this page, not verified"]],
         "motion": motion_record(times, q, []),
         "nearest": nearest_record([Stretch(scene, 0, len(times))], times, q, every),
     }

@@ -1,15 +1,16 @@
 """Files of a comparison: ``study.json``, ``study.csv``, ``study.html`` and its plots."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from cellplan.model.report import CAUTION
 from cellplan.report.page.filters import fixed, floored, small
-from cellplan.report.page.render import inline_svg, template
+from cellplan.report.page.render import template
 from cellplan.report.page.study import STATUS_TEXTS
-from cellplan.report.plots.comparison import MAX_ROBOTS, comparison_sheets, drawn_robots
+from cellplan.report.plots.comparison import MAX_ROBOTS, comparison_figures, drawn_robots
 from cellplan.report.plots.palette import ROBOTS
 from cellplan.report.plots.rendering import pictures
+from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Record, as_json
 from cellplan.report.record.comparison import comparison_table, robot_names
 from cellplan.report.text.comparison import short_value
@@ -21,14 +22,17 @@ PLOT_TITLES: Final = {
 }
 
 
-def comparison_files(record: Record, curves: Sequence[Record | None]) -> dict[str, bytes]:
+def comparison_files(
+    record: Record, curves: Sequence[Record | None], formats: Collection[str] = ()
+) -> dict[str, bytes]:
     """Content of the files of a comparison by name.
 
     Args:
         record: As ``comparison_record`` returns it.
         curves: Curves of each variant; None for one without a motion.
+        formats: Formats of the plots beside SVG.
     """
-    plots = {f"study-{name}": data for name, data in pictures(comparison_sheets(record, curves)).items()}
+    plots = {f"study-{name}": data for name, data in pictures(comparison_figures(record, curves), formats).items()}
     drawings = {
         name.removeprefix("study-").removesuffix(".svg"): data.decode()
         for name, data in plots.items()
@@ -55,7 +59,7 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
         r=record,
         robots=robots,
         tasks=list(dict.fromkeys(name for each in record["variants"] for name in each["figures"].get("tasks", {}))),
-        plots={name: inline_svg(text, prefix=f"{name}-") for name, text in plots.items()},
+        plots={name: inline_svg(text) for name, text in plots.items()},
         titles=PLOT_TITLES,
         legend=list(zip(ROBOTS, solved, strict=False)) if plots else [],
         drawn=drawn_robots(record) if len(robots) > MAX_ROBOTS else [],

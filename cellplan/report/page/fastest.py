@@ -1,12 +1,13 @@
 """``fastest.html``: the shortest cycles of a cell and its production curve as one self-contained page."""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 from cellplan.model.report import CAUTION
-from cellplan.report.page.render import inline_svg, template
-from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_sheets, curves_of, single_programs
-from cellplan.report.plots.rendering import pictures
+from cellplan.report.page.figures import figure
+from cellplan.report.page.render import template
+from cellplan.report.plots.fastest import COLOURS, SHOWN, curve_figures, curves_of, single_programs
+from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.text.fastest import TITLES, binding_lines, saving_text
 
@@ -20,13 +21,9 @@ def fastest_page(record: Record) -> str:
     Args:
         record: As ``fastest_record`` returns it.
     """
-    sheets = curve_sheets(record)
-    drawn = pictures(sheets)
-    plots = [
-        {"title": SHOWN[name].title, "svg": inline_svg(drawn[f"{name}.svg"].decode(), prefix=f"c{place}-")}
-        for place, name in enumerate(sheets)
-    ]
-    legend = [*curves_of(record), *single_programs(record)] if sheets else []
+    drawn = curve_figures(record)
+    plots = [{"title": SHOWN[name].title, "svg": inline_svg(svg_text(figure))} for name, figure in drawn.items()]
+    legend = [*curves_of(record), *single_programs(record)] if drawn else []
     programs = _programs(record)
     return template("fastest.html").render(
         r=record,
@@ -52,18 +49,10 @@ def _programs(record: Record) -> dict[str, Record]:
 
 def _figures(programs: Mapping[str, Record]) -> Entries:
     """The cycle times at the top of the page."""
-    entries: list[dict[str, Any]] = []
+    entries: Entries = []
     for name, program in programs.items():
-        figures = program["figures"]
-        detail = f"{figures['parts_per_h']:.1f} parts per hour"
-        binding = binding_lines(program)
-        entries.append(
-            {
-                "label": name,
-                "value": f"{program['cycle_s']:g}",
-                "unit": "s",
-                "detail": f"{detail}; {binding[0]}" if len(binding) == 1 else detail,
-                "is_bad": program["status"] != "passed",
-            }
-        )
+        per_hour, binding = f"{program['figures']['parts_per_h']:.1f} parts per hour", binding_lines(program)
+        note = f"{per_hour}; {binding[0]}" if len(binding) == 1 else per_hour
+        is_bad = program["status"] != "passed"
+        entries.append(figure(name, f"{program['cycle_s']:g}", "s", note=note, is_bad=is_bad))
     return entries

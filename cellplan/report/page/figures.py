@@ -3,144 +3,192 @@
 from typing import Any, Final
 
 from cellplan.report.page.filters import fixed, floored, percent, small
+from cellplan.report.page.first_screen import clearance_shift
+from cellplan.report.page.times import Shifts
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.text.notes import accuracy_note, clock_note
 
 BETWEEN: Final = "_between_rows"  # part of the keys of errors there
 
-
-def _clock_text(record: Record) -> str:
-    """What determines the duration, unless the cell file states it."""
-    note = clock_note(record)
-    return f"; {note}" if note else ""
+Use = tuple[str, str, Record]  # robot, joint, and how it is used
 
 
 def key_figures(record: Record) -> Entries:
-    """The key figures of a run."""
-    cycle = {
-        "label": "Cycle time",
-        "value": fixed(record["cycle_time_s"], 2),
-        "unit": "s",
-        "detail": f"{record['samples']} samples, {small(1e3 * record['step_s'])} ms apart{_clock_text(record)}"
-        if "samples" in record
-        else f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another",
-    }
+    """The key figures of a run: its duration, its clearance, what is nearest to a limit, and its tool errors.
+
+    Each has a ``label``, a ``value`` and a ``unit``; ``where`` and ``at_s`` of the worst, ``shift`` from which that
+    instant counts on the page's clock, and a ``note``. The joint that is nearest to any limit ``is_nearest``.
+    """
+    shift = Shifts(record)
+    joints = [*_joint_figures(record, shift), *_acceleration_figures(record, shift)]
+    nearest = max(joints, key=lambda each: each["used"], default=None)
+    if nearest is not None:
+        nearest["is_nearest"] = True
     return [
-        cycle,
-        *_error_figures(record["tasks"]),
-        *_closure_figures(record["closure"]),
-        *_joint_figures(record["joints"]),
-        *_acceleration_figures(record["joints"]),
-        _clearance_figure(record),
+        _cycle_figure(record),
+        _clearance_figure(record, shift),
+        *joints,
+        *_closure_figures(record, shift),
+        *_error_figures(record, shift),
     ]
 
 
-def _error_figures(tasks: Record) -> Entries:
+def figure(label: str, value: str, unit: str, **further: Any) -> dict[str, Any]:
+    """A figure with what templates ask of each."""
+    absent = {"where": "", "at_s": None, "shift": 0.0, "note": "", "is_bad": False, "is_nearest": False}
+    return {"label": label, "value": value, "unit": unit, **absent, **further}
+
+
+def _cycle_figure(record: Record) -> dict[str, Any]:
+    """Cycle time, and what determines it unless the cell file states it."""
+    note = (
+        f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another"
+        if "runs" in record
+        else ""
+    )
+    if "samples" in record:
+        note = f"{record['samples']} samples, {small(1e3 * record['step_s'])} ms apart"
+    clock = clock_note(record)
+    return figure("Cycle time", fixed(record["cycle_time_s"], 2), "s", note=f"{note}; {clock}" if clock else note)
+
+
+def _error_figures(record: Record, shift: Shifts) -> Entries:
     """Largest position and orientation error of all tasks."""
-    return [_error_figure(tasks, "position", "mm"), _error_figure(tasks, "orientation", "deg")] if tasks else []
+    if not record["tasks"]:
+        return []
+    return [_error_figure(record, shift, name, unit) for name, unit in (("position", "mm"), ("orientation", "deg"))]
 
 
-def _error_figure(tasks: Record, name: str, unit: str) -> dict[str, Any]:
+def _error_figure(record: Record, shift: Shifts, name: str, unit: str) -> dict[str, Any]:
+    tasks = record["tasks"]
     found = [
-        (record[f"max_{name}_error{where}_{unit}"], where, task)
-        for task, record in tasks.items()
+        (entry[f"max_{name}_error{where}_{unit}"], where, task)
+        for task, entry in tasks.items()
         for where in ("", BETWEEN)
-        if f"max_{name}_error{where}_{unit}" in record
+        if f"max_{name}_error{where}_{unit}" in entry
     ]
     value, where, task = max(found, key=lambda one: one[0])
     worst, allowed = tasks[task], tasks[task]["tolerance"][f"between_rows_{unit}" if where else f"{name}_{unit}"]
-    return {
-        "label": f"Largest {name} error",
-        "value": small(value),
-        "unit": unit,
-        "detail": f"{task} ({worst['robot']}) at {fixed(worst[f'max_{name}_error{where}_at_s'], 3)} s"
-        f"{', between the rows' if where else ''}; allowed {small(allowed)} {unit}",
-        "is_bad": value > allowed,
-    }
+    at = worst[f"max_{name}_error{where}_at_s"]
+    return figure(
+        f"Largest {name} error",
+        small(value),
+        unit,
+        where=f"{task} ({worst['robot']})",
+        at_s=at,
+        shift=shift(f"{name}_error{where}", task, at),
+        note=f"{'between the rows; ' if where else ''}allowed {small(allowed)} {unit}",
+        is_bad=value > allowed,
+    )
 
 
-def _closure_figures(closures: Record) -> Entries:
+def _closure_figures(record: Record, shift: Shifts) -> Entries:
     """Largest deviation of a co-holder's tool from its grasp."""
+    closures = record["closure"]
     if not closures:
         return []
     robot = max(closures, key=lambda name: closures[name]["max_position_error_mm"])
     worst = closures[robot]
-    allowed = worst["allowed"]["position_mm"]
-    return [
-        {
-            "label": "Largest closure error",
-            "value": small(worst["max_position_error_mm"]),
-            "unit": "mm",
-            "detail": f"{robot} at {fixed(worst['at_s'], 3)} s; allowed {small(allowed)} mm",
-            "is_bad": worst["max_position_error_mm"] > allowed,
-        }
-    ]
+    value, allowed = worst["max_position_error_mm"], worst["allowed"]["position_mm"]
+    found = figure(
+        "Largest closure error",
+        small(value),
+        "mm",
+        where=robot,
+        at_s=worst["at_s"],
+        shift=shift("closure_position_error", robot, worst["at_s"]),
+        note=f"allowed {small(allowed)} mm",
+        is_bad=value > allowed,
+    )
+    return [found]
 
 
-def _joint_figures(joints: Record) -> Entries:
+def _joint_figures(record: Record, shift: Shifts) -> Entries:
     """Smallest margin, of revolute joints unless only prismatic ones exceed their limits, and highest speed."""
-    uses = [(robot, name, joint) for robot, named in joints.items() for name, joint in named.items()]
-    figures: Entries = []
+    uses = _uses(record)
     bounded = [use for use in uses if use[2]["margin"] is not None]
-    revolute = [use for use in bounded if use[2]["unit"] == "deg"]
+    moving = [use for use in uses if use[2]["velocity_ratio"] is not None]
+    figures: Entries = []
     if bounded:
         exceeded = [use for use in bounded if use[2]["margin"] < 0.0]
+        revolute = [use for use in bounded if use[2]["unit"] == "deg"]
         shown = [use for use in revolute if use in exceeded] or exceeded or revolute or bounded
-        robot, name, joint = min(shown, key=lambda use: use[2]["margin"])
-        figures.append(
-            {
-                "label": "Smallest joint margin",
-                "value": floored(joint["margin"]),
-                "unit": joint["unit"],
-                "detail": f"{robot} {name} at {fixed(joint['margin_at_s'], 3)} s; "
-                f"allowed {fixed(joint['lower'], 1)} to {fixed(joint['upper'], 1)} {joint['unit']}",
-                "is_bad": joint["margin"] < 0.0,
-            }
-        )
-    moving = [use for use in uses if use[2]["velocity_ratio"] is not None]
+        figures.append(_margin_figure(shift, min(shown, key=lambda use: use[2]["margin"])))
     if moving:
-        robot, name, joint = max(moving, key=lambda use: use[2]["velocity_ratio"])
-        figures.append(
-            {
-                "label": "Highest joint speed",
-                "value": percent(joint["velocity_ratio"]).removesuffix(" %"),
-                "unit": "% of limit",
-                "detail": f"{robot} {name} at {fixed(joint['peak_velocity_at_s'], 3)} s; "
-                f"{fixed(joint['peak_velocity'], 1)} of {fixed(joint['velocity_limit'], 1)} {joint['unit']}/s",
-                "is_bad": joint["velocity_ratio"] > 1.0,
-            }
-        )
+        figures.append(_speed_figure(shift, max(moving, key=lambda use: use[2]["velocity_ratio"])))
     return figures
 
 
-def _clearance_figure(record: Record) -> dict[str, Any]:
-    whole = record["clearance"]["whole"]
-    required = f"required {small(record['required_clearance_mm'])} mm"
-    figure = {"label": "Smallest clearance", "value": floored(whole["minimum_mm"]), "unit": "mm", "detail": required}
-    if whole["minimum_mm"] is not None:
-        where, rests_on = " and ".join(whole["pair"] or ()), accuracy_note(whole["pair"] or (), whole["accuracies_mm"])
-        figure["detail"] = f"{where} at {fixed(whole['at_s'], 3)} s; {required}{f'; {rests_on}' if rests_on else ''}"
-        figure["is_bad"] = whole["minimum_mm"] < record["required_clearance_mm"]
-        figure["value"] = figure["value"] if whole["exact"] else f"at least {figure['value']}"
-    return figure
+def _uses(record: Record) -> list[Use]:
+    return [(robot, name, joint) for robot, named in record["joints"].items() for name, joint in named.items()]
 
 
-def _acceleration_figures(joints: Record) -> Entries:
+def _margin_figure(shift: Shifts, use: Use) -> dict[str, Any]:
+    robot, name, joint = use
+    lower, upper = joint["lower"], joint["upper"]
+    half = 0.5 * (upper - lower) if None not in (lower, upper) else 0.0
+    return figure(
+        "Smallest joint margin",
+        floored(joint["margin"]),
+        joint["unit"],
+        where=f"{robot} {name}",
+        at_s=joint["margin_at_s"],
+        shift=shift("joint_position", f"{robot}/{name}", joint["margin_at_s"]),
+        note=f"allowed {fixed(lower, 1)} to {fixed(upper, 1)} {joint['unit']}",
+        is_bad=joint["margin"] < 0.0,
+        used=1.0 - joint["margin"] / half if half > 0.0 else 0.0,
+    )
+
+
+def _speed_figure(shift: Shifts, use: Use) -> dict[str, Any]:
+    robot, name, joint = use
+    return figure(
+        "Highest joint speed",
+        percent(joint["velocity_ratio"]).removesuffix(" %"),
+        "% of limit",
+        where=f"{robot} {name}",
+        at_s=joint["peak_velocity_at_s"],
+        shift=shift("joint_velocity", f"{robot}/{name}", joint["peak_velocity_at_s"]),
+        note=f"{fixed(joint['peak_velocity'], 1)} of {fixed(joint['velocity_limit'], 1)} {joint['unit']}/s",
+        is_bad=joint["velocity_ratio"] > 1.0,
+        used=joint["velocity_ratio"],
+    )
+
+
+def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
     """The joint with the largest fraction of its limit; nothing if no joint has one."""
-    uses = [(robot, name, joint) for robot, named in joints.items() for name, joint in named.items()]
-    limited = [use for use in uses if use[2].get("acceleration_ratio") is not None]
+    limited = [use for use in _uses(record) if use[2].get("acceleration_ratio") is not None]
     if not limited:
         return []
     robot, name, joint = max(limited, key=lambda use: use[2]["acceleration_ratio"])
     ratio, is_assumed = joint["acceleration_ratio"], joint["acceleration_limit_source"] == "assumed"
-    is_bad = ratio > 1.0
-    return [
-        {
-            "label": "Highest joint acceleration",
-            "value": f"{100.0 * ratio:.4g}" if is_bad else f"{100.0 * ratio:.0f}",
-            "unit": f"% of {'assumed' if is_assumed else 'stated'} limit",
-            "detail": f"{robot} {name} at {joint['peak_acceleration_at_s']:.3f} s; "
-            f"{joint['peak_acceleration']:.1f} of {joint['acceleration_limit']:.1f} {joint['unit']}/s²",
-            "is_bad": is_bad,
-        }
-    ]
+    found = figure(
+        "Highest joint acceleration",
+        f"{100.0 * ratio:.4g}" if ratio > 1.0 else f"{100.0 * ratio:.0f}",
+        f"% of {'assumed' if is_assumed else 'stated'} limit",
+        where=f"{robot} {name}",
+        at_s=joint["peak_acceleration_at_s"],
+        shift=shift("joint_acceleration", f"{robot}/{name}", joint["peak_acceleration_at_s"]),
+        note=f"{joint['peak_acceleration']:.1f} of {joint['acceleration_limit']:.1f} {joint['unit']}/s²",
+        is_bad=ratio > 1.0,
+        used=ratio,
+    )
+    return [found]
+
+
+def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
+    whole, required = record["clearance"]["whole"], f"required {small(record['required_clearance_mm'])} mm"
+    value = floored(whole["minimum_mm"])
+    if whole["minimum_mm"] is None:
+        return figure("Smallest clearance", value, "mm", note=required)
+    rests_on = accuracy_note(whole["pair"] or (), whole["accuracies_mm"])
+    return figure(
+        "Smallest clearance",
+        value if whole["exact"] else f"at least {value}",
+        "mm",
+        where=" and ".join(whole["pair"] or ()),
+        at_s=whole["at_s"],
+        shift=clearance_shift(record, shift),
+        note=f"{required}{f'; {rests_on}' if rests_on else ''}",
+        is_bad=whole["minimum_mm"] < record["required_clearance_mm"],
+    )

@@ -1,9 +1,9 @@
 """Files of a layout search: ``study.json`` and ``study.html``."""
 
 from cellplan.model.report import CAUTION
-from cellplan.report.page.render import inline_svg, template
-from cellplan.report.plots.layout import convergence_sheet, floor_plan, front_sheet
-from cellplan.report.plots.svg import svg_text
+from cellplan.report.page.render import template
+from cellplan.report.plots.layout import convergence_figure, floor_plan, front_figure
+from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Record, as_json
 from cellplan.report.text.layout import changed_variables, path_text, verdict_line
 
@@ -23,10 +23,8 @@ def layout_page(record: Record) -> str:
     Args:
         record: As ``layout_record`` returns it.
     """
-    sheets = {"plan": floor_plan(record), "front": front_sheet(record), "convergence": convergence_sheet(record)}
-    plots = {
-        name: inline_svg(svg_text(sheet), prefix=f"{name}-") for name, sheet in sheets.items() if sheet is not None
-    }
+    drawn = {"plan": floor_plan(record), "front": front_figure(record), "convergence": convergence_figure(record)}
+    plots = {name: inline_svg(svg_text(figure)) for name, figure in drawn.items() if figure is not None}
     return template("layout.html").render(
         r=record,
         plots=plots,

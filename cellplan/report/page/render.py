@@ -1,17 +1,24 @@
 """``report.html``: verdict and evidence of a run as one self-contained page."""
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import cache
-from typing import Any, Final
+from typing import Annotated, Final, TypedDict, Unpack
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check
+from cellplan.report.page.checks import check_groups, failure_groups
+from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
-from cellplan.report.plots.palette import ROBOTS, robot_colours
+from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
+from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links
+from cellplan.report.page.scripts import SCRIPTS, page_scripts
+from cellplan.report.page.time_line import task_times, time_line
+from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
+from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
+from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.method import method_lines
@@ -21,39 +28,6 @@ MODES: Final = {
     "simultaneous": "all robots move",
     "pairwise": "the positioner and one operator move at a time",
     "part_at_rest": "the positioner is at rest",
-}
-CHECKS: Final = {
-    "joint_position": "joint positions within their limits",
-    "joint_velocity": "joint velocities within their limits",
-    "joint_acceleration": "joint accelerations within their limits",
-    "joint_acceleration_assumed": "joint accelerations within assumed limits",
-    "joint_acceleration_between_phases": "joint accelerations where phases meet within their limits",
-    "joint_jerk": "joint jerk within its limits",
-    "part_acceleration": "acceleration of the part within its limit",
-    "tool_speed": "speed of the tools within its limit",
-    "process_feed": "demanded feeds within their tolerances",
-    "process_on_delay": "delays of processes at the start of their paths",
-    "process_off_delay": "delays of processes at the end of their paths",
-    "locked_joint": "failed joints at rest",
-    "position_error": "tool position on the part within tolerance",
-    "orientation_error": "tool orientation on the part within tolerance",
-    "position_error_between_rows": "tool position within tolerance between the rows",
-    "orientation_error_between_rows": "tool orientation within tolerance between the rows",
-    "closure_position_error_between_rows": "tools of co-holders on their grasps between the rows",
-    "closure_orientation_error_between_rows": "orientation of co-holders' tools between the rows",
-    "closure_position_error": "tools of co-holders on their grasps",
-    "closure_orientation_error": "orientation of co-holders' tools",
-    "tool_depth": "tool depth in the part within its limit",
-    "joint_drift": "joints return after each cycle",
-    "clearance": "required clearance kept",
-    "payload": "tool and part within the payload",
-    "payload_centre": "centre of mass of the load within its limits",
-    "payload_moment": "moments of the load on the wrist within their limits",
-    "payload_inertia": "inertia of the load on the wrist within its limits",
-    "collision": "no collision",
-    "grip_depth": "depth of holders in the part within the depth of their grip",
-    "mount_depth": "depth of tools in the arm within the depth of their mounting",
-    "standing_depth": "depth of mounted bodies in their supports within its limit",
 }
 CLASSES: Final = {
     "whole": "whole cell",
@@ -74,14 +48,25 @@ OUTCOMES: Final = {
     "unfinished": "has not converged within the allowed rounds",
 }
 VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
-VIEW_LINKS: Final = '<p class="view-links">'  # stands in pages that lead to it
+VIEW_LINKS: Final = '<a class="view-link"'  # stands in pages that lead to it
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
 NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 
 
+class Beside(TypedDict, total=False):
+    """What lies beside a page, and the pictures in it; what is left out is empty."""
+
+    view: Annotated[str, "where the 3-D page lies from there"]
+    still: Annotated[
+        str, "picture of `worst_instant(record)` as the text of an SVG element; `still.svg` lies beside it"
+    ]
+    floor_plan: Annotated[str, "floor plan, likewise; `floor_plan.svg`"]
+    files: Annotated[Collection[str], "names of the joint tables in the run folder, as `tables/kuka.csv`"]
+
+
 def report_page(
-    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], view: str = ""
+    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], **beside: Unpack[Beside]
 ) -> str:
     """The page of one run.
 
@@ -89,38 +74,63 @@ def report_page(
         record: Result of ``run_record``.
         checks: The checks of the run.
         cell: Its cell.
-        plots: SVG pictures by file name, as ``draw_plots`` returns them; others are ignored.
-        view: Where its 3-D page lies from there; empty without one.
+        plots: SVG pictures by file name, which lie in ``plots/`` beside the page; others are ignored.
+        **beside: What lies beside it, and its pictures.
     """
-    return _render(
-        "report.html",
-        record,
-        cell,
-        {
-            "figures": key_figures(record),
-            "left_out": left_out_notes(record),
-            "grips": grip_notes(record),
-            "check_groups": _check_groups(checks),
-            "shares": _shares(record),
-            "excluded": _by_reason(record["exclusions"]),
-            "open_surfaces": [line for _, line in open_surface_notes(record["open_surfaces"])],
-            "method": list(method_lines(record["solver"], record["step_s"])),
-            "plots": _inline_plots(plots),
-            "view": view,
-        },
-    )
+    drawings = [name for name in plots if name.endswith(".svg")]
+    parts = {
+        "check_groups": check_groups(checks),
+        "shares": _shares(record),
+        "excluded": _by_reason(record["exclusions"]),
+        "method": list(method_lines(record["solver"], record["step_s"])),
+        "plots": _inline_plots(plots),
+        "task_times": task_times(record, cell),
+        "links": _links(record, drawings, beside),
+    }
+    return _render("report.html", record, cell, parts | _shared_parts(record, cell, beside))
 
 
-def overview_page(record: Record, *, cell: Cell, view: str = "") -> str:
+def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> str:
     """The page of several runs, with a link to the page of each.
 
     Args:
         record: Result of ``summary_record``.
         cell: The cell.
-        view: Where the 3-D page lies from there; empty without one.
+        **beside: What lies beside it, and its pictures.
     """
-    parts = {"figures": key_figures(record), "left_out": left_out_notes(record), "grips": grip_notes(record)}
-    return _render("overview.html", record, cell, {**parts, "view": view})
+    parts = {"links": _links(record, (), beside)}
+    return _render("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
+
+
+def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Links]:
+    """Files that a page leads to."""
+    names = ["report.json"] if "runs" in record else ["report.json", "series.json"]
+    names += [name for name, text in ((STILL, beside.get("still")), (FLOOR_PLAN, beside.get("floor_plan"))) if text]
+    return file_links(beside.get("files", ()), plots, names, phase=record.get("phase"))
+
+
+def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, object]:
+    """What the pages of one run and of several have in common."""
+    shift = Shifts(record)
+    return {
+        "figures": key_figures(record),
+        "failures": failure_groups(record),
+        "speeds": process_speeds(record, cell),
+        "most_speeds": MAX_SPEEDS,
+        "not_judged": not_judged(record),
+        "left_out": left_out_notes(record),
+        "grips": grip_notes(record),
+        "open_surfaces": [line for _, line in open_surface_notes(record["open_surfaces"])],
+        "begins": phase_begins(record),
+        "worst": worst_instant(record),
+        "line": time_line(record, cell),
+        "shift": shift,
+        "whole_shift": clearance_shift(record, shift),
+        "at": TimeLinks(beside.get("view", ""), page_begin(record)),
+        "view": beside.get("view", ""),
+        "still": svg_element(beside.get("still", "")),
+        "floor_plan_svg": svg_element(beside.get("floor_plan", "")),
+    }
 
 
 def view_beside(place: str) -> str:
@@ -134,7 +144,7 @@ def has_view_links(page: str) -> bool:
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
-    """The page of a rehearsal; ``plots`` as ``draw_rehearsal`` returns them."""
+    """The page of a rehearsal; ``plots`` as ``pictures`` returns them."""
     parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
     return _render("rehearsal.html", record, cell, parts)
 
@@ -159,12 +169,13 @@ def template(name: str) -> Template:
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("cellplan.report.page", "templates"),
+        loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.bytecode_cache = CompiledTemplates(environment)
     environment.filters |= {
         "fixed": fixed,
         "small": small,
@@ -175,18 +186,9 @@ def _environment() -> Environment:
         "way_round": direction_text,
         "worst": worst,
     }
+    environment.globals["dark_rules"] = dark_rules
+    environment.globals["scripts"] = page_scripts(environment.get_template(name).render() for name in SCRIPTS)
     return environment
-
-
-def _check_groups(checks: Iterable[Check]) -> Entries:
-    """Number of checks of each kind and of those that passed, in their order."""
-    groups: dict[str, dict[str, Any]] = {}
-    for check in checks:
-        title = CHECKS.get(check.name, check.name.replace("_", " "))
-        group = groups.setdefault(check.name, {"title": title, "count": 0, "passed": 0})
-        group["count"] += 1
-        group["passed"] += check.passed
-    return list(groups.values())
 
 
 def _shares(record: Record) -> Entries:
@@ -214,15 +216,9 @@ def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
 def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
     """SVG pictures as page content, by file name without its suffix."""
     drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
-    return {name: inline_svg(data.decode(), prefix=f"p{i}-") for i, (name, data) in enumerate(drawings.items())}
+    return {name: inline_svg(data.decode()) for name, data in drawings.items()}
 
 
-def inline_svg(text: str, *, prefix: str) -> str:
-    """The picture without its file header and with unique ids, so that a page can hold several."""
-    body = text[text.index("<svg") :]
-    body = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", body, flags=re.DOTALL)
-    head, rest = body.split(">", 1)
-    head = re.sub(r'\s(?:width|height)="[^"]*"', "", head) + ' aria-hidden="true" focusable="false"'
-    rest = re.sub(r'\bid="', f'id="{prefix}', rest)
-    rest = re.sub(r'(url\(|href=")#', rf"\g<1>#{prefix}", rest)
-    return f"{head}>{rest}"
+def svg_element(text: str) -> str:
+    """An SVG element without what a file may have before it."""
+    return text[text.index("<svg") :] if text else ""

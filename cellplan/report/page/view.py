@@ -64,8 +64,15 @@ def _about(record: ViewRecord) -> Iterator[str]:
         step = f"{MM * nearest['step']:.3g} ms"
         yield (
             f"Joints move linearly between rows. The closest pair is computed every {step} or more often; in between "
-            "its line joins the same two points. What is certified between the rows is in the report."
+            "its line joins the same two points."
         )
+    if scene["certified"]["times"]:
+        yield (
+            "The curve over the time line is the distance that the report certifies: each value is kept all through "
+            "its block of the motion, between the rows as well."
+        )
+    elif motion["count"] > 1:
+        yield "Nothing is certified here; the curve over the time line is that of the computed distances."
     yield "The closest pair is one of those that are to keep a clearance and move against each other."
     if any(each for one in record["scenes"] for each in one["nearest"]["lower_bound"]):
         yield "A distance after ≥ is that of convex hulls, never above the true one."

@@ -1,31 +1,33 @@
-"""Rendering of sheets as SVG and PNG in one style; the bytes depend on the sheets alone.
+"""Rendering of figures as PNG and PDF in one style; the bytes depend on the figures alone.
 
-The drawing primitives are rendered directly: the axes of the plotting library would take three times as long for the
-same picture.
+The layout is the one of the SVG files: the axes of the plotting library would take longer for another picture.
 """
 
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+
+from cellplan.report.plots.figure import Box, Curve, Figure, Limit, Mark
 from cellplan.report.plots.no_backend import no_backend
-from cellplan.report.plots.palette import INK
-from cellplan.report.plots.sheet import Line, Mark, Rectangle, Sheet
+from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, INK, LIMIT
+from cellplan.report.plots.placing import INCH, SWATCH, TICK, Placed, PlacedPanel, Words, placed
 
 with no_backend():
     import matplotlib as mpl
     from matplotlib import patches
     from matplotlib.artist import Artist
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Canvas
     from matplotlib.lines import Line2D
     from matplotlib.text import Text
+    from matplotlib.transforms import Affine2D
 
 DPI = 110  # [1/inch] of the PNG files
 
 _STYLE: Any = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "cellplan",
+    "pdf.fonttype": 42,
     "text.parse_math": False,  # names may hold a dollar sign
     "text.hinting": "none",
     "font.family": "sans-serif",
@@ -36,11 +38,11 @@ _STYLE: Any = {
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
-_METADATA: dict[str, dict[str, None]] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
 _OPTIONS: dict[str, dict[str, Any]] = {
-    "svg": {},
-    "png": {"dpi": DPI, "pil_kwargs": {"compress_level": 1}},
-}  # quick; files a twelfth larger
+    "png": {"dpi": DPI, "metadata": {"Software": None}, "pil_kwargs": {"compress_level": 1}},  # quick; a twelfth larger
+    "pdf": {"metadata": {"Creator": None, "Producer": None, "CreationDate": None}},
+}
+_ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 
 
 @contextmanager
@@ -52,33 +54,88 @@ def style() -> Iterator[None]:
         yield
 
 
-def paint(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
-    """Every sheet as SVG and PNG, by file name, without date and program name."""
-    files: dict[str, bytes] = {}
+def paint(figure: Figure, kind: str) -> bytes:
+    """A figure as PNG or PDF, without date and program name.
+
+    Args:
+        figure: The figure.
+        kind: Name of the format.
+    """
+    found, buffer = placed(figure), io.BytesIO()
     with style():
-        for name, sheet in sheets.items():
-            figure = _figure(sheet)
-            for kind, options in _OPTIONS.items():
-                buffer = io.BytesIO()
-                figure.savefig(buffer, format=kind, metadata=_METADATA[kind], **options)
-                files[f"{name}.{kind}"] = buffer.getvalue()
-    return files
+        canvas = Canvas(figsize=(found.width / INCH, found.height / INCH))
+        in_points = Affine2D().scale(1.0, -1.0).translate(0.0, found.height).scale(1.0 / INCH)
+        for artist in _artists(found):
+            artist.set_transform(in_points + canvas.dpi_scale_trans)
+            canvas.add_artist(artist)
+        canvas.savefig(buffer, format=kind, **_OPTIONS[kind])
+    return buffer.getvalue()
 
 
-def _figure(sheet: Sheet) -> Figure:
-    """A sheet as a figure of the plotting library."""
-    figure = Figure(figsize=(sheet.width, sheet.height))
-    for mark in sheet.marks:
-        artist = _artist(mark)
-        artist.set_transform(figure.dpi_scale_trans)
-        figure.add_artist(artist)
-    return figure
+def _artists(found: Placed) -> Iterator[Artist]:
+    """Everything in a figure."""
+    for x, y, colour in found.swatches:
+        yield patches.Rectangle((x, y), *SWATCH, color=colour, linewidth=0)
+    for box in found.panels:
+        yield from _panel(box, is_plane=found.figure.is_plane)
+        for each in box.words:
+            yield _text(each._replace(x=each.x + box.left, y=each.y + box.top))
+    yield from map(_text, found.words)
 
 
-def _artist(mark: Mark) -> Artist:
-    """A drawing primitive as an artist of the plotting library."""
-    if isinstance(mark, Line):
-        return Line2D(mark.x, mark.y, **mark.style)
-    if isinstance(mark, Rectangle):
-        return patches.Rectangle(mark.corner, mark.width, mark.height, **mark.style)
-    return Text(mark.x, mark.y, mark.text, **mark.style)
+def _panel(box: PlacedPanel, *, is_plane: bool) -> Iterator[Artist]:
+    """Ranges, grid, items and frame of a panel."""
+    for item in box.panel.items:
+        if isinstance(item, Limit) and item.is_shaded and not item.is_vertical:
+            at = float(np.clip(box.down(item.value), 0.0, box.height))
+            top, bottom = (0.0, at) if item.is_upper else (at, box.height)
+            corner = (box.left, box.top + top)
+            yield patches.Rectangle(corner, box.width, bottom - top, color=FORBIDDEN, linewidth=0, zorder=0.5)
+    for value in () if is_plane else box.x_ticks:
+        yield _line(box, np.full(2, box.across(value)), np.array([0.0, box.height]), color=GRID, zorder=1.0)
+    for value in () if is_plane else box.y_ticks:
+        yield _line(box, np.array([0.0, box.width]), np.full(2, box.down(value)), color=GRID, zorder=1.0)
+    for place, item in enumerate(box.panel.items):
+        yield from _item(box, item, 2.0 + 1e-3 * place)
+    colour = GREY if is_plane else FRAME
+    corners = [(0.0, 0.0), (0.0, box.height), (box.width, box.height)]
+    corners += [(box.width, 0.0), (0.0, 0.0)] if is_plane else []
+    yield _line(box, *np.array(corners).T, color=colour, zorder=4.0)
+    for value in box.x_ticks if is_plane else ():
+        yield _line(box, np.full(2, box.across(value)), box.height + np.array([0.0, TICK]), color=colour)
+    for value in box.y_ticks if is_plane else ():
+        yield _line(box, np.array([-TICK, 0.0]), np.full(2, box.down(value)), color=colour)
+
+
+def _line(box: PlacedPanel, x: Any, y: Any, **pen: Any) -> Line2D:
+    """A line in a panel."""
+    return Line2D(box.left + np.asarray(x), box.top + np.asarray(y), **{"linewidth": 0.8, **pen})
+
+
+def _item(box: PlacedPanel, item: object, order: float) -> Iterator[Artist]:
+    """One item of a panel but for its words."""
+    if isinstance(item, Curve):
+        dashes = {"linestyle": (0, (4 / item.width, 3 / item.width))} if item.is_dashed else {}
+        x, y = box.across(np.asarray(item.x)), box.down(np.asarray(item.y))
+        yield _line(box, x, y, color=item.colour, linewidth=item.width, zorder=order, **dashes)
+    elif isinstance(item, Mark):
+        pen = {"marker": "*" if item.is_star else "o", "markersize": item.size, "linestyle": "none"}
+        pen |= {"color": item.colour, "markeredgecolor": item.edge or item.colour, "markeredgewidth": 0.6}
+        yield _line(box, [box.across(item.x)], [box.down(item.y)], zorder=order, **pen)
+    elif isinstance(item, Box):
+        (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
+        corner, size = (box.left + left, box.top + top), (right - left, bottom - top)
+        fill: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "linewidth": 0, "antialiased": False}
+        yield patches.Rectangle(corner, *size, zorder=order, **fill)
+    elif isinstance(item, Limit):
+        at = np.full(2, box.across(item.value) if item.is_vertical else box.down(item.value))
+        along = np.array([0.0, box.height if item.is_vertical else box.width])
+        ends = (at, along) if item.is_vertical else (along, at)
+        yield _line(box, *ends, color=LIMIT, linewidth=1.0, zorder=order)
+
+
+def _text(each: Words) -> Text:
+    """A line of text."""
+    weight = "bold" if each.is_bold else "normal"
+    anchor = _ANCHORS[each.anchor]
+    return Text(each.x, each.y, each.text, size=each.size, color=each.colour, weight=weight, ha=anchor, zorder=5.0)

@@ -5,18 +5,30 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.report.plots.palette import ROBOTS
-from cellplan.report.plots.sheet import Panel, Sheet
+from cellplan.report.plots.figure import (
+    Axis,
+    Box,
+    Curve,
+    Figure,
+    Item,
+    Limit,
+    Note,
+    Panel,
+    time_axis,
+    value_axis,
+)
+from cellplan.report.plots.palette import PAPER, ROBOTS
 from cellplan.report.record.common import Record
 from cellplan.report.record.comparison import robot_names
 
 MAX_ROBOTS: Final = 8  # drawn: those whose joints are fastest
 TOP: Final = 150.0  # [%] of a limit: what is above is cut off and its value written
+PERCENT: Final = 100.0
 BARS: Final = 0.8  # [-] of the place of a joint that its bars take
 
 
-def comparison_sheets(record: Record, curves: Sequence[Record | None]) -> dict[str, Sheet]:
-    """The sheets of a comparison by name; none where nothing was solved.
+def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[str, Figure]:
+    """The figures of a comparison by name; none where nothing was solved.
 
     Args:
         record: As ``comparison_record`` returns it.
@@ -27,10 +39,10 @@ def comparison_sheets(record: Record, curves: Sequence[Record | None]) -> dict[s
     robots = drawn_robots(record)
     if not solved or not robots:
         return {}
-    sheets = {"joints": _joints(solved, robots), "speeds": _speeds(solved, robots)}
-    if any(figures["curves"]["clearance_mm"] for figures in solved.values()):
-        sheets["clearance"] = _clearance(solved)
-    return sheets
+    figures = {"joints": _joints(solved, robots), "speeds": _speeds(solved, robots)}
+    if any(each["curves"]["clearance_mm"] for each in solved.values()):
+        figures["clearance"] = _clearance(solved)
+    return figures
 
 
 def drawn_robots(record: Record) -> list[str]:
@@ -46,67 +58,65 @@ def _peak(record: Record, robot: str) -> float:
     return max((joint["velocity_ratio"] or 0.0 for use in uses if use for joint in use["joints"].values()), default=0.0)
 
 
-def _joints(solved: Mapping[str, Any], robots: Sequence[str]) -> Sheet:
+def _joints(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     """Bars of every joint: range used and highest speed."""
     uses = {robot: {colour: each["robots"].get(robot) for colour, each in solved.items()} for robot in robots}
     count = max(len(use["joints"]) for found in uses.values() for use in found.values() if use)
-    across = np.array([0.4, count + 0.6])
-    title = "use of the joints"
-    sheet = Sheet(title, rows=len(robots), columns=2, times=across, across="joint, counted from the base")
-    for row, (robot, found) in enumerate(uses.items()):
-        for column, (key, text) in enumerate(
-            (
-                ("range_ratio", "range used, in % of the limit"),
-                ("velocity_ratio", "highest velocity, in % of its limit"),
-            )
-        ):
-            own = {
-                colour: [100.0 * (joint[key] or 0.0) for joint in use["joints"].values()] if use else []
-                for colour, use in found.items()
-            }
-            top = min(TOP, max(105.0, *(max(values, default=0.0) for values in own.values())))
-            panel = sheet.panel(2 * row + column, f"{robot}: {text}", span=(0.0, top), is_floored=True)
-            sheet.limit(panel, 100.0)
-            _bars(sheet, panel, own, top)
-    return sheet
+    panels = [
+        _bars(f"{robot}: {text}", {colour: _percent(use, key) for colour, use in found.items()})
+        for robot, found in uses.items()
+        for key, text in (
+            ("range_ratio", "range used, in % of the limit"),
+            ("velocity_ratio", "highest velocity, in % of its limit"),
+        )
+    ]
+    x = Axis(low=0.4, high=count + 0.6, label="joint, counted from the base")
+    return Figure(title="use of the joints", x=x, panels=panels, columns=2)
 
 
-def _bars(sheet: Sheet, panel: Panel, values: Mapping[str, Sequence[float]], top: float) -> None:
+def _percent(use: Record | None, key: str) -> list[float]:
+    """A ratio of each joint, in [%]."""
+    return [PERCENT * (joint[key] or 0.0) for joint in use["joints"].values()] if use else []
+
+
+def _bars(title: str, values: Mapping[str, Sequence[float]]) -> Panel:
     """Bars side by side at each joint; the value of one that is cut off stands on it."""
-    width = BARS / len(values)
+    top = min(TOP, max(105.0, *(max(own, default=0.0) for own in values.values())))
+    axis, width = value_axis(0.0, top, unit="%", is_floored=True), BARS / len(values)
+    items: list[Item] = [Limit(PERCENT)]
     for place, (colour, own) in enumerate(values.items()):
         for joint, value in enumerate(own, start=1):
             left = joint - 0.5 * BARS + place * width
-            sheet.bar(panel, (left, left + width), min(value, top), colour=colour)
+            items.append(Box((left, left + width), (0.0, min(value, top)), colour))
             if value > top:
-                at = float(panel.x(np.array([left + 0.5 * width]))[0])
-                high = panel.bottom + panel.height
-                sheet.write(at, high - 0.04, f"{value:.0f}", size=6, color="white", ha="center", va="top")
+                items.append(Note(left + 0.5 * width, top, f"{value:.0f}", PAPER, size=6.0, moved=(0.0, -6.0)))
+    return Panel(title=title, y=axis, items=items)
 
 
-def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Sheet:
+def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     """Highest joint speed of every robot over time."""
     end = max(each["cycle_time_s"] for each in solved.values())
     title = "highest joint velocity of each robot over time, in % of the limit"
-    sheet = Sheet(title, rows=(len(robots) + 1) // 2, columns=2, times=np.array([0.0, end]))
-    for place, robot in enumerate(robots):
-        curves = {
-            colour: (np.array(each["curves"]["times_s"]), 100.0 * np.array(each["curves"]["velocity_ratio"][robot]))
-            for colour, each in solved.items()
-            if robot in each["curves"]["velocity_ratio"]
-        }
-        highest = max(float(values.max()) for _, values in curves.values())
-        top = min(TOP, highest)
-        note = f"up to {highest:.0f} %" if highest > TOP else ""
-        panel = sheet.panel(place, robot, note=note, span=(0.0, top), is_floored=True)
-        if top > 100.0:
-            sheet.limit(panel, 100.0)
-        for colour, (times, values) in curves.items():
-            sheet.curve(panel, times, np.minimum(values, top), colour=colour)
-    return sheet
+    panels = [_speed_panel(solved, robot) for robot in robots]
+    return Figure(title=title, x=time_axis(np.array([0.0, end])), panels=panels, columns=2)
 
 
-def _clearance(solved: Mapping[str, Any]) -> Sheet:
+def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
+    """Highest joint speed of one robot in every variant."""
+    curves = {
+        colour: (each["curves"]["times_s"], PERCENT * np.array(each["curves"]["velocity_ratio"][robot]))
+        for colour, each in solved.items()
+        if robot in each["curves"]["velocity_ratio"]
+    }
+    highest = max(float(values.max()) for _, values in curves.values())
+    top = min(TOP, highest)
+    items: list[Item] = [Limit(PERCENT)] if top > PERCENT else []
+    items += [Curve("", np.array(times), np.minimum(values, top), pen) for pen, (times, values) in curves.items()]
+    note = f"up to {highest:.0f} %" if highest > TOP else ""
+    return Panel(title=robot, note=note, y=value_axis(0.0, top, unit="%", is_floored=True), items=items)
+
+
+def _clearance(solved: Mapping[str, Any]) -> Figure:
     """Smallest distance of all bodies over time."""
     curves = {
         colour: (np.array(each["curves"]["clearance_times_s"]), np.array(each["curves"]["clearance_mm"]))
@@ -114,13 +124,13 @@ def _clearance(solved: Mapping[str, Any]) -> Sheet:
         if each["curves"]["clearance_mm"]
     }
     end = max(each["cycle_time_s"] for each in solved.values())
-    required = max(each["required_clearance_mm"] for each in solved.values())
-    title = "smallest distance of all bodies over time, certified between the rows"
-    sheet = Sheet(title, rows=1, columns=1, times=np.array([0.0, end]))
+    required = {each["required_clearance_mm"] for each in solved.values()}
     highest = max(float(values.max()) for _, values in curves.values())
-    panel = sheet.panel(0, "distance, in mm", span=(0.0, max(highest, required)), is_floored=True)
-    if len({each["required_clearance_mm"] for each in solved.values()}) == 1:
-        sheet.limit(panel, required, label=f"required: {required:g} mm", is_upper=False)
-    for colour, (times, values) in curves.items():
-        sheet.curve(panel, times, values, colour=colour)
-    return sheet
+    items: list[Item] = []
+    if len(required) == 1:
+        items.append(Limit(max(required), f"required: {max(required):g} mm", is_upper=False))
+    items += [Curve("", times, values, colour) for colour, (times, values) in curves.items()]
+    axis = value_axis(0.0, max(highest, *required), unit="mm", is_floored=True)
+    title = "smallest distance of all bodies over time, certified between the rows"
+    panel = Panel(title="distance, in mm", y=axis, items=items)
+    return Figure(title=title, x=time_axis(np.array([0.0, end])), panels=[panel])

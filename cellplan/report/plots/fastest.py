@@ -5,8 +5,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from cellplan.report.plots.palette import GREY, INK, LIMIT, ROBOTS
-from cellplan.report.plots.sheet import Panel, Sheet
+from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Limit, Mark, Panel, value_axis
+from cellplan.report.plots.palette import INK, ROBOTS
 from cellplan.report.record.common import Record
 
 NARROW: Final = 4.6  # [inch] of a picture: readable on a telephone too
@@ -39,8 +39,8 @@ SHOWN: Final[Mapping[str, Shown]] = {
 }
 
 
-def curve_sheets(record: Record) -> dict[str, Sheet]:
-    """A sheet for each figure; none where there is no calmer cycle.
+def curve_figures(record: Record) -> dict[str, Figure]:
+    """A figure for each quantity; none where there is no calmer cycle.
 
     Args:
         record: As ``fastest_record`` returns it.
@@ -52,18 +52,12 @@ def curve_sheets(record: Record) -> dict[str, Sheet]:
     cycles = [point["cycle_time_s"] for points in curves.values() for point in points]
     if "demand" in singles:
         cycles.append(singles["demand"]["cycle_time_s"])
-    span = np.array([min(cycles), max(cycles)])
-    seen = {name: one for name, one in singles.items() if span[0] <= one["cycle_time_s"] <= span[1]}
-    every = [*(point for points in curves.values() for point in points), *seen.values()]
-    sheets = {}
-    for name, shown in SHOWN.items():
-        values = [shown.scale * point[name] for point in every if point[name] is not None]
-        if values:
-            sheet = Sheet(shown.title, rows=1, columns=1, times=span, across="cycle time in s", width=NARROW)
-            panel = sheet.panel(0, "", span=(min(0.0, *values), max(*values, shown.limit or 0.0)), is_floored=True)
-            _draw(sheet, panel, name, curves, seen)
-            sheets[name] = sheet
-    return sheets
+    x = Axis(low=min(cycles), high=max(cycles), label="cycle time in s", unit="s")
+    seen = {name: one for name, one in singles.items() if x.low <= one["cycle_time_s"] <= x.high}
+    panels = {name: _panel(name, curves, seen) for name in SHOWN}
+    return {
+        name: Figure(title="", x=x, panels=[panel], width=NARROW) for name, panel in panels.items() if panel is not None
+    }
 
 
 def curves_of(record: Record) -> dict[str, list[Record]]:
@@ -86,23 +80,21 @@ def single_programs(record: Record) -> dict[str, Record]:
     return found
 
 
-def _draw(
-    sheet: Sheet, panel: Panel, name: str, curves: Mapping[str, list[Record]], singles: Mapping[str, Record]
-) -> None:
-    """Limit, curves and single programs of one figure."""
+def _panel(name: str, curves: Mapping[str, list[Record]], singles: Mapping[str, Record]) -> Panel | None:
+    """Limit, curves and single programs of one quantity; None where no program has it."""
     shown = SHOWN[name]
+    items: list[Item] = []
     if shown.limit is not None:
-        across = np.array([panel.first, panel.last])
-        sheet.curve(panel, across, np.full(2, shown.limit), colour=LIMIT, width=0.9)
-        at = float(panel.y(np.array([shown.limit]))[0])
-        sheet.write(panel.left + panel.width, at - 0.04, shown.limit_name, size=7, color=GREY, ha="right", va="top")
-    for law, points in curves.items():
+        items.append(Limit(shown.limit, shown.limit_name, is_shaded=False))
+    values = []
+    for law, points in [*curves.items(), *((law, [point]) for law, point in singles.items())]:
         found = [(point["cycle_time_s"], shown.scale * point[name]) for point in points if point[name] is not None]
-        if found:
-            at_s, values = np.array(found).T
-            sheet.curve(panel, at_s, values, colour=COLOURS[law])
-        for at_one, value in found:
-            sheet.dot(panel, at_one, value, colour=COLOURS[law])
-    for law, point in singles.items():
-        if point[name] is not None:
-            sheet.dot(panel, point["cycle_time_s"], shown.scale * point[name], colour=COLOURS[law])
+        if law in curves and found:
+            at_s, heights = np.array(found).T
+            items.append(Curve(law, at_s, heights, COLOURS[law]))
+        items += [Mark(at_one, value, COLOURS[law]) for at_one, value in found]
+        values += [value for _, value in found]
+    if not values:
+        return None
+    axis = value_axis(min(0.0, *values), max(*values, shown.limit or 0.0), is_floored=True)
+    return Panel(title=shown.title, y=axis, items=items)

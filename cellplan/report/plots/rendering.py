@@ -1,21 +1,51 @@
-"""Rendering of sheets: imports the plotting library only when something is drawn."""
+"""Figures as files: SVG written here, PNG and PDF by the plotting library where they are requested."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from importlib.util import find_spec
+from typing import Final
 
-import numpy as np
+from cellplan.errors import InputError
+from cellplan.report.plots.figure import Figure
+from cellplan.report.plots.svg import svg_text
 
-from cellplan.report.plots.sheet import Sheet
-
-
-def pictures(sheets: Mapping[str, Sheet]) -> dict[str, bytes]:
-    """Every sheet as SVG and PNG, by file name."""
-    from cellplan.report.plots.canvas import paint
-
-    return paint(sheets)
+FORMATS: Final = ("png", "pdf")  # that may be requested beside SVG
+NOTHING: Final[Mapping[str, str]] = {}
 
 
-def warm_up() -> None:
-    """Import the plotting library and fill its font cache."""
-    sheet = Sheet("", rows=1, columns=1, times=np.array([0.0, 1.0]))
-    sheet.panel(0, "0", span=(0.0, 1.0))
-    pictures({"": sheet})
+def pictures(
+    figures: Mapping[str, Figure], formats: Collection[str] = (), *, drawn: Mapping[str, str] = NOTHING
+) -> dict[str, bytes]:
+    """Every figure as SVG and in the requested formats, by file name.
+
+    Args:
+        figures: Figures by name.
+        formats: Further formats, of ``FORMATS``.
+        drawn: What ``svg_text`` gave of some of them before, by name.
+
+    Raises:
+        InputError: A format is unknown, or needs the plotting library, which is not installed.
+    """
+    require_formats(formats)
+    files = {f"{name}.svg": (drawn.get(name) or svg_text(figure)).encode() for name, figure in figures.items()}
+    if formats:
+        from cellplan.report.plots.canvas import paint
+
+        kinds = sorted({*formats})
+        files |= {f"{name}.{kind}": paint(figure, kind) for name, figure in figures.items() for kind in kinds}
+    return files
+
+
+def require_formats(formats: Collection[str]) -> None:
+    """Refuse formats that cannot be written here.
+
+    Raises:
+        InputError: A format is unknown, or needs the plotting library, which is not installed.
+    """
+    for name in formats:
+        if name not in FORMATS:
+            raise InputError(f"plots: expected one of {', '.join(FORMATS)}, got '{name}' (SVG is always written)")
+    if formats and find_spec("matplotlib") is None:
+        raise InputError(
+            f"plots as {' and '.join(sorted({*formats})).upper()}: matplotlib is not installed; "
+            "run 'pip install \"cellplan[plots]\"', or use the SVG files, which need no library"
+        )

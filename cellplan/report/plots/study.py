@@ -1,13 +1,13 @@
 """Plots of a study: key figures over the first varied number, one curve for each combination of the other values."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import numpy as np
 
+from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Limit, Mark, Panel, value_axis
 from cellplan.report.plots.palette import LIMIT, ROBOTS
-from cellplan.report.plots.sheet import Panel, Sheet
 from cellplan.report.record.common import Entries, Record
 
 SHOWN: Final[Mapping[str, tuple[str, float, float | None]]] = {
@@ -19,45 +19,43 @@ SHOWN: Final[Mapping[str, tuple[str, float, float | None]]] = {
 MAX_CURVES: Final = len(ROBOTS)
 
 
-def study_sheets(record: Record) -> dict[str, Sheet]:
-    """The sheet of a study; none where no number is varied or nothing was solved.
+def study_figures(record: Record) -> dict[str, Figure]:
+    """The figure of a study; none where no number is varied or nothing was solved.
 
     Args:
         record: As ``study_record`` returns it.
     """
     address = varied_number(record)
     curves = dict(_curves(record, address)) if address else {}
-    x = np.array([trial["values"][address] for trials in curves.values() for trial in trials], dtype=float)
-    if not len(x) or len(curves) > MAX_CURVES or np.ptp(x) == 0.0:
+    x = [float(trial["values"][address]) for trials in curves.values() for trial in trials]
+    if address is None or not x or len(curves) > MAX_CURVES or min(x) == max(x):
         return {}
     solved = [trial["figures"] for trials in curves.values() for trial in trials]
     shown = [name for name in SHOWN if any(figures[name] is not None for figures in solved)]
-    title = f"{record['cell']}: key figures over {address}; failed variants in red"
-    span = np.array([x.min(), x.max()])
-    sheet = Sheet(title, rows=(len(shown) + 1) // 2, columns=2, times=span, across=str(address))
-    for place, name in enumerate(shown):
-        label, scale, limit = SHOWN[name]
-        found = [scale * figures[name] for figures in solved if figures[name] is not None]
-        panel = sheet.panel(place, label, span=(min(found), max(*found, limit or max(found))))
-        if limit is not None and min(found) < limit:
-            sheet.limit(panel, limit)
-        for colour, trials in zip(ROBOTS, curves.values(), strict=False):
-            points = [
-                (float(trial["values"][address]), scale * trial["figures"][name], trial["status"] == "passed")
-                for trial in trials
-                if trial["figures"][name] is not None
-            ]
-            _draw_curve(sheet, panel, points, colour)
-    return {"study": sheet}
+    figure = Figure(
+        title=f"{record['cell']}: key figures over {address}; failed variants in red",
+        x=Axis(low=min(x), high=max(x), label=address),
+        panels=[_panel(name, curves, address) for name in shown],
+        columns=2,
+    )
+    return {"study": figure}
 
 
-def _draw_curve(sheet: Sheet, panel: Panel, points: Sequence[tuple[float, float, bool]], colour: str) -> None:
-    """One curve: a dot for each variant, red if it failed."""
-    if points:
-        at, values, _ = zip(*points, strict=True)
-        sheet.curve(panel, np.array(at), np.array(values), colour=colour)
-    for one_at, value, passed in points:
-        sheet.dot(panel, one_at, value, colour=colour if passed else LIMIT)
+def _panel(name: str, curves: Mapping[str, Entries], address: str) -> Panel:
+    """One key figure: a curve for each combination of the other values, a dot for each variant, red if it failed."""
+    label, scale, limit = SHOWN[name]
+    known = {
+        others: [each for each in trials if each["figures"][name] is not None] for others, trials in curves.items()
+    }
+    found = [scale * trial["figures"][name] for trials in known.values() for trial in trials]
+    items: list[Item] = [Limit(limit)] if limit is not None and min(found) < limit else []
+    for colour, (others, trials) in zip(ROBOTS, known.items(), strict=False):
+        at = [float(trial["values"][address]) for trial in trials]
+        values = [scale * trial["figures"][name] for trial in trials]
+        items.append(Curve(others, np.array(at), np.array(values), colour))
+        pens = [colour if trial["status"] == "passed" else LIMIT for trial in trials]
+        items += [Mark(*point) for point in zip(at, values, pens, strict=True)]
+    return Panel(title=label, y=value_axis(min(found), max(*found, limit or max(found))), items=items)
 
 
 def varied_number(record: Record) -> str | None:

@@ -1,98 +1,206 @@
-"""Sheets as SVG text, without the plotting library: for pages that are to be there at once."""
+"""Figures as SVG text, written directly; the curves can be read back from it.
 
-import math
-from collections.abc import Iterator, Mapping
+Lengths are in points. The curves of a panel lie in an inner ``svg`` whose coordinates are hundredths of points from the
+upper left corner of its box; ``data-x`` and ``data-y`` of the panel give the values at the edges of that box.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
 from html import escape
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array
-from cellplan.report.plots.palette import INK
-from cellplan.report.plots.sheet import Line, Mark, Rectangle, Sheet
+from cellplan.geometry.arrays import Array
+from cellplan.report.plots.figure import Box, Curve, Figure, Limit, Mark
+from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, LIMIT, PAPER, dark_rules
+from cellplan.report.plots.placing import SWATCH, TICK, Placed, PlacedPanel, Words, gaps, placed
+from cellplan.report.plots.thinning import peaks_kept, straightened
 
-POINTS: Final = 72.0  # [1/inch]
-SIZE: Final = 8.0  # [point] of text
-ORDER: Final = {Line: 2.0, Rectangle: 1.0}  # in which marks without an order of their own are drawn
-ANCHORS: Final = {"left": "start", "center": "middle", "right": "end"}
-RISES: Final = {
-    "top": 0.76,
-    "center": 0.36,
-    "center_baseline": 0.36,
-    "bottom": -0.2,
-    "baseline": 0.0,
-}  # [-] of its size
-STAR: Final = tuple(((1.0, 0.4)[k % 2], np.pi * (0.5 + k / 5.0)) for k in range(10))  # radius and angle of its corners
+FINE: Final = 100  # coordinates to a point
+THINNING_TOL: Final = 0.12 * FINE  # that a curve may lie beside its points: a tenth of its width
+FARTHEST: Final = 1e7  # of coordinates: what lies far outside its box
+FONT: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
+STAR: Final = tuple(((0.5, 0.2)[k % 2], np.pi * (0.5 + k / 5.0)) for k in range(10))  # radius and angle of its corners
+STYLE: Final = re.compile(r"<style>.*?</style>", re.DOTALL)
 
 
-def svg_text(sheet: Sheet) -> str:
-    """A sheet as SVG; its lengths are in points.
+def svg_text(figure: Figure) -> str:
+    """A figure as the text of an SVG file.
 
     Args:
-        sheet: The sheet.
+        figure: The figure.
     """
-    width, height = POINTS * sheet.width, POINTS * sheet.height
-    marks = sorted(sheet.marks, key=lambda mark: float(mark.style.get("zorder", ORDER.get(type(mark), 3.0))))
-    body = "\n".join(part for mark in marks for part in _drawn(mark, height))
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" '
-        f'font-family="DejaVu Sans, Verdana, Helvetica, Arial, sans-serif">\n{body}\n</svg>\n'
+    found = placed(figure)
+    return "\n".join([*_head(found), *map(_words, found.words), *_swatches(found), *_panels(found), "</svg>\n"])
+
+
+def inline_svg(text: str) -> str:
+    """An SVG file as part of a page, which has the style of all pictures.
+
+    Args:
+        text: The file.
+    """
+    return STYLE.sub("", text, count=1)
+
+
+def _head(found: Placed) -> Iterator[str]:
+    """The opening tag, what the figure shows in words, its style for dark pages and its paper."""
+    figure = found.figure
+    size = f"{found.width:.6g} {found.height:.6g}"
+    title = figure.title or figure.panels[0].title
+    yield (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" data-columns="{figure.columns}" '
+        f'font-family="{FONT}" stroke-linejoin="round">'
     )
+    yield f"<title>{escape(title)}</title>"
+    yield f"<desc>{escape(figure.text or _description(figure))}</desc>"
+    yield f"<style>{dark_rules()}</style>"
+    yield f'<rect class="paper" width="{found.width:.6g}" height="{found.height:.6g}" fill="{PAPER}"/>'
 
 
-def _drawn(mark: Mark, height: float) -> Iterator[str]:
-    """The elements of one mark."""
-    if isinstance(mark, Line):
-        points = np.stack([POINTS * np.asarray(mark.x, float), height - POINTS * np.asarray(mark.y, float)], axis=-1)
-        yield from _line(points.reshape(-1, 2), mark.style)
-        yield from _markers(points.reshape(-1, 2), mark.style)
-    elif isinstance(mark, Rectangle):
-        x, y = POINTS * mark.corner[0], height - POINTS * (mark.corner[1] + mark.height)
-        box = f'x="{x:.2f}" y="{y:.2f}" width="{POINTS * mark.width:.2f}" height="{POINTS * mark.height:.2f}"'
-        yield f'<rect {box} fill="{mark.style["color"]}"{_alpha(mark.style, "fill")}/>'
-    else:
-        size = float(mark.style.get("size", SIZE))
-        rise = RISES[mark.style.get("va", "baseline")] * size
-        weight = ' font-weight="bold"' if mark.style.get("weight") == "bold" else ""
-        place = f'x="{POINTS * mark.x:.2f}" y="{height - POINTS * mark.y + rise:.2f}" font-size="{size:g}"'
-        anchor = ANCHORS[mark.style.get("ha", "left")]
+def _description(figure: Figure) -> str:
+    """Titles and notes of the panels, for those who do not see them."""
+    texts = (f"{panel.title}: {panel.note}" if panel.note else panel.title for panel in figure.panels)
+    return f"{'; '.join(text for text in texts if text)}. Along: {figure.x.label}."
+
+
+def _words(each: Words) -> str:
+    """A line of text."""
+    place = f'x="{each.x:.2f}" y="{each.y:.2f}" font-size="{each.size:g}" fill="{each.colour}"'
+    anchor = f' text-anchor="{each.anchor}"' if each.anchor != "start" else ""
+    weight = ' font-weight="bold"' if each.is_bold else ""
+    kind = f' class="{each.kind}"' if each.kind else ""
+    return f"<text{kind} {place}{anchor}{weight}>{escape(each.text)}</text>"
+
+
+def _swatches(found: Placed) -> Iterator[str]:
+    """The colours of the legend."""
+    for x, y, colour in found.swatches:
+        yield f'<rect x="{x:.2f}" y="{y:.2f}" width="{SWATCH[0]:g}" height="{SWATCH[1]:g}" fill="{colour}"/>'
+
+
+def _panels(found: Placed) -> Iterator[str]:
+    """Every panel."""
+    is_plane = found.figure.is_plane
+    for box in found.panels:
+        y = box.panel.y
+        kinds = (' data-time=""' if box.x.is_time else "") + (' data-log=""' if y.is_log else "")
+        unit = f' data-unit="{escape(y.unit)}"' if y.unit else ""
+        place = f'transform="translate({box.left:.6g} {box.top:.6g})" data-size="{box.width:.6g} {box.height:.6g}"'
         yield (
-            f'<text {place} fill="{mark.style.get("color", INK)}" text-anchor="{anchor}"{weight}>'
-            f"{escape(mark.text)}</text>"
+            f'<g class="panel" {place} data-x="{box.x.low:.9g} {box.x.high:.9g}" '
+            f'data-y="{y.low:.9g} {y.high:.9g}"{unit}{kinds}>'
         )
+        width, height = round(FINE * box.width), round(FINE * box.height)
+        size = f'width="{box.width:.6g}" height="{box.height:.6g}" viewBox="0 0 {width} {height}"'
+        yield f'<svg class="box" {size} overflow="visible" fill="none">'
+        yield from _forbidden(box)
+        if not is_plane:
+            yield f'<path class="grid" d="{_grid(box)}" stroke="{GRID}" stroke-width="80"/>'
+        for item in box.panel.items:
+            yield from _item(box, item)
+        yield "</svg>"
+        frame = _plane_frame(box) if is_plane else f"M0 0V{box.height:.6g}H{box.width:.6g}"
+        yield f'<path class="frame" d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
+        yield from map(_words, box.words)
+        yield "</g>"
 
 
-def _line(points: Array, style: Mapping[str, Any]) -> Iterator[str]:
-    """A line with gaps as one path; nothing where there are markers only."""
-    if style.get("linestyle") == "none":
+def _forbidden(box: PlacedPanel) -> Iterator[str]:
+    """The ranges beyond limits."""
+    width, height = round(FINE * box.width), round(FINE * box.height)
+    for item in box.panel.items:
+        if isinstance(item, Limit) and item.is_shaded and not item.is_vertical:
+            at = int(np.clip(_fine(box.down(item.value)), 0, height))
+            top, bottom = (0, at) if item.is_upper else (at, height)
+            yield f'<rect y="{top}" width="{width}" height="{bottom - top}" fill="{FORBIDDEN}"/>'
+
+
+def _grid(box: PlacedPanel) -> str:
+    """Lines at the ticks."""
+    width, height = round(FINE * box.width), round(FINE * box.height)
+    across = "".join(f"M{_fine(box.across(value))} 0v{height}" for value in box.x_ticks)
+    return across + "".join(f"M0 {_fine(box.down(value))}h{width}" for value in box.y_ticks)
+
+
+def _plane_frame(box: PlacedPanel) -> str:
+    """The frame of a plane with ticks outside."""
+    steps = [f"M0 0V{box.height:.6g}H{box.width:.6g}V0Z"]
+    steps += [f"M{float(box.across(value)):.2f} {box.height:.6g}v{TICK:g}" for value in box.x_ticks]
+    steps += [f"M0 {float(box.down(value)):.2f}h{-TICK:g}" for value in box.y_ticks]
+    return "".join(steps)
+
+
+def _item(box: PlacedPanel, item: object) -> Iterator[str]:
+    """The elements of one item but for its words."""
+    if isinstance(item, Curve):
+        yield from _curve(box, item)
+    elif isinstance(item, Mark):
+        yield from _mark(_fine(box.across(item.x)), _fine(box.down(item.y)), item)
+    elif isinstance(item, Box):
+        (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
+        place = f'x="{_fine(left)}" y="{_fine(top)}" width="{_fine(right) - _fine(left)}"'
+        opacity = f' fill-opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
+        yield f'<rect {place} height="{_fine(bottom) - _fine(top)}" fill="{item.colour}"{opacity}/>'
+    elif isinstance(item, Limit):
+        line = f"M{_fine(box.across(item.value))} 0V{round(FINE * box.height)}"
+        if not item.is_vertical:
+            line = f"M0 {_fine(box.down(item.value))}H{round(FINE * box.width)}"
+        yield f'<path class="bound" d="{line}" stroke="{LIMIT}" stroke-width="{FINE}"/>'
+
+
+def _fine(length: Array | float) -> int:
+    """A length in points as a coordinate."""
+    return round(float(np.clip(FINE * np.asarray(length), -FARTHEST, FARTHEST)))
+
+
+def _curve(box: PlacedPanel, curve: Curve) -> Iterator[str]:
+    """A curve as one path, thinned so that every peak is kept; nothing where it has no points."""
+    x, y = np.asarray(curve.x, dtype=float), np.asarray(curve.y, dtype=float)
+    is_function = len(x) > 2 and bool(np.all(np.diff(x) >= 0.0))
+    steps = "".join(_stretch(box, x[first:last], y[first:last], is_function) for first, last in gaps(x + y))
+    if steps:
+        name = f' data-name="{escape(curve.name)}"' if curve.name else ""
+        dashes = ' stroke-dasharray="400 300"' if curve.is_dashed else ""
+        pen = f'stroke="{curve.colour}" stroke-width="{FINE * curve.width:g}"{dashes}'
+        yield f'<path class="curve"{name} d="{steps}" {pen}/>'
+
+
+def _stretch(box: PlacedPanel, x: Array, y: Array, is_function: bool) -> str:
+    """The path of a stretch without gaps: its first point, and from each point to the next."""
+    if is_function:
+        kept = peaks_kept(y)
+        x, y = x[kept], y[kept]
+    points = np.stack([FINE * box.across(x), FINE * box.down(y)], axis=-1)
+    points = np.rint(np.clip(points, -FARTHEST, FARTHEST))
+    if is_function:
+        points = points[straightened(points[:, 0], points[:, 1], THINNING_TOL)]
+    whole = points.astype(np.int64)
+    steps = _numbers(np.diff(whole, axis=0).ravel().tolist())
+    return f"M{_numbers(whole[0].tolist())}" + (f"l{steps}" if steps else "h0")
+
+
+def _numbers(values: Sequence[int]) -> str:
+    """Numbers as short as a path allows."""
+    return " ".join(map(str, values)).replace(" -", "-")
+
+
+def _mark(x: int, y: int, mark: Mark) -> Iterator[str]:
+    """A dot as a line without length and with round ends; a star as a polygon."""
+    size = FINE * mark.size
+    if mark.is_star:
+        corners = _numbers([round(v) for r, a in STAR for v in (x + size * r * np.cos(a), y - size * r * np.sin(a))])
+        edge = f' stroke="{mark.edge}" stroke-width="60"' if mark.edge else ""
+        yield f'<path class="mark" d="M{corners}Z" fill="{mark.colour}"{edge}/>'
         return
-    steps, is_down = [], False
-    for x, y in points.tolist():
-        if not math.isfinite(x + y):
-            is_down = False
-            continue
-        steps.append(f"{'L' if is_down else 'M'}{x:.2f} {y:.2f}")
-        is_down = True
-    width = float(style.get("linewidth", 1.0))
-    dashes = ' stroke-dasharray="4 3"' if style.get("linestyle") == "--" else ""
-    path = "".join(steps)
-    yield f'<path d="{path}" fill="none" stroke="{style["color"]}" stroke-width="{width:g}"{dashes}/>'
+    if mark.edge:
+        yield _dot(x, y, mark.edge, size + 0.3 * FINE)
+        size -= 0.3 * FINE
+    yield _dot(x, y, mark.colour, size)
 
 
-def _markers(points: Array, style: Mapping[str, Any]) -> Iterator[str]:
-    """Its markers: dots or stars."""
-    if "marker" not in style:
-        return
-    radius, edge = 0.5 * float(style["markersize"]), style.get("markeredgecolor", style["color"])
-    colours = f'fill="{style["color"]}" stroke="{edge}" stroke-width="{float(style.get("markeredgewidth", 0.6)):g}"'
-    for x, y in points.tolist():
-        if style["marker"] == "*":
-            corners = " ".join(f"{x + radius * r * np.cos(a):.2f},{y - radius * r * np.sin(a):.2f}" for r, a in STAR)
-            yield f'<polygon points="{corners}" {colours}/>'
-        else:
-            yield f'<circle cx="{x:.2f}" cy="{y:.2f}" r="{radius:g}" {colours}/>'
-
-
-def _alpha(style: Mapping[str, Any], kind: str) -> str:
-    """How transparent it is."""
-    return f' {kind}-opacity="{float(style["alpha"]):g}"' if "alpha" in style else ""
+def _dot(x: int, y: int, colour: str, size: float) -> str:
+    """A dot."""
+    pen = f'stroke="{colour}" stroke-width="{size:g}" stroke-linecap="round"'
+    return f'<path class="mark" d="M{_numbers([x, y])}h0" {pen}/>'

@@ -9,13 +9,15 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion import Motion
-from cellplan.model.report import JointUse, Report
+from cellplan.model.report import ClearanceReport, JointUse, Report
+from cellplan.model.units import MM
 from cellplan.report.record.common import SIGNIFICANT
 
 SCHEMA: Final = "cellplan.series/1"
 MAX_STEPS: Final = 50_000  # a longer motion is thinned
 DIGITS: Final = 7  # [-] significant: 1e-5 deg of a joint, 1e-7 of an error; the joint tables have all digits
 INDENT: Final = "  "
+CLEARANCE: Final = "clearance"  # name of the last ones
 
 Tree = dict[str, Any]  # by name: trees, arrays of shape (K,), whole numbers, texts or None
 
@@ -23,8 +25,9 @@ Tree = dict[str, Any]  # by name: trees, arrays of shape (K,), whole numbers, te
 def series(report: Report, motion: Motion | None = None) -> Tree:
     """Quantities along the motion in printed units.
 
-    Every n-th sample is kept, and the last one. Quantities of a step, velocities among them, have one value less than
-    there are samples: the k-th value belongs to the step of the clock that begins at the k-th kept sample.
+    Every n-th sample is kept, and the last one; the clearance has times of its own. Quantities of a step, velocities
+    among them, have one value less than there are samples: the k-th value belongs to the step of the clock that begins
+    at the k-th kept sample.
 
     Args:
         report: The run.
@@ -54,6 +57,7 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
         },
         "iterations": None if motion is None or motion.iterations is None else motion.iterations[steps],
         "slack": None if motion is None or motion.slack is None else motion.slack[steps],
+        CLEARANCE: _clearance_series(report.clearance),
     }
 
 
@@ -70,6 +74,13 @@ def _of_stack(report: Report) -> dict[str, Array]:
     }
 
 
+def _clearance_series(clearance: ClearanceReport) -> Tree:
+    """What each class of pairs keeps over time; nothing where the curves were not worked out."""
+    if not clearance.curves:
+        return {}
+    return {"times_s": clearance.curve_times} | {f"{kind}_mm": MM * kept for kind, kept in clearance.curves.items()}
+
+
 def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
     """Position and velocity of each joint of one robot, in the order of its columns."""
     tree: Tree = {}
@@ -79,9 +90,21 @@ def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
     return tree
 
 
-def series_json(report: Report, motion: Motion | None = None) -> str:
-    """The text of ``series.json``; see ``series``."""
-    return series_text(series(report, motion)) + "\n"
+def series_json(report: Report, motion: Motion | None = None, *, head: str = "") -> str:
+    """The text of ``series.json``; see ``series``.
+
+    Args:
+        report: The run.
+        motion: The planned motion.
+        head: What ``series_head`` gave of the same motion; empty for nothing.
+    """
+    end = series_text({CLEARANCE: _clearance_series(report.clearance)})
+    return (head or series_head(report, motion)).removesuffix("\n}") + "," + end.removeprefix("{") + "\n"
+
+
+def series_head(report: Report, motion: Motion | None = None) -> str:
+    """The text of all series but those of the clearance, which come last."""
+    return series_text({name: each for name, each in series(report, motion).items() if name != CLEARANCE})
 
 
 def series_text(tree: Mapping[str, Any], depth: int = 0) -> str:

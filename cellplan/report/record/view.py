@@ -133,6 +133,13 @@ class NearestRecord(TypedDict):
     points: Annotated[list[Numbers], "the nearest points, each in the frame of its body"]
 
 
+class ClearanceCurveRecord(TypedDict):
+    """What the report of a run certifies over time; empty where nothing is certified."""
+
+    times: Numbers
+    distances: Annotated[list[float | None], "kept all through the block that holds the time; null where none is near"]
+
+
 class ContactViewRecord(TypedDict):
     """Two bodies that touch for a while."""
 
@@ -181,6 +188,7 @@ class SceneViewRecord(TypedDict):
     tasks: list[TaskViewRecord]
     motion: MotionViewRecord
     nearest: NearestRecord
+    certified: ClearanceCurveRecord
     contacts: list[ContactViewRecord]
     failures: list[FailureRecord]
     excluded: list[ExcludedRecord]

@@ -16,8 +16,6 @@ from cellplan.io.run.clock_table import parse_clock
 from cellplan.model.motion import ClockTable
 from cellplan.model.report import Check
 
-pytestmark = pytest.mark.usefixtures("sketched_pictures")
-
 FEEDS = {"bead": 40.0, "seam": 50.0, "ring": 60.0}  # [mm/s]
 ROBOTS = ("left", "right", "top")
 TOP = 4  # header lines of the clock

@@ -18,7 +18,7 @@ from cellplan.io.run.clock_table import parse_clock
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
 
-pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 PHASES = (
     *("transfer-1", "grip", "lift", "transfer-2", "work-1", "transfer-3", "work-2"),

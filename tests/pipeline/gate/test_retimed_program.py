@@ -12,8 +12,6 @@ from cellplan import Cell, Solution, export_program, load_cell, open_gate, solve
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.io.run.clock_table import parse_clock
 
-pytestmark = pytest.mark.usefixtures("sketched_pictures")
-
 FEED = 700.0  # [mm/s]
 TOP = 4  # header lines of the clock
 

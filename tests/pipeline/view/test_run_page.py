@@ -170,14 +170,37 @@ def test_the_page_asks_for_nothing(record: ViewRecord) -> None:
     assert not any(word in page for word in ("http:", "https:", "fetch(", "XMLHttpRequest", "@import", " src="))
 
 
-def test_a_series_that_does_not_fit_is_named(sound: Path, tmp_path: Path) -> None:
-    class Short(StoredRun):
+DAMAGED_SERIES = {
+    "joints: expected positions of all joints of the cell": {"times_s": [0.0], "joints": {}},
+    "clearance: expected times and as many distances": {"clearance": {"times_s": [0.0, 1.0], "part_mm": [1.0]}},
+    "clearance: expected times and": {"clearance": {"times_s": ["x"]}},
+    "clearance: expected": {"clearance": [1.0]},
+}
+
+
+@pytest.mark.parametrize("message", DAMAGED_SERIES)
+def test_a_series_that_does_not_fit_is_named(sound: Path, message: str) -> None:
+    class Damaged(StoredRun):
         def series(self, place: str) -> dict[str, object]:
-            return {"times_s": [0.0], "joints": {}}
+            return {**StoredRun.series(self, place), **DAMAGED_SERIES[message]}
 
     stored = read_stored_run(sound / "run")
     names = ("folder", "digest", "manifest", "record", "records", "tables", "clock")
-    short = Short(**{name: getattr(stored, name) for name in names})
+    damaged = Damaged(**{name: getattr(stored, name) for name in names})
 
-    with pytest.raises(InputError, match=r"series\.json: joints: expected positions of all joints of the cell"):
-        run_scene(short, load_cell(sound / "cell" / "small.yaml"), geometries.Geometries())
+    with pytest.raises(InputError, match=rf"series\.json: {message}"):
+        run_scene(damaged, load_cell(sound / "cell" / "small.yaml"), geometries.Geometries())
+
+
+def test_the_curve_over_the_time_line_is_what_the_report_certifies(record: ViewRecord, sound: Path) -> None:
+    curve, whole = record["scenes"][0]["certified"], read_stored_run(sound / "run").record["clearance"]["whole"]
+    known = [each for each in curve["distances"] if each is not None]
+
+    assert len(curve["times"]) == len(curve["distances"]) > 40
+    assert min(known) == pytest.approx(whole["minimum_mm"], abs=1e-4)
+    assert curve["times"][curve["distances"].index(min(known))] == pytest.approx(whole["at_s"], abs=1e-6)
+    nearest = record["scenes"][0]["nearest"]
+    for at, distance in zip(nearest["times"], nearest["distances"], strict=True):
+        before = max(i for i, each in enumerate(curve["times"]) if each <= at + 1e-9)
+        about = [each for each in curve["distances"][max(before - 1, 0) : before + 3] if each is not None]
+        assert min(about) <= distance + 0.1  # a block is never kept better than in one of its rows

@@ -9,8 +9,10 @@ import pytest
 PROGRAM = """
 import os, sys
 before = os.environ.get("MPLBACKEND")
-from cellplan.report.plots.rendering import warm_up
-warm_up()
+from cellplan.report.plots.canvas import paint
+from cellplan.report.plots.figure import Axis, Figure, Panel
+x = Axis(low=0.0, high=1.0)
+paint(Figure(title="0", x=x, panels=[Panel(title="0", y=x, items=[])]), "png")
 import matplotlib
 assert os.environ.get("MPLBACKEND") == before
 print(matplotlib.rcParams._get("backend"))

@@ -99,10 +99,10 @@ def test_what_was_not_counted_is_null(passed_run: Any) -> None:
 
 
 def lengths(tree: Any) -> set[tuple[str, int]]:
-    """Length of every array, by whether it belongs to instants or to steps."""
+    """Length of every array, by whether it belongs to instants or to steps; but for the clearance."""
     found = set()
     for name, value in tree.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and name != "clearance":
             found |= lengths(value)
         elif isinstance(value, np.ndarray):
             is_of_steps = name.startswith("speed") or name in {"iterations", "slack"}
@@ -136,7 +136,7 @@ def test_each_array_is_one_line(passed_run: Any) -> None:
     assert lines[1:3] == ['  "schema": "cellplan.series/1",', '  "every": 1,']
     arrays_at = [line for line in lines if "[" in line]
     assert all(line.rstrip(",").endswith("]") for line in arrays_at)
-    assert len(arrays_at) == 1 + 3 * 2 + 4 + 24 * 2
+    assert len(arrays_at) == 1 + 3 * 2 + 4 + 24 * 2 + 1 + 4  # the last five: clearance of four classes
     assert text.endswith("\n}\n")
 
 
@@ -174,3 +174,22 @@ def test_names_cannot_break_out_of_their_place(passed_run: Any) -> None:
     accuracy = (replace(passed_run.report.accuracy[0], task='x": [1], "y'),)
     tree = series(replace(passed_run.report, accuracy=accuracy))
     assert list(json.loads(series_text(tree))["tasks"]) == ['x": [1], "y']
+
+
+def test_the_clearance_of_each_class_is_found_again_at_its_minimum(passed_run: Any) -> None:
+    record = written(passed_run)
+    curves = record["series"]["clearance"]
+    minima = {key: each for key, each in record["clearance"].items() if key != "whole"}
+
+    assert set(curves) == {"times_s", *(f"{key}_mm" for key, each in minima.items() if each["pair"])}
+    for key, each in minima.items():
+        if each["pair"]:
+            kept = curves[f"{key}_mm"]
+            assert kept[curves["times_s"].index(each["at_s"])] == pytest.approx(each["minimum_mm"], rel=RELATIVE)
+            assert min(kept) == pytest.approx(each["minimum_mm"], rel=RELATIVE)
+
+
+def test_without_curves_the_clearance_is_empty(passed_run: Any) -> None:
+    clearance = replace(passed_run.report.clearance, curves={})
+
+    assert series(replace(passed_run.report, clearance=clearance))["clearance"] == {}

@@ -1,1 +1,5 @@
 """URDF: document, tree, limits, bodies."""
+
+from typing import Final
+
+XACRO_SUFFIX: Final = ".xacro"

@@ -12,9 +12,10 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import did_you_mean, shown
+from cellplan.io.robots.urdf import XACRO_SUFFIX
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.spelling import check_spelling
-from cellplan.io.robots.urdf.xacro import XACRO_SUFFIX, XacroSettings, expand_xacro
+from cellplan.io.robots.urdf.xacro import XacroSettings, expand_xacro
 from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
 
 MAX_LINKS: Final = 1000  # a humanoid with two hands has 130

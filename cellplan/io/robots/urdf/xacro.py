@@ -27,7 +27,6 @@ from cellplan.io.robots.urdf.packages import Packages
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.xml import MAX_BYTES, MAX_DEPTH, Element, parse_xml
 
-XACRO_SUFFIX: Final = ".xacro"
 INSTALL: Final = 'pip install "cellplan[xacro]"'
 PACKAGE: Final = "/:package:/"  # begins the path of a file in a package, until the file is read
 PLACE: Final = "place"  # of a node in its file, kept by copies of the node

@@ -49,17 +49,22 @@ class Controls {
     return button;
   }
 
-  /** The distance of the closest pair over time, what is demanded of it, and contacts that are not allowed. */
+  /** The distance over time, certified where it can be, what is demanded of it, and contacts that are not allowed. */
   curve() {
     const { scene, motion } = this.app.stage;
-    const { times: sampled, distances, required, pairs } = scene.nearest;
+    const { required, pairs } = scene.nearest;
+    const isCertified = scene.certified.times.length > 0;
+    const { times: sampled, distances } = isCertified ? scene.certified : scene.nearest;
     const most = Math.max(3 * required, 10);
     const x = (t) => (1000 * t) / motion.end;
     const y = (mm) => CURVE_HEIGHT - 2 - (CURVE_HEIGHT - 4) * clamp(mm / most, 0, 1);
     const marks = scene.contacts.filter((contact) => !contact.allowed).map((contact) => svgElement("rect", {
       x: x(contact.first), y: 0, width: Math.max(x(contact.last) - x(contact.first), 3), height: CURVE_HEIGHT, class: "hit",
     }));
-    const points = sampled.flatMap((t, i) => (pairs[i].length ? [`${x(t).toFixed(1)},${y(distances[i]).toFixed(1)}`] : []));
+    const isKnown = (i) => (isCertified ? distances[i] !== null : pairs[i].length > 0);
+    const what = isCertified ? "certified smallest distance" : "distance of the closest pair";
+    byId("curve").setAttribute("aria-label", `${what} over time; contacts are marked red`);
+    const points = sampled.flatMap((t, i) => (isKnown(i) ? [`${x(t).toFixed(1)},${y(distances[i]).toFixed(1)}`] : []));
     const demand = svgElement("line", { x1: 0, x2: 1000, y1: y(required), y2: y(required), class: "demand" });
     const line = svgElement("polyline", { points: points.join(" "), class: "distance" });
     const ticks = scene.failures.filter((failure) => failure.at !== null).map((failure) => svgElement("line", {

@@ -10,7 +10,7 @@ import pytest
 from cellplan import load_cell
 from cellplan.checks.verify import Clearance, run_clearance
 from cellplan.model.progress import silent
-from cellplan.pipeline.quick_clearance import QuickClearance
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.solve import certified, solve_motion
 
 CELL = Path(__file__).resolve().parents[2] / "cells" / "planar_pair.yaml"
@@ -25,9 +25,9 @@ def test_verdicts_and_smallest_distances_are_those_of_solve(is_begun: bool) -> N
         asked.append(len(arguments))
         return lambda: function(*arguments)
 
-    quick = QuickClearance(begin if is_begun else None)
-    scene, solution = solve_motion(load_cell(CELL).with_values(VALUES), task=None, progress=silent, quick=quick)
-    found = certified(solution, scene, progress=silent, quick=quick).runs[0]
+    early = EarlyClearance(begin if is_begun else None)
+    scene, solution = solve_motion(load_cell(CELL).with_values(VALUES), task=None, progress=silent, early=early)
+    found = certified(solution, scene, progress=silent, early=early).runs[0]
 
     q = np.concatenate([found.report.q[robot.name] for robot in scene.cell.robots], axis=1)
     clearance, checks = run_clearance(scene, found.schedule, q)
@@ -49,12 +49,12 @@ def test_what_was_begun_for_other_tasks_or_rows_is_not_taken() -> None:
     run = solution.runs[0]
     q = np.concatenate([run.report.q[robot.name] for robot in scene.cell.robots], axis=1)
     own, other = run_clearance(scene, run.schedule, q), (run.report.clearance, ())
-    quick = QuickClearance(lambda *_: lambda: other)
+    early = EarlyClearance(lambda *_: lambda: other)
 
-    quick.begin(scene, run.schedule, q)
+    early.begin(scene, run.schedule, q)
 
     assert own[1]
-    assert quick.of(scene, run.schedule, q, silent) is other
+    assert early.of(scene, run.schedule, q, silent) is other
     for schedule, rows in ((replace(run.schedule), q), (run.schedule, q + 1e-9)):
-        checks = quick.of(scene, schedule, rows, silent)[1]
+        checks = early.of(scene, schedule, rows, silent)[1]
         assert [each.name for each in checks] == [each.name for each in own[1]]

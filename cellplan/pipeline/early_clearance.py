@@ -1,4 +1,4 @@
-"""Clearance of the motions of a search: without curves, and in another process while this one checks all else."""
+"""Clearance of runs, begun as soon as their rows are known: in another process, while this one checks all else."""
 
 from collections.abc import Callable
 
@@ -13,30 +13,35 @@ from cellplan.scene.scene import Scene
 Begin = Callable[..., Callable[[], Clearance]]
 
 
-class QuickClearance:
-    """Works out the clearance of runs as ``solve`` does, but for the curves that only the page of a run shows."""
+class EarlyClearance:
+    """Works out the clearance of runs as ``solve`` does, with or without the curves that only the page of a run shows.
 
-    def __init__(self, begin: Begin | None = None) -> None:
+    A clearance that was begun belongs to its schedule and its rows; for any others it is worked out anew.
+    """
+
+    def __init__(self, begin: Begin | None = None, *, with_curves: bool = False) -> None:
         """Prepare.
 
         Args:
             begin: Begins a function with its arguments in another process and returns what waits for its value; None
                 where all is done here.
+            with_curves: Whether the distances over time are worked out sharply enough to be drawn.
         """
         self._begin = begin
+        self._clearance = run_clearance if with_curves else without_curves
         self._begun: list[tuple[Schedule, Array, Callable[[], Clearance]]] = []
 
     def begin(self, scene: Scene, schedule: Schedule, q: Array) -> None:
         """Begin with a run whose rows are known; arguments as those of ``run_clearance``."""
         if self._begin is not None:
-            self._begun.append((schedule, q, self._begin(without_curves, scene, schedule, q)))
+            self._begun.append((schedule, q, self._begin(self._clearance, scene, schedule, q)))
 
     def of(self, scene: Scene, schedule: Schedule, q: Array, progress: Progress) -> Clearance:
         """The clearance of a run: what was begun with its schedule and rows, or worked out now."""
         for known, rows, result in self._begun:
             if known is schedule and np.array_equal(rows, q):
                 return result()
-        return without_curves(scene, schedule, q, progress)
+        return self._clearance(scene, schedule, q, progress=progress)
 
 
 def without_curves(scene: Scene, schedule: Schedule, q: Array, progress: Progress = silent) -> Clearance:

@@ -1,0 +1,108 @@
+"""First screen of a report: process speeds, what was not judged, and the instant that its picture shows."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from cellplan.model.cell import Cell
+from cellplan.model.left_out import TITLES
+from cellplan.model.units import MM
+from cellplan.report.page.checks import failure_groups
+from cellplan.report.page.filters import floored, small
+from cellplan.report.page.times import Shifts, phase_begins
+from cellplan.report.record.common import Entries, Record
+
+MAX_SPEEDS: Final = 4  # tasks on the first screen; all of them have a line in the table of process speeds
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorstInstant:
+    """What the picture of a report shows.
+
+    Attributes:
+        at_s: The instant in [s], on the clock of its run.
+        shift: Time in [s] on the page's clock from which it counts; None if that is not known.
+        text: What is worst there.
+    """
+
+    at_s: float
+    shift: float | None
+    text: str
+
+
+def worst_instant(record: Record) -> WorstInstant | None:
+    """The instant of the first failed check that has one, else that of the closest pair; None without either."""
+    begins = phase_begins(record)
+    for group in failure_groups(record):
+        for row in group["rows"]:
+            if row["at_s"] is not None:
+                shift = begins.get(row["run"]) if row["run"] else 0.0
+                return WorstInstant(at_s=row["at_s"], shift=shift, text=f"{group['title']}: {row['where']}")
+    whole = record["clearance"]["whole"]
+    if whole["at_s"] is None:
+        return None
+    pair = " – ".join(whole["pair"] or ())
+    return WorstInstant(
+        at_s=whole["at_s"],
+        shift=clearance_shift(record, Shifts(record)),
+        text=f"Closest pair: {pair}, {'' if whole['exact'] else 'at least '}{floored(whole['minimum_mm'])} mm",
+    )
+
+
+def clearance_shift(record: Record, shift: Shifts) -> float | None:
+    """Time in [s] on the page's clock from which the instant of the smallest clearance counts."""
+    whole = record["clearance"]["whole"]
+    kinds = (name for name, each in record["clearance"].items() if name != "whole" and each["pair"] == whole["pair"])
+    return shift("clearance", next(kinds, ""), whole["at_s"])
+
+
+def process_speeds(record: Record, cell: Cell) -> Entries:
+    """Speed along its path of every task, with the feed that is demanded; failed ones first."""
+    failed = {check["subject"] for check in record["checks"] if check["name"] == "process_feed" and not check["passed"]}
+    begins = {
+        role.removeprefix("work: "): phase["begin_s"]
+        for phase in reversed(record["phases"])
+        for role in phase["roles"].values()
+        if role.startswith("work: ")
+    }
+    rows = [
+        {
+            "task": name,
+            "robot": task["robot"],
+            "speed": task["process_speed"],
+            "demanded": _demanded(cell, name),
+            "shift": begins.get(name) if "runs" in record else 0.0,
+            "is_bad": name in failed,
+        }
+        for name, task in record["tasks"].items()
+    ]
+    return sorted(rows, key=lambda row: not row["is_bad"])
+
+
+def _demanded(cell: Cell, name: str) -> str:
+    """Feed that the process of a task demands; empty without one."""
+    process = next((task.process for task in cell.tasks if task.name == name), None)
+    return "" if process is None else f"{small(MM * process.feed)} mm/s ± {small(100.0 * process.tolerance)} %"
+
+
+def not_judged(record: Record) -> list[tuple[str, str]]:
+    """What was not judged, in a few words each, with the part of the page that has the full lines."""
+    return list(_not_judged(record))
+
+
+def _not_judged(record: Record) -> Iterator[tuple[str, str]]:
+    heads = dict.fromkeys(line.partition(": ")[0] for line in record["rests_on"]["lines"])
+    yield from ((head, "#unstated") for head in heads)
+    kinds: dict[str, int] = {}
+    for each in record.get("left_out", ()):
+        kinds[each["kind"]] = kinds.get(each["kind"], 0) + 1
+    if kinds:
+        named = ", ".join(f"{count} {TITLES[kind]}" for kind in TITLES if (count := kinds.get(kind)))
+        yield f"{sum(kinds.values())} pairs with reduced checks ({named})", "#left-out"
+    for each in record["accelerations"]["not_judged"]:
+        of = f" of {each['robot']}" if each["robot"] else ""
+        yield f"{each['what']}{of}", "#accelerations"
+    if record["open_surfaces"]:
+        yield f"{len(record['open_surfaces'])} meshes are not closed", "#open-surfaces"
+    if record.get("clearance_proof", {}).get("not_certified"):
+        yield "distances of some pairs between the samples", "#assumptions"

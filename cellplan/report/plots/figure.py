@@ -1,0 +1,190 @@
+"""Figures as data: panels with curves, limits, ranges and marks in printed units; nothing is placed or drawn here."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.report.plots.palette import INK
+
+PADDING_FRACTION: Final = 0.06  # [-] of the range, left free above and below
+WIDTH, ROW = 10.0, 1.75  # [inch] of a figure; from one row of panels to the next
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """What is measured along one side of a panel.
+
+    Attributes:
+        low: Value at its lower or left end.
+        high: Value at its upper or right end.
+        label: What it measures.
+        unit: Unit of its values.
+        is_log: Whether its scale is logarithmic; both ends are positive then, and smaller values lie at the lower end.
+        is_time: Whether it is the time of a motion in [s], which all figures of a page share.
+    """
+
+    low: float
+    high: float
+    label: str = ""
+    unit: str = ""
+    is_log: bool = False
+    is_time: bool = False
+
+    def share(self, values: Array | float) -> Array:
+        """Place of values between the two ends, from 0 to 1."""
+        if self.is_log:
+            decades = np.log10(self.high / self.low)
+            return np.log10(np.maximum(values, self.low) / self.low) / decades
+        return (np.asarray(values, dtype=float) - self.low) / (self.high - self.low)
+
+
+def time_axis(times: Array) -> Axis:
+    """The axis of the time of a motion."""
+    return Axis(low=float(times[0]), high=float(times[-1]), label="time in s", unit="s", is_time=True)
+
+
+def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = False) -> Axis:
+    """An axis for values, with some room at its ends.
+
+    Args:
+        low: Smallest value to show.
+        high: Largest value to show.
+        unit: Unit of the values.
+        is_floored: Whether the axis begins at the smallest value itself.
+    """
+    padding = PADDING_FRACTION * (high - low) or 1.0
+    return Axis(low=low if is_floored else low - padding, high=high + padding, unit=unit)
+
+
+class Curve(NamedTuple):
+    """A polyline: its name, and its points, shape (K,) each; NaN interrupts it."""
+
+    name: str
+    x: Array
+    y: Array
+    colour: str = INK
+    width: float = 1.3
+    is_dashed: bool = False
+
+
+class Limit(NamedTuple):
+    """A line at a limit, with the forbidden range beyond it shaded where it has one.
+
+    Attributes:
+        value: The limit.
+        label: Text at its right end.
+        is_upper: Whether values above it are forbidden, otherwise those below.
+        is_shaded: Whether the forbidden range is shaded.
+        is_vertical: Whether it limits the values along the x axis.
+    """
+
+    value: float
+    label: str = ""
+    is_upper: bool = True
+    is_shaded: bool = True
+    is_vertical: bool = False
+
+
+class Mark(NamedTuple):
+    """A point of note, such as the worst instant: a dot or a star, with an edge where that has a colour."""
+
+    x: float
+    y: float
+    colour: str = INK
+    size: float = 3.8
+    edge: str = ""
+    is_star: bool = False
+
+
+class Box(NamedTuple):
+    """A filled rectangle: a bar, a place, an area that is swept."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    colour: str
+    opacity: float = 1.0
+
+
+class Note(NamedTuple):
+    """A word at a point, moved by so many points to the right and up."""
+
+    x: float
+    y: float
+    text: str
+    colour: str = INK
+    size: float = 8.0
+    is_bold: bool = False
+    anchor: str = "middle"
+    moved: tuple[float, float] = (0.0, 0.0)
+
+
+def line(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> Curve:
+    """A line through points of the plane, shape (K, 2)."""
+    x, y = np.array(points, dtype=float).reshape(-1, 2).T
+    return Curve("", x, y, colour, width, is_dashed)
+
+
+def outline(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> Curve:
+    """A closed line through points of the plane, shape (K, 2)."""
+    return line([*points, points[0]], colour=colour, width=width, is_dashed=is_dashed)
+
+
+Item = Curve | Limit | Mark | Box | Note
+
+
+class Key(NamedTuple):
+    """An entry of a legend: a text with the colour that it explains, or a text alone."""
+
+    text: str
+    colour: str = ""
+    is_bold: bool = False
+    ink: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Panel:
+    """One pair of axes.
+
+    Attributes:
+        title: Text at its upper left.
+        note: Small text at its upper right.
+        y: Its upward axis.
+        items: What it shows, in the order in which it is drawn.
+        keys: Names of its curves in their colours, at its upper right.
+    """
+
+    title: str
+    y: Axis
+    items: Sequence[Item]
+    note: str = ""
+    keys: Sequence[Key] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Figure:
+    """Panels that share the axis along them.
+
+    Attributes:
+        title: Text above the panels.
+        x: Their axis from left to right.
+        panels: The panels, row by row.
+        columns: Number of panels in a row.
+        width: Width of the figure in [inch].
+        row: Height of a row of panels in [inch].
+        is_plane: Whether both axes are lengths in one scale, seen from above: a frame with ticks and no grid.
+        legend: Texts to the right of the panels.
+        text: What the figure shows, for those who do not see it.
+    """
+
+    title: str
+    x: Axis
+    panels: Sequence[Panel]
+    columns: int = 1
+    width: float = WIDTH
+    row: float = ROW
+    is_plane: bool = False
+    legend: Sequence[Key] = ()
+    text: str = ""
