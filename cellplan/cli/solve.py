@@ -60,8 +60,8 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
     with_view: WithView = False,
-    plots: PlotFormats = None,
     watch: Watch = False,
+    plots: PlotFormats = None,
     quiet: Quiet = False,
     allow_dir: AllowDirs = None,
 ) -> None:
@@ -85,7 +85,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         task=task,
         keep_rejected=keep_rejected,
         with_view=with_view,
-        formats=tuple(plots or ()),
+        plot_formats=tuple(plots or ()),
         allow_dirs=tuple(allow_dir or ()),
     )
     if watch:
@@ -107,7 +107,7 @@ class _Request:
     task: str | None
     keep_rejected: bool
     with_view: bool
-    formats: tuple[str, ...]
+    plot_formats: tuple[str, ...]
     allow_dirs: tuple[Path, ...]
 
 
@@ -119,7 +119,7 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
     from cellplan.pipeline.parallel import solve_in_parallel
     from cellplan.report.plots.rendering import require_formats
 
-    require_formats(request.formats)
+    require_formats(request.plot_formats)
     given = load_cell(request.cell, allow_dirs=request.allow_dirs)
     follow(given)
     changed = with_overrides(given, request.settings, **request.overrides)
@@ -159,7 +159,7 @@ def _written(solution: "Solution", folder: Path, request: _Request, progress: Li
         solution,
         folder,
         keep_rejected=request.keep_rejected,
-        formats=request.formats,
+        formats=request.plot_formats,
         view=request.with_view,
         progress=progress,
     )

@@ -21,7 +21,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
+@pytest.mark.usefixtures("kept_solutions")
 def test_the_first_template_passes_by_the_commands_that_are_printed(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -39,7 +39,6 @@ def test_the_first_template_passes_by_the_commands_that_are_printed(
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("sketched_pictures")
 @pytest.mark.parametrize("name", [template.name for template in TEMPLATES])
 def test_every_command_on_the_page_of_a_template_passes(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     run(["init", "new", "-t", name])
