@@ -10,13 +10,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from builders.browser import Browser
 
 from cellplan.cli.main import run
+from cellplan.pipeline.view.write import ViewRequest, view, write_view
 
 pytestmark = pytest.mark.slow
 
+PICTURE = np.s_[60:600, 5:900]  # of a window of 1280 by 800
 LIMIT_S = 60.0  # [s] for a round on a slow machine
 PHASE = "return document.getElementById('phase').textContent;"
 
@@ -105,3 +108,27 @@ def test_both_pages_follow_each_save_and_the_run_is_whole_in_the_end(
     monkeypatch.chdir(cell.parent)
     assert run(["verify", "outputs/planar-pair", "--cell", "pair.yaml", "-q"]) == 0
     assert [json.loads(line) for line in browser.console if "ERR_FILE_NOT_FOUND" not in line] == []
+
+
+def share_of_change(one: np.ndarray, other: np.ndarray) -> float:
+    """Share of the values of the picture that differ visibly."""
+    return float(np.mean(np.abs(one - other)[PICTURE] > 0.05))
+
+
+def test_a_3d_page_keeps_its_camera_when_it_is_refreshed(sound: Path, tmp_path: Path, browser: Browser) -> None:
+    page = tmp_path / "view.html"
+    write_view(view(ViewRequest(path=sound / "run", cell=sound / "cell" / "small.yaml"))[0], page)
+    browser.open(page)
+    first = browser.picture()
+    for kind, x in (("mousePressed", 300), ("mouseMoved", 380), ("mouseReleased", 380)):
+        browser.command("Input.dispatchMouseEvent", type=kind, x=x, y=300, button="left", buttons=1, clickCount=1)
+    browser.run("await drawn();")
+    turned = browser.picture()
+
+    browser.run("document.body.dataset.ready = 'old'; postMessage('cellplan:reload', '*');")
+    until(lambda: browser.run("return document.body?.dataset.ready;") == "true", "not loaded again")
+    browser.run("await drawn();")
+
+    assert share_of_change(first, turned) > 1e-2
+    assert share_of_change(browser.picture(), turned) < 1e-4  # angles in the address are rounded
+    assert "camera" not in browser.run("return location.hash;")
