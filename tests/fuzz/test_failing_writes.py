@@ -16,6 +16,7 @@ from fuzz.failing_disk import faulty
 from cellplan.errors import InputError
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.folder import RunFolder
+from cellplan.io.templates import write_folder
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.solve import solve
 from cellplan.pipeline.write_run import write_run
@@ -76,6 +77,14 @@ def every_call_fails_once(
 @pytest.mark.parametrize("number", ERRORS, ids=lambda number: errno.errorcode[number])
 def test_no_failing_call_leaves_a_cut_file_or_goes_unreported(tmp_path: Path, number: int, older: bool) -> None:
     assert every_call_fails_once(tmp_path, write_files, number=number, older=older) > 4 * len(FILES)
+
+
+@pytest.mark.parametrize("number", ERRORS, ids=lambda number: errno.errorcode[number])
+def test_no_failing_call_leaves_a_part_of_a_template_or_goes_unreported(tmp_path: Path, number: int) -> None:
+    def write(folder: Path) -> None:
+        write_folder(folder, FILES)
+
+    assert every_call_fails_once(tmp_path, write, number=number, older=False) > len(FILES)
 
 
 @pytest.fixture(scope="module")

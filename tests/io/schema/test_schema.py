@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from jsonschema import Draft202012Validator
 
 from cellplan.errors import InvalidFileError
 from cellplan.io.cell.load import load_cell
 from cellplan.io.input.findings import key_text
-from cellplan.io.schema import CellDocument, RobotTableDocument, json_schema
+from cellplan.io.schema import CellDocument, RobotTableDocument, json_schema, robot_table_schema
 from cellplan.io.yaml.reader import parse_yaml
 from cellplan.io.yaml.writer import yaml_text
 
@@ -149,6 +150,26 @@ def test_the_json_schema_is_closed_and_holds_no_null() -> None:
     assert None not in nodes
     assert {"type": "null"} not in nodes
     assert all({"description", "$ref"} & set(field) for node in objects for field in node["properties"].values())
+
+
+@pytest.mark.parametrize("schema", [json_schema(), robot_table_schema()], ids=["cell", "robot table"])
+def test_editors_can_explain_every_key_and_name_it_as_the_file_does(schema: dict[str, Any]) -> None:
+    for entry in (schema, *schema["$defs"].values()):
+        for key, field in entry.get("properties", {}).items():
+            kind = schema["$defs"].get(field.get("$ref", "").rpartition("/")[2], {})
+            assert len(field.get("description") or kind["description"]) > 3, key
+            assert kind.get("title") or field["title"] == key
+        assert "Entry" not in entry["title"]
+
+
+def test_the_json_schema_refuses_names_that_no_cell_may_have() -> None:
+    rules = Draft202012Validator(json_schema())
+    document = four_robots()
+    rules.validate(document)
+
+    document["environment"]["a fence"] = document["environment"].pop("floor")
+    (finding,) = rules.iter_errors(document)
+    assert "'a fence'" in finding.message
 
 
 @pytest.mark.parametrize("model", [CellDocument, RobotTableDocument])
