@@ -37,23 +37,31 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, *, config: MkDocsConfig) -> Files:
-    """Add a page for every file of the repository outside the documentation that a page links to."""
-    pages = [Path(file.abs_src_path) for file in files.documentation_pages() if file.abs_src_path is not None]
-    for path in sorted({target for page in pages for target in outside(page)}):
-        files.append(File.generated(config, place_of(path), content=page_of(path)))
+    """Add every file of the repository outside the documentation that a page, or such a file, links to."""
+    todo = [Path(file.abs_src_path) for file in files.documentation_pages() if file.abs_src_path is not None]
+    added: set[Path] = set()
+    for page in todo:
+        for path in sorted(outside(page) - added):
+            added.add(path)
+            files.append(file_of(path, config))
+            if path.suffix == ".md":
+                todo.append(path)
     return files
 
 
 def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
-    """Lead links that leave the documentation to the pages of these files."""
-    source = page.file.abs_src_path
-    if source is None:
+    """Lead links that leave the documentation, or come back to it, to where the site has their targets."""
+    if page.file.abs_src_path is None:
         return markdown
+    source = Path(page.file.abs_src_path)
     up = "../" * page.file.src_uri.count("/")
 
     def led(match: re.Match[str]) -> str:
-        path = (Path(source).parent / match["target"]).resolve()
-        return f"]({up}{place_of(path)})" if is_outside(path) else match[0]
+        path = (source.parent / match["target"]).resolve()
+        if is_outside(path):
+            return f"]({up}{place_of(path)}{match['anchor'] or ''})"
+        comes_back = is_outside(source) and path.is_relative_to(DOCS)
+        return f"]({up}{path.relative_to(DOCS)}{match['anchor'] or ''})" if comes_back else match[0]
 
     return LINK.sub(led, markdown)
 
@@ -115,11 +123,13 @@ def is_outside(path: Path) -> bool:
 
 
 def place_of(path: Path) -> str:
-    """Where the site has the page of a file outside the documentation."""
-    return f"files/{path.relative_to(ROOT).as_posix()}.md"
+    """Where the site has a file outside the documentation."""
+    return f"files/{path.relative_to(ROOT).as_posix()}{'.md' if path.suffix in LANGUAGES else ''}"
 
 
-def page_of(path: Path) -> str:
-    """A page that shows a file as it stands."""
-    name = path.relative_to(ROOT).as_posix()
-    return f"# {name}\n\n````{LANGUAGES.get(path.suffix, 'text')}\n{path.read_text(encoding='utf-8')}````\n"
+def file_of(path: Path, config: MkDocsConfig) -> File:
+    """A file outside the documentation for the site: a page that shows it, or the file itself."""
+    if path.suffix not in LANGUAGES:
+        return File.generated(config, place_of(path), abs_src_path=str(path))
+    name, text = path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")
+    return File.generated(config, place_of(path), content=f"# {name}\n\n````{LANGUAGES[path.suffix]}\n{text}````\n")

@@ -127,6 +127,37 @@ def test_the_site_loads_nothing_from_the_network_and_shows_all_formulas(site: Pa
     assert "<math" in (site / "concepts" / "cooperation.html").read_text(encoding="utf-8")
 
 
+def copy_sources(folder: Path) -> None:
+    """Copy what the site is made from."""
+    for name in ("docs", "examples"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "mkdocs.yml", folder)
+
+
+@pytest.mark.slow
+def test_links_lead_to_other_files_of_the_repository_and_back(tmp_path: Path) -> None:
+    copy_sources(tmp_path)
+    links = "[a script](../solve.py) [data](data.bin) [back](../../docs/glossary.md#sources)"
+    (tmp_path / "examples" / "more").mkdir()
+    (tmp_path / "examples" / "more" / "README.md").write_text(f"# More\n\n{links}\n", encoding="utf-8")
+    (tmp_path / "examples" / "more" / "data.bin").write_bytes(b"\x00\x01")
+    with (tmp_path / "docs" / "guides" / "install.md").open("a", encoding="utf-8") as file:
+        file.write("\n[more](../../examples/more/README.md)\n")
+
+    run = build(tmp_path, tmp_path / "site")
+
+    assert run.returncode == 0, run.stdout + run.stderr
+    more = tmp_path / "site" / "files" / "examples" / "more"
+    page = (more / "index.html").read_text(encoding="utf-8")
+    assert [
+        link for link in ("../solve.py.html", "data.bin", "../../../glossary.html#sources") if link not in page
+    ] == []
+    assert (more / "data.bin").read_bytes() == b"\x00\x01"
+    assert "write_run" in (more.parent / "solve.py.html").read_text(encoding="utf-8")
+    install = (tmp_path / "site" / "guides" / "install.html").read_text(encoding="utf-8")
+    assert '"../files/examples/more/index.html"' in install
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("page", "text", "warning"),
@@ -139,9 +170,7 @@ def test_the_site_loads_nothing_from_the_network_and_shows_all_formulas(site: Pa
 def test_a_link_to_nowhere_and_a_forgotten_page_end_the_build(
     tmp_path: Path, page: str, text: str, warning: str
 ) -> None:
-    for name in ("docs", "examples"):
-        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "mkdocs.yml", tmp_path)
+    copy_sources(tmp_path)
     with (tmp_path / "docs" / page).open("a", encoding="utf-8") as file:
         file.write(f"\n{text}\n")
 

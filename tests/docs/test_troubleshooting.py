@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from builders.commands import run_command
 
-pytestmark = pytest.mark.usefixtures("kept_solutions", "sketched_pictures")
+pytestmark = pytest.mark.usefixtures("kept_solutions")
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")

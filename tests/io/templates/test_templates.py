@@ -113,6 +113,17 @@ def test_every_file_of_a_template_goes_into_the_wheel(repository: Path, template
         assert sources == [Path("cells", name)]
 
 
+def test_every_template_has_its_row_with_a_picture_in_the_guide(repository: Path, template: Template) -> None:
+    guide = (repository / "docs" / "guides" / "templates.md").read_text(encoding="utf-8")
+    (row,) = [line for line in guide.splitlines() if line.startswith(f"| `{template.name}`: ")]
+
+    assert f"`cells/{template.source}`" in row
+    assert all(f"`cells/{name}`" in row for name in template.files if name.startswith("robots/"))
+    assert f"](../images/templates/{template.name}.png) |" in row
+    picture = repository / "docs" / "images" / "templates" / f"{template.name}.png"
+    assert 5_000 < picture.stat().st_size < 60_000
+
+
 def test_an_unknown_template_is_refused_with_those_that_there_are() -> None:
     with pytest.raises(InputError, match=r"expected one of two-robots, .*, got 'turntble', did you mean 'turntable'\?"):
         template_named("turntble")
