@@ -15,10 +15,11 @@ The public interface; everything else may change without notice:
   ``search_layout``, ``repair``, ``rehearse``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
-  ``export_program``; 3-D pages: ``view``, ``write_view``
+  ``export_program``; 3-D pages: ``view``, ``write_view``; floor plans:
+  ``requested_floor_plan``, ``write_floor_plan``
 - show: ``tables``, ``to_frame``, ``to_html``: results as pandas frames, and in a notebook
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``
+  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``, ``FloorPlanRequest``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
   ``LayoutResult``, ``Repair``, ``VerifiedRun``
 - errors: ``CellplanError``
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from cellplan.pipeline.export import export_program
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
     from cellplan.pipeline.fastest.write import write_fastest
+    from cellplan.pipeline.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.layout.request import LayoutRequest
     from cellplan.pipeline.layout.search import LayoutResult, search_layout
@@ -84,6 +86,7 @@ _HOME: Final = {
     "CellplanError": "errors",
     "Check": "model.report",
     "CompareJob": "pipeline.compare",
+    "FloorPlanRequest": "pipeline.floor_plan_file",
     "LayoutRequest": "pipeline.layout.request",
     "LayoutResult": "pipeline.layout.search",
     "MapRequest": "pipeline.base_map.prepared",
@@ -112,6 +115,7 @@ _HOME: Final = {
     "open_gate": "pipeline.gate.open_gate",
     "rehearse": "pipeline.rehearsal.rehearse",
     "repair": "pipeline.repair.repair",
+    "requested_floor_plan": "pipeline.floor_plan_file",
     "screen": "pipeline.screen",
     "search_layout": "pipeline.layout.search",
     "solve": "pipeline.solve",
@@ -123,6 +127,7 @@ _HOME: Final = {
     "view": "pipeline.view.write",
     "write_base_map": "pipeline.base_map.judged",
     "write_fastest": "pipeline.fastest.write",
+    "write_floor_plan": "pipeline.floor_plan_file",
     "write_repair": "pipeline.repair.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
@@ -137,6 +142,7 @@ __all__ = [
     "CellplanError",
     "Check",
     "CompareJob",
+    "FloorPlanRequest",
     "LayoutRequest",
     "LayoutResult",
     "MapRequest",
@@ -166,6 +172,7 @@ __all__ = [
     "open_gate",
     "rehearse",
     "repair",
+    "requested_floor_plan",
     "screen",
     "search_layout",
     "solve",
@@ -177,6 +184,7 @@ __all__ = [
     "view",
     "write_base_map",
     "write_fastest",
+    "write_floor_plan",
     "write_rehearsal",
     "write_repair",
     "write_run",

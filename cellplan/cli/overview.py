@@ -18,6 +18,7 @@ First steps:
 
 cellplan --help lists all commands, cellplan COMMAND --help what one of them can do."""
 EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
+    "init": ("cellplan init my-cell", "cellplan init --list", "cellplan init my-rail --template rail"),
     "check": ("cellplan check cell.yaml --watch", "cellplan check cell.yaml --set robots.kuka.base.x_mm=900"),
     "solve": (
         "cellplan solve cell.yaml --view",
@@ -25,8 +26,12 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
         "cellplan solve cell.yaml --watch --view",
     ),
     "view": ("cellplan view outputs/cell", "cellplan view cell.yaml --set robots.kuka.base.x_mm=900"),
+    "floorplan": ("cellplan floorplan outputs/cell", "cellplan floorplan cell.yaml --format dxf -o cell.dxf"),
     "verify": ("cellplan verify outputs/cell --cell cell.yaml",),
-    "export": ("cellplan export outputs/cell --format csv --cell cell.yaml",),
+    "export": (
+        "cellplan export outputs/cell --format csv --cell cell.yaml",
+        "cellplan export outputs/cell --format wide --cell cell.yaml",
+    ),
     "layout": ("cellplan layout cell.yaml --repair", "cellplan layout cell.yaml --objective cycle --budget 5min"),
     "map": ("cellplan map cell.yaml --robot kuka --grid 100 --certify 3",),
     "fastest": ("cellplan fastest cell.yaml -o outputs/fastest", "cellplan fastest cell.yaml --demand 120/h"),

@@ -56,6 +56,10 @@ class FloorPlanRequest:
 def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = silent) -> FloorPlan:
     """The floor plan of a run with what its motion sweeps, or of a cell file at its start.
 
+    Args:
+        request: Which run or cell.
+        progress: Called with the stage and the fraction done.
+
     Raises:
         InputError: The path is neither a run nor a cell, or does not fit the options.
     """
@@ -69,15 +73,22 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
     return _of_cell(cell, progress)
 
 
-def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat) -> int:
+def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = PlanFormat.SVG) -> int:
     """Write a floor plan whole or not at all; gives the size of the file in bytes.
 
+    Args:
+        plan: What ``requested_floor_plan`` returned.
+        target: The file; an older floor plan there is replaced.
+        form: ``svg`` or ``dxf``.
+
     Raises:
+        ValueError: There is no such format.
         InputError: The place holds something else or cannot be written, or ``ezdxf`` is missing.
     """
+    kind = PlanFormat(form)
     if target.is_symlink() or (target.exists() and not _is_floor_plan(target)):
         raise InputError(f"{target}: holds something that is no floor plan; choose another file with -o")
-    content = (floor_plan_svg(plan) if form is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
+    content = (floor_plan_svg(plan) if kind is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, content)

@@ -48,7 +48,7 @@ def folder(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         ("map cells/four_robots.yaml --robot k", ["kuka"]),
         ("robots kuka_kr6", ["kuka_kr6", "kuka_kr6_maker_zero"]),
         ("robots ar", ["arm.urdf"]),
-        ("export outputs/run --format ", ["csv"]),
+        ("export outputs/run --format ", ["csv", "wide"]),
         ("layout cells/four_robots.yaml --objective c", ["conforming", "cycle", "clearance", "change"]),
         ("--install-completion ", ["bash", "zsh", "fish"]),
     ],

@@ -113,7 +113,7 @@ def test_other_formats_are_refused_by_name(copy: Copy, name: str, capsys: pytest
     status = run(["export", str(copy.run), "--cell", str(copy.cell), "--format", name])
 
     assert status == 2
-    assert capsys.readouterr().err.startswith(f"error: --format: expected one of csv, got '{name}'")
+    assert capsys.readouterr().err.startswith(f"error: --format: expected one of csv, wide, got '{name}'")
 
 
 def test_a_rehearsal_is_no_run(copy: Copy, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -185,11 +185,13 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
 
     assert {path.name for path in folder.iterdir()} == {
         "cell.yaml",
+        "floor_plan.svg",
         "manifest.json",
         "plots",
         "report.html",
         "report.json",
         "series.json",
+        "still.svg",
         "tables",
     }
     assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli", "clock"}

@@ -1,6 +1,7 @@
 """The gate: what it lets through, what it says of the rest, and that there is no way round it."""
 
 import ast
+import inspect
 import json
 import re
 import shutil
@@ -19,6 +20,7 @@ from cellplan.guard import isolated_call
 from cellplan.model.motion import Resolution
 from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
+from cellplan.pipeline.export import EXPORTERS
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -88,11 +90,9 @@ def test_the_seal_is_held_by_the_gate_alone() -> None:
 
 
 def test_every_exporter_takes_a_verified_run_and_nothing_else() -> None:
-    for path in (PACKAGE / "export").glob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and node.name.startswith("render_"):
-                annotations = [ast.unparse(argument.annotation) for argument in node.args.args if argument.annotation]
-                assert annotations == [VerifiedRun.__name__], f"{path.name}: {node.name}"
+    for name, exporter in EXPORTERS.items():
+        signature = inspect.signature(exporter.render)
+        assert [each.annotation for each in signature.parameters.values()] == [VerifiedRun], name
 
 
 def test_other_versions_are_reported_and_do_not_matter(copy: Path) -> None:
