@@ -61,3 +61,11 @@ def test_every_decision_is_listed_under_its_number() -> None:
     assert [
         title for title, record in zip(titles, records, strict=True) if f"# {int(record.name[:4])}. " not in title
     ] == []
+
+
+def test_what_shows_a_guarantee_exists() -> None:
+    page = (ROOT / "docs" / "reference" / "guarantees.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`((?:tests|benchmarks)/[\w./]+)", page))
+
+    assert len(named) > 100
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
