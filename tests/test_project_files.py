@@ -65,7 +65,7 @@ def test_every_decision_is_listed_under_its_number() -> None:
 
 def test_what_shows_a_guarantee_exists() -> None:
     page = (ROOT / "docs" / "reference" / "guarantees.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"`((?:tests|benchmarks)/[\w./]+)", page))
+    named = set(re.findall(r"`((?:tests|benchmarks)/[\w./]+)`", page))
 
     assert len(named) > 100
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
