@@ -120,7 +120,8 @@ def _abb_rows(abb: Numbers) -> list[Row]:
                 f"ABB {joint}: range in mode 3 and 1",
                 "larger in mode 3",
                 f"{compared(joint, 'range_deg')} deg",
-                holds=alone[joint]["range_deg"] > together[joint]["range_deg"],
+                holds=(is_larger := alone[joint]["range_deg"] > together[joint]["range_deg"]),
+                difference="none" if is_larger else "smaller in mode 3",
             )
             for joint in MODE_3_MORE
         ),
