@@ -6,6 +6,8 @@ from reproduction.runs import Curves, Numbers, curves, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints
 
 REGION = 0.04  # epsilon of Eq. 2.12: damping sets in where the smallest singular value falls below it
+PRINTED = "printed_best_first"  # Algorithm 1 without what ours adds
+UPWARDS = {"tasks.circle.path.circle.direction": "clockwise"}  # the circle begins towards +z
 ONSET = (2.0, 3.0)  # [s] the arm comes to the singular point of the circle at 3 s
 
 
@@ -15,7 +17,15 @@ def measure_circle() -> Numbers:
     damped = curves(paper_cell("nicolato_circle", method="damped_least_squares"))
     _draw_motion("nicolato_circle_search", search)
     _draw_motion("nicolato_circle_dls", damped)
-    return {"search": _motion(search), "dls": _motion(damped) | {"damped_from_s": _damped_from(damped)}}
+    return {
+        "search": _motion(search),
+        "printed": _motion(curves(paper_cell("nicolato_circle", method=PRINTED))),
+        "dls": _motion(damped) | {"damped_from_s": _damped_from(damped)},
+        "upwards": {
+            "search": _motion(curves(paper_cell("nicolato_circle", values=UPWARDS))),
+            "dls": _motion(curves(paper_cell("nicolato_circle", values=UPWARDS, method="damped_least_squares"))),
+        },
+    }
 
 
 def measure_line() -> Numbers:
@@ -24,7 +34,8 @@ def measure_line() -> Numbers:
     damped = curves(paper_cell("nicolato_line", method="damped_least_squares"))
     _draw_motion("nicolato_line_search", search)
     _draw_motion("nicolato_line_dls", damped)
-    return {"search": _motion(search), "dls": _motion(damped)}
+    printed = curves(paper_cell("nicolato_line", method=PRINTED))
+    return {"search": _motion(search), "printed": _motion(printed), "dls": _motion(damped)}
 
 
 def measure_limits() -> Numbers:
@@ -72,6 +83,7 @@ def _motion(run: Curves) -> Numbers:
         "error_at_s": run.t[run.error.argmax()],
         "speed_rad_s": np.abs(run.qd).max(),
         "acceleration_rad_s2": np.abs(run.qdd).max(),
+        "iterations": 0.0 if run.iterations is None else np.mean(run.iterations),
         "travel_rad": np.abs(np.diff(run.q, axis=0)).sum(axis=0),
     }
 

@@ -5,23 +5,22 @@ from reproduction.verdicts import Row, alone, bound, claim, shown
 
 ONSET = 2.85  # [s]
 STEP = 0.01  # [s] of the circle
+FOUND = 4.5e-8  # [m] printed error of the search
 LARGE = 1e-3  # [m] an error that is large beside a tolerance of 1e-7 m
 SEARCHED = 1e-5  # [m] tolerance of section 4.2
 CLOSED = 0.001  # [deg] drift of a joint that comes back
 
 
+SMOOTH = 2.0  # [-] times the acceleration of the smoothest motion on the same path: more is not smooth
+
+
 def circle_rows(numbers: Numbers) -> list[Row]:
     """Search and damped least squares on the circle."""
-    search, dls = numbers["search"], numbers["dls"]
+    search, dls, upwards = numbers["search"], numbers["dls"], numbers["upwards"]
     onset = dls["damped_from_s"]
     return [
         bound("search: largest error", search["error_m"], 4.5e-8, "m"),
-        claim(
-            "search: smooth through the singular point",
-            "smooth",
-            f"at most {shown(search['speed_rad_s'])} rad/s and {shown(search['acceleration_rad_s2'])} rad/s²",
-            holds=search["acceleration_rad_s2"] < dls["acceleration_rad_s2"],
-        ),
+        *_smooth_rows("through the singular point", search, numbers["printed"]),
         claim(
             "DLS: damping sets in",
             f"about {ONSET:g} s",
@@ -41,7 +40,45 @@ def circle_rows(numbers: Numbers) -> list[Row]:
             f"at most {shown(dls['speed_rad_s'])} rad/s and {shown(dls['acceleration_rad_s2'])} rad/s²",
             holds=dls["acceleration_rad_s2"] > 2 * search["acceleration_rad_s2"],
         ),
+        claim(
+            "circle begun towards +z: search",
+            "smooth, negligible error",
+            f"{shown(upwards['search']['error_m'])} m, {_pace(upwards['search'])}",
+            holds=upwards["search"]["error_m"] < FOUND
+            and upwards["search"]["acceleration_rad_s2"] < SMOOTH * search["acceleration_rad_s2"],
+        ),
+        claim(
+            "circle begun towards +z: DLS",
+            "error grows markedly, not smooth",
+            f"{shown(1e3 * upwards['dls']['error_m'])} mm, at most {shown(upwards['dls']['speed_rad_s'])} rad/s and "
+            f"{shown(upwards['dls']['acceleration_rad_s2'])} rad/s²",
+            holds=upwards["dls"]["error_m"] > LARGE
+            and upwards["dls"]["acceleration_rad_s2"] > SMOOTH * search["acceleration_rad_s2"],
+        ),
     ]
+
+
+def _smooth_rows(where: str, ours: Numbers, printed: Numbers) -> list[Row]:
+    """Whether the joints move smoothly: ours, and Algorithm 1 as printed."""
+    return [
+        claim(
+            f"search as printed: smooth {where}",
+            "smooth",
+            _pace(printed),
+            holds=printed["acceleration_rad_s2"] < SMOOTH * ours["acceleration_rad_s2"],
+            difference=f"{shown(printed['acceleration_rad_s2'] / ours['acceleration_rad_s2'])} times ours",
+        ),
+        alone(f"ours, with momentum and passes combined: smooth {where}", _pace(ours)),
+        alone(
+            f"moves of a joint per sample {where}: as printed; rounds of ours",
+            f"{shown(printed['iterations'])}; {shown(ours['iterations'])} rounds of at most three moves",
+        ),
+    ]
+
+
+def _pace(run: Numbers) -> str:
+    """How fast and how suddenly the joints move."""
+    return f"at most {shown(run['speed_rad_s'])} rad/s and {shown(run['acceleration_rad_s2'])} rad/s²"
 
 
 def line_rows(numbers: Numbers) -> list[Row]:
@@ -49,12 +86,7 @@ def line_rows(numbers: Numbers) -> list[Row]:
     search, dls = numbers["search"], numbers["dls"]
     return [
         bound("search: largest error (its tolerance)", search["error_m"], 1e-7, "m"),
-        claim(
-            "search: smooth on singular points",
-            "smooth",
-            f"at most {shown(search['speed_rad_s'])} rad/s and {shown(search['acceleration_rad_s2'])} rad/s²",
-            holds=search["acceleration_rad_s2"] < dls["acceleration_rad_s2"],
-        ),
+        *_smooth_rows("on singular points", search, numbers["printed"]),
         claim(
             "DLS",
             "fails",

@@ -1,5 +1,6 @@
 """Solving a paper's cell and keeping its curves: path, errors, joints, conditioning."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -7,11 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import cellplan.planning.methods
 from cellplan import Cell, Report, load_cell, solve
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Any]  # what was measured, by name: numbers, truths, lists of numbers, or more of these
-PAPERS = Path(__file__).resolve().parent.parent.parent / "cells" / "papers"
+FOLDER = Path(__file__).resolve().parent
+PAPERS = FOLDER.parent.parent / "cells" / "papers"
+OWN_METHODS = FOLDER / "methods"  # resolution methods that only these pages compare
 DIGITS = 3  # [-] of a recorded figure: what the page can show; the rest depends on the processor's rounding
 NOTHING = 1e-12  # smaller figures are rounding, and recorded as zero
 
@@ -27,6 +31,7 @@ class Curves:
         actual: Actual place of the tool, shape (N, 3).
         turn: Angle from the desired orientation, shape (N,).
         report: The whole report.
+        iterations: Evaluations, rounds or moves of each step, shape (N - 1,); None where the method counts none.
     """
 
     t: Array
@@ -35,6 +40,7 @@ class Curves:
     actual: Array
     turn: Array
     report: Report
+    iterations: Array | None
 
     @property
     def error(self) -> Array:
@@ -61,9 +67,13 @@ class Curves:
         return np.asarray(self.t >= instant - 1e-9)
 
 
-def paper_cell(name: str, *, method: str | None = None) -> Cell:
-    """A cell of ``cells/papers``, as ``--method`` would change it."""
+def paper_cell(name: str, *, method: str | None = None, values: Mapping[str, object] | None = None) -> Cell:
+    """A cell of ``cells/papers``, as ``--set`` and ``--method`` would change it; also by a method of these pages."""
     cell = load_cell(PAPERS / f"{name}.yaml")
+    if values is not None:
+        cell = cell.with_values(values)
+    if method is not None and str(OWN_METHODS) not in cellplan.planning.methods.__path__:
+        cellplan.planning.methods.__path__.append(str(OWN_METHODS))
     return cell if method is None else replace(cell, solver=replace(cell.solver, method=method))  # type: ignore[arg-type]
 
 
@@ -79,6 +89,7 @@ def curves(cell: Cell) -> Curves:
         actual=desired - accuracy.position_error,
         turn=np.asarray(np.linalg.norm(accuracy.orientation_error, axis=1)),
         report=run.report,
+        iterations=run.motion.iterations,
     )
 
 

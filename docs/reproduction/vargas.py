@@ -1,10 +1,7 @@
 """Vargas, Leite and Costa 2012, section 4: three paths of a planar arm, each by three methods."""
 
-from pathlib import Path
-
 import numpy as np
 
-import cellplan.planning.methods
 from reproduction.runs import Array, Curves, Numbers, curves, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints, path_curve
 
@@ -15,7 +12,6 @@ METHODS = {
 }
 SETTLED = 5.0  # [s] 25 time constants of the feedback: what is left of the start error is rounding
 PASSED_BY = 30.0  # [s] half of the way from the singular point of case III to its end is behind the arm
-OWN_METHODS = Path(__file__).resolve().parent / "methods"
 OTHER_READING = "squared_vargas_damping"  # lambda^2 I in Eq. 9
 NAMES = ("$q_1$", "$q_2$", "$q_3$")
 ERRORS = {1: (-0.1, 0.6), 2: (-0.05, 0.3), 3: (-0.1, 0.6)}  # [m] axes of figures 6, 10 and 14
@@ -33,15 +29,8 @@ def measure(case: int) -> Numbers:
         float(np.linalg.norm(a - b, axis=1).max()) for i, a in enumerate(places) for b in places[i + 1 :]
     )
     if case > 1:
-        numbers["squared"] = _of_one(_other_reading(case))
+        numbers["squared"] = _of_one(curves(paper_cell(f"vargas_case_{case}", method=OTHER_READING)))
     return numbers
-
-
-def _other_reading(case: int) -> Curves:
-    """Damped least squares with ``J J^T + lambda^2 I``."""
-    if str(OWN_METHODS) not in cellplan.planning.methods.__path__:
-        cellplan.planning.methods.__path__.append(str(OWN_METHODS))
-    return curves(paper_cell(f"vargas_case_{case}", method=OTHER_READING))
 
 
 def _of_one(run: Curves) -> Numbers:
