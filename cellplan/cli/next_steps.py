@@ -2,9 +2,10 @@
 
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final
 
+from cellplan.io.run.manifest import own_inputs
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.cell import Cell
 from cellplan.pipeline.synchronous import is_searchable
@@ -54,9 +55,10 @@ def export_line(run: Path, cell: Path | None, allow_dirs: Sequence[Path]) -> str
     return _line("export", str(run), "--format", "csv", *words, *_folders(allow_dirs))
 
 
-def view_line(run: Path, cell: Path, allow_dirs: Sequence[Path]) -> str:
-    """The line to type for the 3-D page of a run."""
-    named = ["--cell", str(cell), *_folders(allow_dirs)] if allow_dirs else []
+def view_line(run: Path, cell: Path, solved: Cell, allow_dirs: Sequence[Path]) -> str:
+    """The line to type for the 3-D page of a run; with its cell file where that names files of its own."""
+    own = own_inputs(solved.inputs, PurePath(solved.origin.file).name)
+    named = ["--cell", str(cell), *_folders(allow_dirs)] if own else []
     return _line("view", str(run), *named)
 
 

@@ -43,7 +43,7 @@ KeepRejected = Annotated[
 
 WithView = Annotated[
     bool,
-    typer.Option("--view", help="Write the 3-D page view.html too, as cellplan view does; the report leads to it."),
+    typer.Option("--view", help="Write the 3-D page view.html too, as cellplan view does."),
 ]
 
 
@@ -141,7 +141,7 @@ def _result(request: _Request, changed: "Cell", solution: "Solution", record: "R
     status = ExitStatus.PASSED if solution.passed else ExitStatus.CHECK_FAILED
     lines = summary_lines(record, folder)
     lines += [f"3-D page: {folder / 'view.html'}"] if request.with_view else []
-    lines += [] if request.with_view else [view_line(folder, request.cell, request.allow_dirs)]
+    lines += [] if request.with_view else [view_line(folder, request.cell, changed, request.allow_dirs)]
     if request.task is None:
         failed = [check["name"] for check in record["checks"] if not check["passed"]]
         lines += after_solve(request.cell, changed, failed, run=folder, allow_dirs=request.allow_dirs)
@@ -160,7 +160,6 @@ def _written(solution: "Solution", folder: Path, request: _Request, progress: Li
         folder,
         keep_rejected=request.keep_rejected,
         formats=request.plot_formats,
-        view=request.with_view,
         progress=progress,
     )
     if request.with_view:

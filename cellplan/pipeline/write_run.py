@@ -2,14 +2,14 @@
 
 from collections.abc import Collection, Mapping
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Final
 
 import cellplan
 from cellplan.io.cell.write import render_cell
 from cellplan.io.run.folder import MANIFEST, RunFolder
 from cellplan.io.run.joint_tables import program_digest
-from cellplan.io.run.manifest import render_manifest
+from cellplan.io.run.manifest import own_inputs, render_manifest
 from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
@@ -17,7 +17,9 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
 from cellplan.pipeline.early_files import early_files, with_early_files
 from cellplan.pipeline.solution import Run, Solution
-from cellplan.report.page.render import Beside, overview_page, report_page, view_beside
+from cellplan.report.page.links import VIEW_PAGE
+from cellplan.report.page.render import Beside, overview_page, report_page
+from cellplan.report.page.view import unmade_view_page
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
@@ -42,14 +44,14 @@ def write_run(
     keep_rejected: bool = False,
     progress: Progress = silent,
     formats: Collection[str] = (),
-    view: bool = False,
 ) -> Record:
     """Write a run folder; it appears whole or not at all.
 
     The folder holds ``report.json``, ``series.json``, ``report.html``, ``plots/`` and ``cell.yaml``; as drawings
     ``still.svg`` and ``floor_plan.svg``; ``tables/`` only if every check passed. The phases of a program with one for
-    each task have reports, drawings and plots of their own in subfolders, and an overview above them. Last comes
-    ``manifest.json``, which names every file.
+    each task have reports, drawings and plots of their own in subfolders, and an overview above them. After them comes
+    ``manifest.json``, which names every file but ``view.html``: there stands the 3-D page once ``write_view`` made it,
+    and until then how to make it.
 
     Args:
         solution: The solution.
@@ -57,7 +59,6 @@ def write_run(
         keep_rejected: Write the tables of a failed solution too, under ``rejected/``, marked in every header.
         progress: Called with the stage and the fraction done.
         formats: Further formats of the plots beside SVG: ``png``, ``pdf``; both need matplotlib.
-        view: Whether the pages lead to the 3-D page, which ``write_view`` adds.
 
     Returns:
         The record in the ``report.json`` of the folder.
@@ -74,22 +75,24 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            beside = Beside(view=view_beside(run.name or "") if view else "", files=tables)
-            record = _write_report(target, run.cell_of(cell), run, provenance, formats, beside)
+            record = _write_report(target, run.cell_of(cell), run, provenance, formats, Beside(files=tables))
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
             target.write_text("report.json", as_json(record))
             phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
-            beside = Beside(view=view_beside("") if view else "", files=tables)
-            beside |= _write_drawings(target, "", program_drawings(cell, phases))
+            beside = Beside(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
             target.write_text("report.html", overview_page(record, cell=cell, **beside))
         target.write_text("cell.yaml", render_cell(cell))
         if has_tables:
             _write_tables(target, program, released)
         manifest = render_manifest(cell, passed=solution.passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
+        file = PurePath(cell.origin.file).name
+        target.write_text(
+            VIEW_PAGE, unmade_view_page(cell.name, cell_file=file if own_inputs(cell.inputs, file) else "")
+        )
     return record
 
 

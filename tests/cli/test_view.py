@@ -1,12 +1,14 @@
 """``cellplan view`` from the shell: what is said, what is written, how it ends."""
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 
 import pytest
 
 from cellplan.cli.main import run
+from cellplan.report.page.view import unmade_view_page
 
 
 def test_a_run_gets_its_page_beside_its_report(sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -76,20 +78,37 @@ def test_what_cannot_be_shown_ends_with_one_line(
     assert (tmp_path / "mine.txt").read_text() == "mine"
 
 
-def test_a_solved_cell_brings_its_page_and_stays_verifiable(
-    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_solved_cell_brings_its_page_and_a_page_made_later_stands_in_the_same_run(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cell = sound / "cell" / "small.yaml"
+    monkeypatch.chdir(tmp_path)
 
-    assert run(["solve", str(cell), "--view", "-q", "-o", str(tmp_path / "run")]) == 0
+    assert run(["solve", str(cell), "--view", "-q", "-o", "at-once"]) == 0
+    assert "3-D page: at-once/view.html" in capsys.readouterr().out
+    assert run(["solve", str(cell), "-q", "-o", "later"]) == 0
+    (line,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("next: cellplan view"))
+    before = contents(Path("later"))
+    assert run([*shlex.split(line.removeprefix("next: cellplan ")), "-q"]) == 0
+    after = contents(Path("later"))
 
-    assert f"3-D page: {tmp_path / 'run' / 'view.html'}" in capsys.readouterr().out
-    report = (tmp_path / "run" / "report.html").read_text()
-    assert '<a class="view-link" href="view.html"' in report
-    assert 'href="view.html#t=' in report
-    assert (tmp_path / "run" / "view.html").is_file()
-    assert run(["verify", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0
-    shutil.copy(tmp_path / "run" / "view.html", tmp_path / "other.html")
-    assert run(["view", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0
-    assert (tmp_path / "run" / "view.html").read_bytes() == (tmp_path / "other.html").read_bytes()
+    assert {name for name, content in after.items() if content != before[name]} == {"view.html"}
+    assert after == contents(Path("at-once"))
+    assert b'<a class="go" href="view.html#t=' in after["report.html"]
+    for made_later in ("at-once", "later"):
+        assert run(["verify", made_later, "--cell", str(cell), "-q"]) == 0
     capsys.readouterr()
+
+
+def test_until_the_page_is_made_the_place_of_it_says_how(sound: Path) -> None:
+    page = (sound / "run" / "view.html").read_text()
+
+    assert "<code>cellplan view RUN --cell CELL</code>" in page
+    assert "small.yaml" in page
+    assert "<script" not in page
+    assert "&lt;b&gt;" in unmade_view_page("<b>", cell_file="")
+    assert "<code>cellplan view RUN</code>" in unmade_view_page("four-robots", cell_file="")

@@ -193,6 +193,7 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
         "series.json",
         "still.svg",
         "tables",
+        "view.html",
     }
     assert {path.stem for path in (folder / "tables").iterdir()} == {"reis", "kuka", "abb", "staubli", "clock"}
     assert record["status"] == "passed"

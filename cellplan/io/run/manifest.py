@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, Final
@@ -56,7 +56,17 @@ class Manifest:
     @property
     def own_inputs(self) -> tuple[str, ...]:
         """Files beside the cell file that the cell names; robots that come with the program are not among them."""
-        return tuple(name for name in self.inputs if name != self.cell_file and not name.startswith(BUNDLED))
+        return own_inputs(self.inputs, self.cell_file)
+
+
+def own_inputs(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
+    """Files that a cell names, but for those that come with the program.
+
+    Args:
+        inputs: Names of all files that were read.
+        cell_file: Name of the cell file among them, without folders.
+    """
+    return tuple(name for name in inputs if name != cell_file and not name.startswith(BUNDLED))
 
 
 def render_manifest(

@@ -12,7 +12,7 @@ from cellplan.pipeline.gate.compare_drawings import CellDrawings, foreign_drawin
 from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
-from cellplan.report.page.render import Beside, has_view_links, overview_page, report_page, view_beside
+from cellplan.report.page.render import Beside, overview_page, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record
@@ -98,11 +98,9 @@ def _page_finding(
 
 
 def _beside(stored: StoredRun, place: str) -> Beside:
-    """What lies beside a page of the run: the 3-D page where it leads there, and the drawings of the cell on disk."""
-    text = stored.content(place, PAGE).decode("utf-8", "replace")
+    """What lies beside a page of the run: its tables, and the drawings of the cell on disk."""
     found = stored_drawings(stored, place, (STILL, FLOOR_PLAN))
-    view = view_beside(place) if has_view_links(text) else ""
-    return {"view": view, "still": found[STILL], "floor_plan": found[FLOOR_PLAN], "files": tuple(stored.manifest.files)}
+    return {"still": found[STILL], "floor_plan": found[FLOOR_PLAN], "files": tuple(stored.manifest.files)}
 
 
 def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:

@@ -19,7 +19,7 @@ from cellplan.pipeline.view.cell_scene import unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.run_scene import run_scene
 from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
-from cellplan.report.page.render import VIEW_PAGE
+from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.view import is_view_page, view_page
 from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
 from cellplan.study.folder import JOURNAL, RESULT, write_whole

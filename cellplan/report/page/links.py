@@ -10,6 +10,7 @@ Links = list[tuple[str, str]]  # text and address
 TABLES: Final = {"tables": "Joint tables", "rejected": "Joint tables of a failed run, not for use"}
 STILL: Final = "still.svg"  # picture of the worst instant, beside the page
 FLOOR_PLAN: Final = "floor_plan.svg"  # likewise
+VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
 
 
 def file_links(
@@ -23,12 +24,22 @@ def file_links(
         beside: Names of other files in that folder.
         phase: Phase of the page, which lies in a folder of its own; None for the page in the run folder.
     """
-    up = "../" if phase is not None else ""
+    up = _up(phase)
     found = {title: _tables(tables, folder, up) for folder, title in TABLES.items()}
     of_the_run = [(name, f"{up}{name}") for name in ("cell.yaml", "manifest.json")]
     found["Results"] = [*((name, name) for name in beside), *of_the_run]
     found["Plots"] = [(PurePosixPath(name).stem.replace("_", " "), f"plots/{quote(name)}") for name in plots]
     return {title: links for title, links in found.items() if links}
+
+
+def view_link(phase: str | None) -> str:
+    """Address of the 3-D page of a run, seen from the page of a phase, or from the page in the run folder."""
+    return f"{_up(phase)}{VIEW_PAGE}"
+
+
+def _up(phase: str | None) -> str:
+    """The way from the folder of a page to the run folder, to be put before a name."""
+    return "../" if phase is not None else ""
 
 
 def _tables(files: Collection[str], folder: str, up: str) -> Links:

@@ -13,7 +13,7 @@ from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
 from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
-from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links
+from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
@@ -47,8 +47,6 @@ OUTCOMES: Final = {
     "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
     "unfinished": "has not converged within the allowed rounds",
 }
-VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
-VIEW_LINKS: Final = '<a class="view-link"'  # stands in pages that lead to it
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
 NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
@@ -57,7 +55,6 @@ FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds ar
 class Beside(TypedDict, total=False):
     """What lies beside a page, and the pictures in it; what is left out is empty."""
 
-    view: Annotated[str, "where the 3-D page lies from there"]
     still: Annotated[
         str, "picture of `worst_instant(record)` as the text of an SVG element; `still.svg` lies beside it"
     ]
@@ -111,7 +108,7 @@ def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Li
 
 def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, object]:
     """What the pages of one run and of several have in common."""
-    shift = Shifts(record)
+    shift, view = Shifts(record), view_link(record.get("phase"))
     return {
         "figures": key_figures(record),
         "failures": failure_groups(record),
@@ -126,21 +123,11 @@ def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, objec
         "line": time_line(record, cell),
         "shift": shift,
         "whole_shift": clearance_shift(record, shift),
-        "at": TimeLinks(beside.get("view", ""), page_begin(record)),
-        "view": beside.get("view", ""),
+        "at": TimeLinks(view, page_begin(record)),
+        "view": view,
         "still": svg_element(beside.get("still", "")),
         "floor_plan_svg": svg_element(beside.get("floor_plan", "")),
     }
-
-
-def view_beside(place: str) -> str:
-    """Where the 3-D page of a run lies, seen from the page in one of its folders, or from its own page."""
-    return f"../{VIEW_PAGE}" if place else VIEW_PAGE
-
-
-def has_view_links(page: str) -> bool:
-    """Whether a page of a run leads to its 3-D page."""
-    return VIEW_LINKS in page
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:

@@ -1,4 +1,4 @@
-"""Times on a page: each may be chosen there, and leads to the 3-D page where there is one."""
+"""Times on a page: each may be chosen there, and leads to the 3-D page."""
 
 from dataclasses import dataclass
 from html import escape
@@ -17,7 +17,7 @@ class TimeLink:
     Attributes:
         text: What is printed.
         at: The instant in [s] on the clock of the page.
-        address: Address of the 3-D page at that instant; empty without one.
+        address: Address of the 3-D page at that instant.
     """
 
     text: str
@@ -26,8 +26,6 @@ class TimeLink:
 
     def __html__(self) -> str:
         """The element; templates take it as it is."""
-        if not self.address:
-            return f'<span class="at" data-at="{self.at}">{self.text}</span>'
         return f'<a class="at" data-at="{self.at}" href="{escape(self.address)}">{self.text}</a>'
 
 
@@ -36,7 +34,7 @@ class TimeLinks:
     """Writer of times that may be chosen, ``at(1.626)`` in templates.
 
     Attributes:
-        view: Where the 3-D page lies from the page; empty without one.
+        view: Where the 3-D page lies from the page.
         begin: Time in [s] at which the clock of the page begins on that of the whole program, which the 3-D page has.
     """
 
@@ -53,7 +51,7 @@ class TimeLinks:
         if at is None or shift is None:
             return fixed(at, 3)
         chosen = round(shift + at, DIGITS)
-        return TimeLink(fixed(at, 3), chosen, self.address(chosen) if self.view else "")
+        return TimeLink(fixed(at, 3), chosen, self.address(chosen))
 
     def address(self, t: float) -> str:
         """Address of the 3-D page at an instant of the page's clock in [s]."""

@@ -44,6 +44,16 @@ def view_page(record: ViewRecord) -> str:
     )
 
 
+def unmade_view_page(cell: str, *, cell_file: str) -> str:
+    """What stands in a run folder in place of its 3-D page until that is made: the line that makes it.
+
+    Args:
+        cell: Name of the cell.
+        cell_file: Name of its cell file where that line must name it; empty otherwise.
+    """
+    return template("view/unmade.html").render(cell=cell, cell_file=cell_file, mark=MARK)
+
+
 def _about(record: ViewRecord) -> Iterator[str]:
     """How exact the page is."""
     if record["scenes"][0]["visuals"]:

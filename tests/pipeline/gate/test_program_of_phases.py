@@ -50,7 +50,7 @@ def test_all_phases_stand_in_one_table_per_robot_with_a_line_between_them(solved
     assert sorted(path.name for path in (folder / "tables").iterdir()) == ["clock.csv", "left.csv", "right.csv"]
     assert sorted(path.name for path in folder.iterdir()) == [
         *("cell.yaml", "first", "floor_plan.svg", "manifest.json", "report.html", "report.json", "second"),
-        *("still.svg", "tables"),
+        *("still.svg", "tables", "view.html"),
     ]
     for robot in ("left", "right"):
         text = (folder / "tables" / f"{robot}.csv").read_text()

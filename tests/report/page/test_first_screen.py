@@ -134,7 +134,6 @@ def test_a_time_of_a_page_leads_to_that_of_the_program(begin: float) -> None:
     assert link.address == f"../view.html#t={round(begin + 2.1264, 4)}"
     assert "1.626</a>" in link.__html__()
     assert (at(None), at(1.0, None)) == ("–", "1.000")
-    assert "href" not in TimeLinks("")(1.0).__html__()
 
 
 def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: Any) -> None:

@@ -1,5 +1,6 @@
 """Pages of every kind in headless Chromium: no error, nothing that sticks out, legible text, tables that sort."""
 
+import shutil
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +16,7 @@ pytestmark = pytest.mark.slow
 PAGES = {
     "run": "run/report.html",
     "view": "run/view.html",
+    "unmade view": "failed/view.html",
     "program": "program/report.html",
     "phase": "program/path/report.html",
     "failed": "failed/report.html",
@@ -212,6 +214,22 @@ def test_a_time_leads_a_phase_to_the_clock_of_the_program(browser: Browser, fold
       const t = Number(at.href.split("#t=")[1]);
       return Math.abs(t - begin - Number(at.dataset.at)) < 1e-9 && at.pathname.endsWith("/program/view.html");
     """)
+
+
+def test_the_report_leads_to_a_3_d_page_that_is_made_later(browser: Browser, sound: Path, tmp_path: Path) -> None:
+    shutil.copytree(sound / "run", tmp_path / "run")
+    browser.open(tmp_path / "run" / "report.html")
+    link = browser.run("return document.querySelector('a.go').href;")
+    page, t = link.removeprefix("file://").split("#t=")
+
+    browser.open(Path(page), f"#t={t}")
+    unmade = browser.run("return document.body.innerText;")
+    run(["view", str(tmp_path / "run"), "--cell", str(sound / "cell" / "small.yaml"), "-q"])
+    browser.open(Path(page), f"#t={t}")
+
+    assert "cellplan view RUN --cell CELL" in unmade
+    assert browser.text("clock").startswith(f"{float(t):.3f} s of ")
+    assert browser.console == []
 
 
 def test_an_address_unfolds_what_it_leads_to(browser: Browser, folder: Path) -> None:
