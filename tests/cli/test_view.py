@@ -93,3 +93,13 @@ def test_a_solved_cell_brings_its_page_and_stays_verifiable(
     assert run(["view", str(tmp_path / "run"), "--cell", str(cell), "-q"]) == 0
     assert (tmp_path / "run" / "view.html").read_bytes() == (tmp_path / "other.html").read_bytes()
     capsys.readouterr()
+
+
+def test_the_folder_of_a_repair_leads_to_its_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "advice.json").write_text("{}", encoding="utf-8")
+
+    assert run(["view", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        f"error: {tmp_path}: expected a run, a layout search or a cell file, got a repair: "
+        f"show '{tmp_path / 'best.yaml'}'\n"
+    )
