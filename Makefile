@@ -59,7 +59,7 @@ $(PROGRAM): pyproject.toml
 	    echo "making $(VENV) from $$("$$python" -c 'import platform, sys; print(sys.executable, platform.python_version())')"; \
 	    "$$python" -m venv --clear $(VENV); \
 	fi; \
-	echo "installing cellplan into $(VENV): about 140 MB to download, 700 MB on disk, a minute or two"; \
+	echo "installing cellplan into $(VENV): about 110 MB to download, 600 MB on disk, a minute or two"; \
 	$(BIN)/python -m pip install --quiet --upgrade pip || true; \
 	rm -f $@.done; \
 	{ PYTHONUNBUFFERED=1 $(BIN)/python -m pip install $(if $(CONSTRAINTS),--constraint '$(CONSTRAINTS)') --editable . && touch $@.done; } \

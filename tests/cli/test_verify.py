@@ -82,6 +82,17 @@ def test_a_stale_input_ends_with_two(copy: Copy, capsys: pytest.CaptureFixture[s
     assert json.loads(out)["exit"] == 2
 
 
+def test_the_cell_of_another_run_is_named(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
+    other = copy.cell.with_name("other.yaml")
+    other.write_text(copy.cell.read_text() + "# a remark\n", encoding="utf-8")
+
+    assert run(["verify", str(copy.run), "--cell", str(other)]) == 2
+    assert capsys.readouterr().err == (
+        f"{copy.run}: the run was made from 'small.yaml', and '{other}' differs from it; "
+        "name the file of the run, or solve again\n"
+    )
+
+
 def test_programs_are_written_into_the_run(copy: Copy, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["export", str(copy.run), "--cell", str(copy.cell), "--format", "csv"])
 

@@ -112,3 +112,13 @@ def test_until_the_page_is_made_the_place_of_it_says_how(sound: Path) -> None:
     assert "<script" not in page
     assert "&lt;b&gt;" in unmade_view_page("<b>", cell_file="")
     assert "<code>cellplan view RUN</code>" in unmade_view_page("four-robots", cell_file="")
+
+
+def test_the_folder_of_a_repair_leads_to_its_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "advice.json").write_text("{}", encoding="utf-8")
+
+    assert run(["view", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        f"error: {tmp_path}: expected a run, a layout search or a cell file, got a repair: "
+        f"show '{tmp_path / 'best.yaml'}'\n"
+    )

@@ -91,7 +91,7 @@ def test_both_pages_follow_each_save_and_the_run_is_whole_in_the_end(
     in_frame(browser, "report.html", "scrollTo({top: 400, behavior: 'instant'})")
 
     cell.write_text("cellplan: 1\nname: <b>\n", encoding="utf-8")
-    until(lambda: browser.run(PHASE) == "✗ no result", "no error")
+    until(lambda: browser.run(PHASE) == "✗ no new result; the last result is shown", "no error")
     said = browser.text("lines")
     cell.write_text(sound.replace("duration_s: 12,", "duration_s: 15,"), encoding="utf-8")
     until(lambda: browser.run(PHASE) == "✓ passed", "no second result")
@@ -103,6 +103,7 @@ def test_both_pages_follow_each_save_and_the_run_is_whole_in_the_end(
 
     program.send_signal(signal.SIGINT)
     assert program.wait(timeout=LIMIT_S) == 130
+    until(lambda: browser.run(PHASE) == "watching has ended; the last result is shown", "the end is not said")
     assert "pair.yaml" in said
     assert hash_after.startswith("#t=0.5")
     assert float(last) == pytest.approx(15.0)

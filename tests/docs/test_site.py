@@ -8,6 +8,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 from builders.browser import Browser
@@ -108,6 +109,20 @@ def show(browser: Browser, page: Path, size: tuple[int, int], theme: str) -> Non
     )
     browser.command("Page.navigate", url=f"file://{page}")
     browser.run("while (document.readyState !== 'complete') await new Promise((go) => setTimeout(go, 20));" + DRAWN)
+
+
+@pytest.mark.slow
+def test_every_link_of_the_site_leads_to_a_file(site: Path) -> None:
+    named = [
+        (path, unquote(target.partition("#")[0]))
+        for path in sorted(site.rglob("*.html"))
+        if path.name != "404.html"  # its links begin at the root of a server
+        for target in re.findall(r'<a\b[^>]*?href="([^"]*)"', path.read_text(encoding="utf-8"))
+        if not re.match(r"[a-z]+:", target)
+    ]
+
+    assert len(named) > 1000
+    assert [(path.name, target) for path, target in named if not (path.parent / target).exists()] == []
 
 
 @pytest.mark.slow

@@ -52,7 +52,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     original = load_cell(cell, allow_dirs=allow_dirs)
     original = original.with_values(changes) if changes else original
     now = {stored.manifest.cell_file if name == cell.name else name: sha for name, sha in original.inputs.items()}
-    _refuse_stale(stored, now, where=f"'{cell}'")
+    _refuse_stale(stored, now, where=f"'{cell}'", cell=cell)
     resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
     written, copied = written_document(original), written_document(resolved)
     foreign = [each for each in _differences(written, copied) if not _may_differ(each[0], each[1])]
@@ -83,6 +83,13 @@ def _without_file(stored: StoredRun) -> StoredCell:
     return StoredCell(cell=resolved, compared=tuple(bundled), remarks=(remark,))
 
 
+def _changed(stored: StoredRun, name: str, cell: Path | None) -> str:
+    """What to say of an input with another content; the cell file may be another one than that of the run."""
+    if cell is not None and name == stored.manifest.cell_file and cell.name != name:
+        return f"the run was made from '{name}', and '{cell}' differs from it; name the file of the run, or solve again"
+    return f"'{name}' has changed since the run was made; solve the cell again"
+
+
 def _bundled_digest(name: str) -> str:
     """Digest of a robot that comes with the program; empty when it no longer does."""
     try:
@@ -91,14 +98,14 @@ def _bundled_digest(name: str) -> str:
         return ""
 
 
-def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str) -> None:
+def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str, cell: Path | None = None) -> None:
     """Refuse inputs that are not what they were when the run was made."""
     findings = []
     for name, digest in stored.manifest.inputs.items():
         if not now.get(name):
             findings.append(f"the run depends on '{name}', to which {where} does not refer")
         elif now[name] != digest:
-            findings.append(f"'{name}' has changed since the run was made; solve the cell again")
+            findings.append(_changed(stored, name, cell))
     findings += [
         f"{where} needs '{name}', on which the run does not depend"
         for name in now

@@ -14,6 +14,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
+from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.view.cell_scene import unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
@@ -25,6 +26,7 @@ from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
 from cellplan.study.folder import JOURNAL, RESULT, write_whole
 
 STUDY_PAGE: Final = "study-view.html"  # in the folder of a study
+ADVICE: Final = "advice.json"  # in the folder of a repair
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +60,10 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
     if path.is_dir():
         if request.settings:
             raise InputError(f"--set: expected a cell file with it, got the folder '{path}'")
+        if (path / ADVICE).exists():
+            raise InputError(
+                f"{path}: expected a run, a layout search or a cell file, got a repair: show '{path / BEST}'"
+            )
         if (path / MANIFEST).exists() or is_run_folder(path):
             return _view_of_run(request, progress), path / VIEW_PAGE
         if (path / RESULT).exists() or (path / JOURNAL).exists():

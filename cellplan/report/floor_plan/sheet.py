@@ -169,10 +169,11 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
     yield _text("key", x, y + 40, f"{bar:g} mm")
     y = top + 230
-    columns = (("robot", 0), ("x", 310), ("y", 420), ("z", 505), ("turn", 610), ("reach", 700))
+    columns = (("robot", 0), ("x", 285), ("y", 395), ("z", 480), ("turn", 585), ("reach", COLUMN))
     for word, offset in columns:
         yield _text("head" if not offset else "head right", left + offset, y, word)
     yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'
+    y += 6
     for robot in plan.robots[: _most_rows(y)]:
         y += TEXT
         yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'

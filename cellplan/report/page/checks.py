@@ -60,7 +60,7 @@ def failure_groups(record: Record) -> Entries:
     """The failed checks of a record by kind, most severe kind first and the worst of each first.
 
     Each group has a ``title``, all its ``rows`` and the number of those ``listed`` on the first screen; a row has the
-    check as ``message``, and what of it as ``where``, ``amount``, ``at_s`` and ``run``.
+    check as ``message``, and what of it as ``where``, ``amount``, ``when`` (the word before it), ``at_s`` and ``run``.
     """
     groups: dict[str, list[Record]] = {}
     for check in record["checks"]:
@@ -82,6 +82,7 @@ def _row(check: Record, record: Record) -> dict[str, Any]:
     return {
         "where": _where(check, record),
         "amount": _amount(check),
+        "when": "from" if check["name"] == "collision" else "at",
         "at_s": check["at_s"],
         "run": check.get("run", ""),
         "message": check["message"],
@@ -108,7 +109,7 @@ def _where(check: Record, record: Record) -> str:
 
 def _amount(check: Record) -> str:
     """By how much a check fails."""
-    value, limit, unit = check["value"], check["limit"], check["unit"]
+    value, limit, unit = check["value"], check["limit"], str(check["unit"]).replace("s2", "s²").replace("s3", "s³")
     if value is None or limit is None:
         return "–"
     if check["name"] == "collision":

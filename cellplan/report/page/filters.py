@@ -7,6 +7,7 @@ from cellplan.report.record.common import Record, rounded_down
 
 MIN_SHOWN: Final = 1e-6  # [mm] or [deg]
 MIN_PLAIN: Final = 1e-4  # [-] of a manipulability: smaller ones are shown with a power of ten
+ALL_DIGITS: Final = 1000.0  # from here on no digit before the point is rounded
 
 
 def fixed(value: float | None, digits: int = 1) -> str:
@@ -18,14 +19,14 @@ def fixed(value: float | None, digits: int = 1) -> str:
 
 
 def small(value: float | None) -> str:
-    """The value with three significant digits, without an exponent."""
+    """The value with three significant digits, without an exponent; from 1000 on with all digits before the point."""
     if value is None:
         return "–"
     if value == 0.0:
         return "0"
     if abs(value) < MIN_SHOWN:
         return f"< {MIN_SHOWN:.6f}"
-    text = f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
+    text = f"{value:.0f}" if abs(value) >= ALL_DIGITS else f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
     return text.replace("-", "−")
 
 

@@ -11,7 +11,7 @@ svg.still-sheet {{ font-family: {FONT}; color-scheme: light dark; }}
 .still-sheet .e {{ stroke: #101820; stroke-opacity: .45; stroke-width: 9; fill: none; stroke-linecap: round; }}
 .still-sheet .grid {{ stroke: #c8d0d9; stroke-width: 8; fill: none; }}
 .still-sheet .shadow {{ fill: #1d2733; fill-opacity: .13; stroke: none; }}
-.still-sheet .title {{ fill: #1c6b43; font-size: 235px; font-weight: 700; }}
+.still-sheet .title {{ fill: #1c6b43; font-size: 205px; font-weight: 700; }}
 .still-sheet .bad .title {{ fill: #a61f1f; }}
 .still-sheet .note, .still-sheet .name, .still-sheet .value {{ fill: #1d2733; font-size: 165px; }}
 .still-sheet .name, .still-sheet .value {{ font-weight: 600; paint-order: stroke; stroke: #f6f8fa; stroke-width: 45; }}

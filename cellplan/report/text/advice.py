@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.report.record.common import Record, rounded_down
+from cellplan.report.text.layout import solve_best_line
 
 MOST_FAILED: Final = 4  # [-] failed checks that are shown
 MOST_EFFECTS: Final = 3  # [-] effects of a remedy that are shown
@@ -31,7 +32,7 @@ def advice_lines(record: Record, folder: Path, cell: Path) -> list[str]:
         lines += [f"    {texts}: {reason}" for texts, reason in groups]
     lines += [f"  {remark}" for remark in record["remarks"]]
     if record["remedies"]:
-        lines.append(f"next: cellplan solve {shlex.quote(str(folder / 'best.yaml'))}")
+        lines.append(solve_best_line(folder))
     return [*lines, f"report: {folder / 'advice.html'}"]
 
 

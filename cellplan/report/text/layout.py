@@ -37,8 +37,14 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
     rounds = "1 round" if record["rounds"] == 1 else f"{record['rounds']} rounds"
     lines.append(f"  {_trials(record['trials'])} in {rounds}, {record['solves']} solved in full")
     if record["best"] is not None:
-        lines.append(f"next: cellplan solve {shlex.quote(str(folder / 'best.yaml'))}")
+        lines.append(solve_best_line(folder))
     return [*lines, f"report: {folder / 'study.html'}"]
+
+
+def solve_best_line(folder: Path) -> str:
+    """The line to type for the best cell of a folder; its run does not replace that of the given cell."""
+    words = ["cellplan", "solve", str(folder / "best.yaml"), "-o", f"{folder}-run"]
+    return f"next: {shlex.join(words)}"
 
 
 def verdict_line(record: Record) -> str:

@@ -91,7 +91,7 @@ def test_record_page_and_console_say_the_same(found: LayoutResult, folder: Path)
     assert record == found.record
     assert lines[0].startswith("planar-pair: CERTIFIED: cycle ")
     assert lines[0].partition(": ")[2] in page
-    assert lines[-2] == f"next: cellplan solve {folder / 'study' / 'best.yaml'}"
+    assert lines[-2] == f"next: cellplan solve {folder / 'study' / 'best.yaml'} -o {folder / 'study'}-run"
     assert page.count("<svg") >= 2
 
 

@@ -44,6 +44,7 @@ def test_failures_are_grouped_most_severe_first_and_none_is_lost(passed_run: Any
         "Of its own",
     ]
     assert [row["where"] for row in groups[0]["rows"]] == ["a – b1", "a – b2", "a – b0", "a – b3"]
+    assert [row["when"] for row in (groups[0]["rows"][0], groups[1]["rows"][0])] == ["from", "at"]
     assert groups[0]["listed"] == MAX_LISTED < len(groups[0]["rows"])
     assert [row["where"] for row in groups[1]["rows"]] == ["staubli/C4", "kuka/B2"]
     assert groups[1]["rows"][0]["amount"] == "8 mm beyond −150 mm"

@@ -145,7 +145,7 @@ def test_the_first_screen_of_a_failed_run_says_what_where_when_and_by_how_much(b
 
     assert below < SIZES[0][1]
     assert any("crate" in row and "in contact for" in row for row in rows)
-    assert all(" at " in row for row in rows)
+    assert all((" from " if "in contact for" in row else " at ") in row for row in rows)
 
 
 SORTED = """

@@ -79,7 +79,7 @@ def test_a_repaired_cell() -> None:
         "    spin of the tool of right; b: too fast",
         "    a: too near",
         "  environment.column is the pedestal of 'right' here",
-        "next: cellplan solve out/best.yaml",
+        "next: cellplan solve out/best.yaml -o out-run",
         "report: out/advice.html",
     ]
 

@@ -5,6 +5,7 @@
   const EVENT = "cellplan:time";
   const KEYS = "Arrow keys move the time cursor, Enter chooses its time, plus and minus zoom, 0 shows all, Escape clears.";
   const LEFT = 42, RIGHT = 11, HEAD = 33, FOOT = 20, NARROW = 560, PIXELS = 1.25; // points; pixels; pixels to a point
+  const TOOLS = 56; // points beside a title for the buttons
   const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   const figures = [];
   let pinned = null, hovered = null, pixelsBefore = innerWidth, isPrinting = false;
@@ -161,7 +162,7 @@
     const isNarrow = pixels > 0 && pixels < NARROW && !isPrinting;
     const width = isNarrow ? pixels / PIXELS : figure.width;
     let top = 30 + HEAD;
-    if (figure.title) top += 13 * wrapped(figure.title, figure.name, isNarrow ? Math.floor(width / 6.6) : Infinity);
+    if (figure.title) top += 13 * wrapped(figure.title, figure.name, isNarrow ? Math.floor((width - TOOLS) / 6.6) : Infinity);
     for (const panel of figure.panels) {
       const [own, left, above] = panel.full;
       panel.width = isNarrow ? width - LEFT - RIGHT : own;
