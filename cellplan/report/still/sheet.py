@@ -1,5 +1,6 @@
 """The sheet of a picture of an instant as SVG text: heading, floor, cell, names and an enlarged detail."""
 
+import textwrap
 from html import escape
 from typing import Final
 
@@ -19,6 +20,8 @@ from cellplan.report.still.view import best_axes
 WIDTH, HEIGHT = 7200, 4600  # units of the sheet: tenths of a pixel, so that places are whole numbers
 MARGIN: Final = 220
 TITLE, LINE = 390, 215  # down to the title, and from one line to the next
+TITLE_SIZE, SMALLEST_TITLE = 235, 120  # height of its letters, and that of long titles
+LETTER: Final = 0.68  # [-] width of a letter by its height, in a wide bold type
 NAME_BELOW: Final = 200  # from a foot down to the name of its robot
 DETAIL: Final = 2000  # edge of the enlarged detail
 GAP: Final = 160  # beside it
@@ -90,8 +93,12 @@ def _floor(picture: StillPicture, camera: Camera) -> str:
 
 
 def _heading(picture: StillPicture) -> str:
-    """Title and notes."""
-    lines = [f'<text class="title" x="{MARGIN}" y="{TITLE}">{escape(picture.title)}</text>']
+    """Title and notes; long titles are written smaller, and cut where that is not enough."""
+    width = (WIDTH - 2 * MARGIN) / LETTER
+    title = textwrap.shorten(picture.title, int(width / SMALLEST_TITLE), placeholder=" …")
+    size = min(TITLE_SIZE, int(width / max(len(title), 1)))
+    smaller = f' style="font-size:{size}px"' if size < TITLE_SIZE else ""
+    lines = [f'<text class="title" x="{MARGIN}" y="{TITLE}"{smaller}>{escape(title)}</text>']
     lines += [
         f'<text class="note" x="{MARGIN}" y="{TITLE + 30 + LINE * number}">{escape(note)}</text>'
         for number, note in enumerate(picture.notes, start=1)
