@@ -2,7 +2,7 @@
 
 from typing import Any, Final
 
-from cellplan.report.page.filters import against, fixed, floored, percent, stated
+from cellplan.report.page.filters import against, fixed, floored, percent, small, stated
 from cellplan.report.page.first_screen import clearance_shift
 from cellplan.report.page.times import Shifts
 from cellplan.report.record.common import Entries, Record
