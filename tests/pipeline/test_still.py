@@ -11,7 +11,7 @@ from cellplan.model.report import Check, Report
 from cellplan.pipeline.cell_drawings import STILL, DrawnPhase, phase_drawings, program_drawings
 from cellplan.pipeline.gate.compare_drawings import foreign_piece, is_same_drawing
 from cellplan.pipeline.still.instant import worst_instant
-from cellplan.pipeline.still.picture import MARKED, still_picture
+from cellplan.pipeline.still.picture import MARKED, materials, still_picture
 from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
 from cellplan.report.still.picture import StillPicture
@@ -101,10 +101,33 @@ def test_bodies_that_touch_are_marked_and_the_other_robot_is_muted(solved: Solut
 
     materials = {solid.name: solid.material for solid in shown.solids}
     assert {materials["left/A"], materials["part"]} == {MARKED, f"{MARKED}-2"}
-    assert materials["right/A"] == "muted-right"
-    assert materials["left/B"] == "left"
+    assert materials["right/A"] == "muted right"
+    assert materials["left/B"] == "robot left"
     assert shown.title == "Collision at 1.000 s of first"
     assert shown.is_bad
+
+
+def test_a_failure_without_an_instant_does_not_make_the_smallest_clearance_look_failed(solved: Solution) -> None:
+    told = failed("payload", "left", at_s=None)
+    shown = drawn(solved, with_checks(solved, told))
+
+    assert shown.title.startswith("Smallest clearance")
+    assert told.message in shown.notes
+    assert not shown.is_bad
+    assert not [solid.name for solid in shown.solids if solid.material.startswith(MARKED)]
+
+
+def test_a_robot_called_like_a_colour_leaves_the_colours_of_other_things_alone(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    file = tmp_path_factory.mktemp("names") / "pair.yaml"
+    file.write_text(PAIR.replace("left", MARKED).replace("right", "thing"), encoding="utf-8")
+    usual = file.with_name("usual.yaml")
+    usual.write_text(PAIR, encoding="utf-8")
+
+    assert {name: colour for name, colour in materials(load_cell(usual)).items() if " " not in name} == {
+        name: colour for name, colour in materials(load_cell(file)).items() if " " not in name
+    }
 
 
 def test_a_joint_beyond_its_limit_marks_the_link_that_it_moves(solved: Solution) -> None:

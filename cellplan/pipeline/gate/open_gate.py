@@ -38,7 +38,7 @@ MAX_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
 
 
 def open_gate(
-    folder: Path, *, cell: Path | None = None, allow_dirs: Sequence[Path] = (), progress: Progress = silent
+    folder: Path | str, *, cell: Path | str | None = None, allow_dirs: Sequence[Path] = (), progress: Progress = silent
 ) -> VerifiedRun:
     """Verify a run on disk with this version of the program; the result can be exported.
 
@@ -56,7 +56,8 @@ def open_gate(
         NotVerifiedError: The run failed, or a check fails now.
     """
     with nothing_kept():  # a proof rests on the files themselves
-        return _opened(folder, cell=cell, allow_dirs=allow_dirs, progress=progress)
+        file = None if cell is None else Path(cell)
+        return _opened(Path(folder), cell=file, allow_dirs=allow_dirs, progress=progress)
 
 
 def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], progress: Progress) -> VerifiedRun:

@@ -11,7 +11,7 @@ from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
 from cellplan.report.record.failures import FAILURES
 
-NOTE_WIDTH: Final = 84  # [characters] of a line below the title
+NOTE_WIDTH: Final = 74  # [characters] of a line below the title, in a wide type
 MOST_NOTES: Final = 2
 
 
@@ -38,6 +38,11 @@ class Instant:
     joint: str | None = None
     task: str | None = None
     use: JointUse | None = None
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether a check failed at it, or without an instant of its own where there is nothing else to show."""
+        return self.check is not None and (self.check.at_s is not None or self.minimum is None)
 
 
 def worst_instant(report: Report, cell: Cell) -> Instant:
@@ -114,7 +119,7 @@ def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
 def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     """Title and the lines below it."""
     at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
-    if instant.check is not None and (instant.check.at_s is not None or instant.minimum is None):
+    if instant.check is not None and instant.is_failure:
         title = f"{FAILURES.get(instant.check.name, 'Failed')} {at}"
         return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:

@@ -36,7 +36,8 @@ GREYS: Final = {
     MARKED: Colour(light="#e0352b", dark="#f0443a"),
     f"{MARKED}-2": Colour(light="#a3123f", dark="#b8174a"),
 }
-MUTED: Final = "muted-"  # begins the names of colours of what does not matter here
+ROBOT: Final = "robot "  # begins the name of the colour of a robot; the space keeps it apart from all others
+MUTED: Final = "muted "  # the same of a robot that does not matter here
 MUTING: Final = 0.62  # [-]
 
 
@@ -60,7 +61,7 @@ def still_picture(cell: Cell, schedule: Schedule, report: Report) -> StillPictur
     poses = body_poses(bodies, chains, q)
     marked = _marked(instant, cell, bodies)
     involved = {body.robot for body in bodies if body.name in marked} | {instant.robot}
-    is_failed = instant.check is not None
+    is_failed = instant.is_failure
     solids = []
     for index, body in enumerate(bodies):
         X_WS = np.eye(4)
@@ -78,7 +79,7 @@ def still_picture(cell: Cell, schedule: Schedule, report: Report) -> StillPictur
         solids=tuple(solids),
         lines=(*_paths(cell, schedule, chains, q), *_skeletons(cell, bodies, chains, q)),
         names=tuple(_names(cell, solids, bodies)),
-        materials=_materials(cell),
+        materials=materials(cell),
         mark=mark,
         label=label,
         floor=_floor(cell),
@@ -113,16 +114,17 @@ def _material(body: SceneBody, *, marked: frozenset[str], involved: set[str | No
     if body.name in marked:
         return f"{MARKED}-2" if len(marked) == 2 and body.name == max(marked) else MARKED
     usual = {Kind.PART: "part", Kind.TOOL: "tool", Kind.PEDESTAL: "stand", Kind.OBSTACLE: "thing"}.get(body.kind)
-    name = usual or str(body.robot)
-    is_muted = involved is not None and len(involved - {None}) > 0 and usual is None and body.robot not in involved
-    return f"{MUTED}{name}" if is_muted else name
+    if usual is not None:
+        return usual
+    is_muted = involved is not None and len(involved - {None}) > 0 and body.robot not in involved
+    return f"{MUTED if is_muted else ROBOT}{body.robot}"
 
 
-def _materials(cell: Cell) -> Mapping[str, Colour]:
-    """All colours by name; robots are called like colours of other things at no harm: theirs come last."""
+def materials(cell: Cell) -> Mapping[str, Colour]:
+    """All colours by name."""
     found = dict(GREYS)
     for name, colour in robot_colours(cell).items():
-        found[name] = Colour(light=mixed(colour, "#ffffff", 0.12), dark=mixed(colour, "#ffffff", 0.12))
+        found[f"{ROBOT}{name}"] = Colour(light=mixed(colour, "#ffffff", 0.12), dark=mixed(colour, "#ffffff", 0.12))
         found[f"{MUTED}{name}"] = Colour(light=mixed(colour, LIGHT_WASH, MUTING), dark=mixed(colour, DARK_WASH, MUTING))
     return found
 
@@ -189,7 +191,7 @@ def _paths(cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: 
         points = each.X_PT[rows, :3, 3]
         if each.task.relative_to is Frame.PART:
             points = transform_points(_part_pose(cell, chains, q), points)
-        found.append(ShownLine(points=points, material=each.task.robot, width=3.2))
+        found.append(ShownLine(points=points, material=f"{ROBOT}{each.task.robot}", width=3.2))
     return found
 
 
@@ -217,7 +219,8 @@ def _skeletons(
                 D[link + 1][:3, :3] @ robot.model.axes[link].point_B + D[link + 1][:3, 3]
                 for link in robot.model.links_to_flange
             ]
-            found.append(ShownLine(points=np.array([robot.X_WB[:3, 3], *axes, flange]), material=robot.name, width=9.0))
+            points = np.array([robot.X_WB[:3, 3], *axes, flange])
+            found.append(ShownLine(points=points, material=f"{ROBOT}{robot.name}", width=9.0))
         if robot.name not in tools and not robot.tool.is_bare:
             found.append(ShownLine(points=np.array([flange, tip]), material="tool", width=6.0))
     return found

@@ -1,6 +1,6 @@
 """The floor plan on a sheet of paper, as SVG text: to scale when it is printed without scaling."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Final
@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall
+from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanRobot, PlanWall
 from cellplan.report.floor_plan.style import style
+from cellplan.report.record.common import shortened
 
 SVG_START: Final = '<svg class="plan-sheet"'
 WIDTH_MM, HEIGHT_MM = 297, 210  # A4 across
@@ -22,6 +23,7 @@ SCALES: Final = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200
 BARS: Final = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)  # [mm] lengths of a scale bar
 LONGEST_BAR: Final = 480  # units
 TEXT: Final = 34  # units between lines of the table
+NAME_BESIDE, NAME_ABOVE, NAME_IN_PLAN = 7, 32, 16  # letters of names beside and above their numbers, and in the plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +132,7 @@ def _bases(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         u, v = x + 75 * np.cos(turn), y - 75 * np.sin(turn)
         cross = f"M{x - 22:.1f} {y:.1f}H{x + 22:.1f}M{x:.1f} {y - 22:.1f}V{y + 22:.1f}M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}"
         yield f'<path class="cross" d="{cross}"/>'
-        yield _text(f"name n{numbers[robot.name]}", x, y + 60, robot.name)
+        yield _text(f"name n{numbers[robot.name]}", x, y + 60, shortened(robot.name, NAME_IN_PLAN))
 
 
 def _dimension(each: Dimension, sheet: Sheet) -> Iterator[str]:
@@ -169,27 +171,36 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
     yield _text("key", x, y + 40, f"{bar:g} mm")
     y = top + 230
-    columns = (("robot", 0), ("x", 285), ("y", 395), ("z", 480), ("turn", 585), ("reach", COLUMN))
+    columns = (("robot", 0), ("x", 258), ("y", 390), ("z", 493), ("turn", 604), ("reach", COLUMN))
     for word, offset in columns:
         yield _text("head" if not offset else "head right", left + offset, y, word)
     yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'
     y += 6
-    for robot in plan.robots[: _most_rows(y)]:
+    shown = _with_room(plan.robots, y)
+    for robot in shown:
         y += TEXT
         yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
-        yield _text("key", left + 28, y, robot.name)
+        yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE))
+        y += TEXT * (_lines(robot) - 1)
         cells = (*(_length(float(each)) for each in robot.base), f"{robot.turn_deg:.1f}°".replace(".0°", "°"))
         for text, (_, offset) in zip((*cells, f"{robot.reach:.0f}"), columns[1:], strict=True):
             yield _text("key right", left + offset, y, text)
-    if len(plan.robots) > _most_rows(top + 230):
+    if len(plan.robots) > len(shown):
         y += TEXT
-        yield _text("key", left + 28, y, f"and {len(plan.robots) - _most_rows(top + 230)} more robots")
+        yield _text("key", left + 28, y, f"and {len(plan.robots) - len(shown)} more robots")
     yield from _legend(plan, left, y + 90)
 
 
-def _most_rows(top: float) -> int:
-    """Robots that the table has room for."""
-    return int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
+def _lines(robot: PlanRobot) -> int:
+    """Lines of the table that a robot takes: a long name has one for itself."""
+    return 2 if len(robot.name) > NAME_BESIDE else 1
+
+
+def _with_room(robots: Sequence[PlanRobot], top: float) -> Sequence[PlanRobot]:
+    """The robots that the table has room for."""
+    room = int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
+    taken = np.cumsum([_lines(robot) for robot in robots])
+    return robots[: int(np.searchsorted(taken, room, side="right"))]
 
 
 def _directions(x: float, y: float) -> Iterator[str]:

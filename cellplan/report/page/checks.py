@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 from cellplan.model.report import Check
-from cellplan.report.page.filters import floored, small
+from cellplan.report.page.filters import against, floored, small, stated
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.failures import FAILURES
 
@@ -115,7 +115,7 @@ def _amount(check: Record) -> str:
     if check["name"] == "collision":
         return f"in contact for {small(value)} s"
     if check["name"] == "clearance":
-        return f"{floored(value)} {unit}, required {small(limit)} {unit}"
+        return f"{floored(value)} {unit}, required {stated(limit)} {unit}"
     if check["name"] == "joint_position":
-        return f"{small(abs(value - limit))} {unit} beyond {small(limit)} {unit}"
-    return f"{small(value)} {unit}, allowed {small(limit)} {unit}"
+        return f"{small(abs(value - limit))} {unit} beyond {stated(limit)} {unit}"
+    return f"{against(value, limit)} {unit}, allowed {stated(limit)} {unit}"

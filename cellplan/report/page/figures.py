@@ -2,7 +2,7 @@
 
 from typing import Any, Final
 
-from cellplan.report.page.filters import fixed, floored, percent, small
+from cellplan.report.page.filters import against, fixed, floored, percent, small, stated
 from cellplan.report.page.first_screen import clearance_shift
 from cellplan.report.page.times import Shifts
 from cellplan.report.record.common import Entries, Record
@@ -72,12 +72,12 @@ def _error_figure(record: Record, shift: Shifts, name: str, unit: str) -> dict[s
     at = worst[f"max_{name}_error{where}_at_s"]
     return figure(
         f"Largest {name} error",
-        small(value),
+        against(value, allowed),
         unit,
         where=f"{task} ({worst['robot']})",
         at_s=at,
         shift=shift(f"{name}_error{where}", task, at),
-        note=f"{'between the rows; ' if where else ''}allowed {small(allowed)} {unit}",
+        note=f"{'between the rows; ' if where else ''}allowed {stated(allowed)} {unit}",
         is_bad=value > allowed,
     )
 
@@ -92,12 +92,12 @@ def _closure_figures(record: Record, shift: Shifts) -> Entries:
     value, allowed = worst["max_position_error_mm"], worst["allowed"]["position_mm"]
     found = figure(
         "Largest closure error",
-        small(value),
+        against(value, allowed),
         "mm",
         where=robot,
         at_s=worst["at_s"],
         shift=shift("closure_position_error", robot, worst["at_s"]),
-        note=f"allowed {small(allowed)} mm",
+        note=f"allowed {stated(allowed)} mm",
         is_bad=value > allowed,
     )
     return [found]
@@ -177,7 +177,7 @@ def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
 
 
 def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
-    whole, required = record["clearance"]["whole"], f"required {small(record['required_clearance_mm'])} mm"
+    whole, required = record["clearance"]["whole"], f"required {stated(record['required_clearance_mm'])} mm"
     value = floored(whole["minimum_mm"])
     if whole["minimum_mm"] is None:
         return figure("Smallest clearance", value, "mm", note=required)

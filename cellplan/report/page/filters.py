@@ -1,6 +1,7 @@
 """Numbers as the page shows them."""
 
 import math
+from decimal import Decimal
 from typing import Any, Final
 
 from cellplan.report.record.common import Record, rounded_down
@@ -28,6 +29,29 @@ def small(value: float | None) -> str:
         return f"< {MIN_SHOWN:.6f}"
     text = f"{value:.0f}" if abs(value) >= ALL_DIGITS else f"{float(f'{value:.3g}'):.9f}".rstrip("0").rstrip(".")
     return text.replace("-", "−")
+
+
+def stated(value: float | None) -> str:
+    """A limit as it is stated: up to nine significant digits, without an exponent."""
+    return "–" if value is None else _plain(value, 9)
+
+
+def against(value: float | None, limit: float | None) -> str:
+    """The value beside its limit: like ``small``, with more digits where these would hide which of them is larger."""
+    if value is None or limit is None or value == limit or small(value) != small(limit):
+        return small(value)
+    is_above = value > limit
+    for digits in range(3, 17):
+        rounded = float(f"{value:.{digits}g}")
+        if rounded != limit and (rounded > limit) is is_above:
+            return _plain(value, digits)
+    return _plain(value, 17)
+
+
+def _plain(value: float, digits: int) -> str:
+    """The value with a number of significant digits, without an exponent."""
+    text = f"{Decimal(f'{value:.{digits}g}'):f}"
+    return (text.rstrip("0").rstrip(".") if "." in text else text).replace("-", "−")
 
 
 def power(value: float | None) -> str:

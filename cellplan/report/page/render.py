@@ -11,7 +11,7 @@ from cellplan.model.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
-from cellplan.report.page.filters import fixed, floored, percent, power, range_bar, small, worst
+from cellplan.report.page.filters import against, fixed, floored, percent, power, range_bar, small, stated, worst
 from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
 from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
@@ -166,6 +166,8 @@ def _environment() -> Environment:
     environment.filters |= {
         "fixed": fixed,
         "small": small,
+        "stated": stated,
+        "against": against,
         "power": power,
         "percent": percent,
         "floored": floored,

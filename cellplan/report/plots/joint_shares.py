@@ -10,10 +10,11 @@ from cellplan.model.report import JointUse, Report
 from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Key, Limit, Mark, Panel, time_axis, value_axis
 from cellplan.report.plots.palette import INK, LIMIT, ROBOTS
 from cellplan.report.plots.placing import number_sign
-from cellplan.report.record.common import rounded_down
+from cellplan.report.record.common import rounded_down, shortened
 
 MAX_ROBOTS: Final = 8  # with a panel each; more share one, with a curve for the worst joint of each robot
 MAX_LETTERS: Final = 22  # [-] of joint names beside a title; longer ones are counted from the base
+LONGEST_NAME: Final = 13  # [-] letters of a robot's name beside the names of its joints
 PERCENT: Final = 100.0
 
 Shares = Mapping[str, tuple[Sequence[JointUse], Array]]  # by robot: its joints and their shares in [%], shape (N, n)
@@ -94,7 +95,7 @@ def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *,
     ]
     items.append(Mark(float(times[row]), value, LIMIT if is_bad else INK))
     return Panel(
-        title=robot,
+        title=shortened(robot, LONGEST_NAME),
         keys=[Key(name, pen) for name, pen in zip(names, pens, strict=True)],
         note=f"{uses[int(joint)].joint}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.2f} s",
         y=_axis(shares, is_margin=is_margin),

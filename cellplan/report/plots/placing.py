@@ -20,6 +20,7 @@ PLANE_LEFT, PLANE_FOOT, LEGEND = 54.0, 46.0, 164.0
 PLANE_LONGEST: Final = 504.0  # longer side of a plane
 TICK: Final = 4.0
 LINE: Final = 14.0  # from one line of a legend to the next
+SMALLEST_NOTE: Final = 5.0  # [points] of letters beside a long title
 LETTER: Final = 0.57  # [-] of its size that a bold letter takes on average
 ASCENT, MIDDLE, DESCENT = 0.76, 0.36, 0.2  # [-] of its size: a text below, beside and above a point
 MAX_DECADES: Final = 6  # [-] with a tick for each; more have one for every second or third
@@ -192,7 +193,8 @@ def _headings(panel: Panel, width: float) -> Iterator[Words]:
     for key in panel.keys:
         yield Words(x, -5.0, key.text, size=8.5, colour=key.colour, is_bold=True, kind="key")
         x += 8.5 * LETTER * (len(key.text) + 1)
-    yield Words(width, -5.0, panel.note, size=7.5, colour=GREY, anchor="end", kind="note")
+    room = (width - x) / (LETTER * max(len(panel.note), 1))
+    yield Words(width, -5.0, panel.note, min(7.5, max(room, SMALLEST_NOTE)), GREY, anchor="end", kind="note")
 
 
 def _tick_labels(box: PlacedPanel, *, has_x_labels: bool) -> Iterator[Words]:

@@ -15,7 +15,7 @@ from cellplan.report.plots.figure import Curve, Figure, Item, Limit, Mark, Panel
 from cellplan.report.plots.joint_shares import margins_figure, speeds_figure
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, robot_colours
 from cellplan.report.plots.placing import SUPERSCRIPTS, number_sign
-from cellplan.report.record.common import rounded_down
+from cellplan.report.record.common import rounded_down, shortened
 
 CLEARANCE: Final = "clearance"  # the one figure that shows more than the motion
 JOINT_COLUMNS: Final = 3
@@ -184,7 +184,7 @@ def _smallest(name: str, values: Array, times: Array, colour: str) -> Panel:
     at_s, smallest = float(times[worst]), scale * float(values[worst])
     is_long = len(name + unit) > MAX_TITLE_LETTERS
     return Panel(
-        title=name + unit,
+        title=shortened(name, MAX_TITLE_LETTERS) + unit,
         note=f"{'' if is_long else 'smallest '}{smallest:.2g} at {at_s:.2f} s",
         y=value_axis(0.0, scale * float(values.max()) or 1.0, is_floored=True),
         items=[Curve(name, times, scale * values, colour), Mark(at_s, smallest)],

@@ -123,3 +123,11 @@ def check_record(check: Check) -> CheckRecord:
 def as_json(record: Mapping[str, object]) -> str:
     """A record as JSON text; a number that is not finite is refused."""
     return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def shortened(name: str, letters: int) -> str:
+    """A name with its middle left out where it has more letters than there is room for."""
+    if len(name) <= letters:
+        return name
+    tail = letters // 3
+    return f"{name[: letters - tail - 1]}…{name[-tail:]}"

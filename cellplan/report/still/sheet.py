@@ -1,5 +1,6 @@
 """The sheet of a picture of an instant as SVG text: heading, floor, cell, names and an enlarged detail."""
 
+import textwrap
 from html import escape
 from typing import Final
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import bounding_box
+from cellplan.report.record.common import shortened
 from cellplan.report.still.camera import Camera, framed
 from cellplan.report.still.detail import Window, detail, is_worth_it, mark
 from cellplan.report.still.floor import floor_paths, shadow_path
@@ -19,6 +21,10 @@ from cellplan.report.still.view import best_axes
 WIDTH, HEIGHT = 7200, 4600  # units of the sheet: tenths of a pixel, so that places are whole numbers
 MARGIN: Final = 220
 TITLE, LINE = 390, 215  # down to the title, and from one line to the next
+TITLE_SIZE, SMALLEST_TITLE = 235, 120  # height of its letters, and that of long titles
+LETTER: Final = 0.68  # [-] width of a letter by its height, in a wide bold type
+WIDE_LETTER: Final = 0.8  # [-] the same of capital letters
+NAME_SIZE, LONGEST_NAME = 165, 20  # height of the letters of names, and how many of them are shown
 NAME_BELOW: Final = 200  # from a foot down to the name of its robot
 DETAIL: Final = 2000  # edge of the enlarged detail
 GAP: Final = 160  # beside it
@@ -90,8 +96,12 @@ def _floor(picture: StillPicture, camera: Camera) -> str:
 
 
 def _heading(picture: StillPicture) -> str:
-    """Title and notes."""
-    lines = [f'<text class="title" x="{MARGIN}" y="{TITLE}">{escape(picture.title)}</text>']
+    """Title and notes; long titles are written smaller, and cut where that is not enough."""
+    width = (WIDTH - 2 * MARGIN) / LETTER
+    title = textwrap.shorten(picture.title, int(width / SMALLEST_TITLE), placeholder=" …")
+    size = min(TITLE_SIZE, int(width / max(len(title), 1)))
+    smaller = f' style="font-size:{size}px"' if size < TITLE_SIZE else ""
+    lines = [f'<text class="title" x="{MARGIN}" y="{TITLE}"{smaller}>{escape(title)}</text>']
     lines += [
         f'<text class="note" x="{MARGIN}" y="{TITLE + 30 + LINE * number}">{escape(note)}</text>'
         for number, note in enumerate(picture.notes, start=1)
@@ -104,5 +114,8 @@ def _names(picture: StillPicture, camera: Camera) -> str:
     lines = []
     for name in picture.names:
         x, y, _ = np.rint(camera.project(name.at)).astype(int).tolist()
-        lines.append(f'<text class="name" x="{x}" y="{min(y + NAME_BELOW, HEIGHT - 70)}">{escape(name.text)}</text>')
+        text = shortened(name.text, LONGEST_NAME)
+        half = int(0.5 * WIDE_LETTER * NAME_SIZE * len(text))
+        x = min(max(x, half), WIDTH - half)
+        lines.append(f'<text class="name" x="{x}" y="{min(y + NAME_BELOW, HEIGHT - 70)}">{escape(text)}</text>')
     return "\n".join(lines)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -125,3 +126,22 @@ def test_a_wall_is_a_line_where_it_stands(plan: FloorPlan) -> None:
 
 def test_equal_plans_give_equal_bytes(plan: FloorPlan) -> None:
     assert floor_plan_dxf(plan) == floor_plan_dxf(plan)
+
+
+def test_names_and_numbers_of_the_table_leave_each_other_room(plan: FloorPlan) -> None:
+    """Widths of letters are those of a wide type, by their height."""
+    width = {"-": 0.37, ".": 0.33, "°": 0.5}
+    base = np.array([-2598.1, -12598.1, 1500.5])
+    robots = tuple(replace(robot, base=base, turn_deg=-150.5, reach=10303.0) for robot in plan.robots)
+    named = replace(robots[0], name="N" * 40)
+    outlines = tuple(replace(each, robot=None) for each in plan.outlines)
+    whole = replace(plan, robots=(named, *robots[1:]), outlines=outlines, paths=())
+
+    rows: dict[str, list[tuple[float, float]]] = {}
+    for each in ET.fromstring(floor_plan_svg(whole)).iter(f"{NS}text"):  # noqa: S314 - our own text
+        if each.get("class") in {"key", "key right"} and float(each.get("y")) > 400.0:
+            x, across = float(each.get("x")), 27.0 * sum(width.get(letter, 0.64) for letter in each.text)
+            box = (x - across, x) if "right" in each.get("class") else (x, x + across)
+            rows.setdefault(each.get("y"), []).append(box)
+    assert sorted(map(len, rows.values()))[-4:] == [5, 6, 6, 6]  # the long name has a line for itself
+    assert all(left[1] <= right[0] for row in rows.values() for left, right in pairwise(sorted(row)))

@@ -9,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from cellplan.report.plots.figure import Axis, Curve, Figure, Key, Limit, Mark, Note, Panel, line, value_axis
 from cellplan.report.plots.palette import ON_DARK
+from cellplan.report.plots.placing import placed
 from cellplan.report.plots.svg import FINE, THINNING_TOL, inline_svg, svg_text
 
 TIMES = np.linspace(0.0, 2.0, 4001)
@@ -129,3 +130,14 @@ def test_coordinates_are_hundredths_of_points() -> None:
     width = float(figure.split('data-size="')[1].split(" ")[0])
 
     assert panel.resolution[0] == pytest.approx(2.0 / (FINE * width))
+
+
+def test_a_note_beside_a_long_title_is_written_smaller_than_one_beside_a_short_title() -> None:
+    axis = value_axis(0.0, 1.0)
+    sizes = []
+    for title in ("speed", "their manipulability, in 10⁻⁶"):
+        panel = Panel(title=title, y=axis, items=(), note="smallest 3.9 at 0.81 s")
+        figure = Figure(title="t", x=X, panels=[panel] * 3, columns=3)
+        sizes.append(next(each.size for box in placed(figure).panels for each in box.words if each.kind == "note"))
+
+    assert sizes[1] < sizes[0] == 7.5

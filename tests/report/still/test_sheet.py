@@ -101,3 +101,21 @@ def test_a_detail_is_drawn_only_where_it_is_larger() -> None:
 
     assert "enlarged" in still_svg(small)
     assert "enlarged" not in still_svg(wide)
+
+
+def test_a_long_title_is_written_smaller_and_stays_on_the_sheet() -> None:
+    title = "Joint acceleration too high where phases meet at 12.000 s of a_task_with_a_name_of_forty_letters_____"
+    for words in (title, title[:60], title[:50]):
+        (text,) = re.findall(r'<text class="title" [^>]*>[^<]*', still_svg(replace(picture(), title=words)))
+
+        size = float(re.search(r"font-size:(\d+)px", text).group(1))
+        assert 120 <= size < 235
+        assert 0.68 * size * len(text.partition(">")[2]) <= 7200 - 2 * 220
+
+
+def test_a_long_name_is_shortened_and_stays_on_the_sheet() -> None:
+    long = replace(picture(box("one", (0, 0, 0))), names=(ShownName(text=40 * "N", at=np.array([-9.0, 0.0, 0.0])),))
+    ((x, text),) = re.findall(r'<text class="name" x="(-?\d+)" [^>]*>([^<]*)', still_svg(long))
+
+    assert len(text) == 20
+    assert int(x) - 0.5 * 0.68 * 165 * len(text) + 1 >= 0

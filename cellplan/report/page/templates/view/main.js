@@ -215,6 +215,7 @@ class App {
     this.distanceLabel.textContent = nearest ? distanceText(nearest) : "";
     this.distanceLabel.classList.toggle("mark", nearest !== null && nearest.distance < this.stage.scene.nearest.required);
     this.placeLabel(this.distanceLabel, matrix, middle);
+    keepInside(this.distanceLabel);
   }
 
   placeLabel(label, matrix, point) {
@@ -224,6 +225,13 @@ class App {
     label.style.left = `${50 + (50 * at[0]) / at[3]}%`;
     label.style.top = `${50 - (50 * at[1]) / at[3]}%`;
   }
+}
+
+/** Move a label whose place is in the picture so that all of it is. */
+function keepInside(label) {
+  const half = label.offsetWidth / 2;
+  const percent = parseFloat(label.style.left);
+  if (percent >= 0 && percent <= 100) label.style.left = `clamp(${half}px, ${label.style.left}, calc(100% - ${half}px))`;
 }
 
 /** Colour behind the picture, as the style sheet of the page has it. */
