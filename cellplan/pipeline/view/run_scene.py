@@ -23,7 +23,7 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
-from cellplan.report.record.common import Record
+from cellplan.report.record.common import Record, rounded_down
 from cellplan.report.record.common import number as plain
 from cellplan.report.record.view import (
     ClearanceCurveRecord,
@@ -309,7 +309,8 @@ def _facts(record: Record) -> list[list[str]]:
     facts = [["mode", str(record["mode"])], ["cycle", f"{record['cycle_time_s']:.4g} s"]]
     if whole["minimum_mm"] is not None:
         word = "certified" if whole["certified"] else "not certified"
-        facts.append(["smallest clearance", f"{whole['minimum_mm']:.4g} mm, {word}: {' – '.join(whole['pair'] or [])}"])
+        distance = f"{rounded_down(whole['minimum_mm']):.1f} mm"
+        facts.append(["smallest clearance", f"{distance}, {word}: {' – '.join(whole['pair'] or [])}"])
     return facts
 
 

@@ -164,7 +164,7 @@ def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
     ratio, is_assumed = joint["acceleration_ratio"], joint["acceleration_limit_source"] == "assumed"
     found = figure(
         "Highest joint acceleration",
-        f"{100.0 * ratio:.4g}" if ratio > 1.0 else f"{100.0 * ratio:.0f}",
+        percent(ratio).removesuffix(" %"),
         f"% of {'assumed' if is_assumed else 'stated'} limit",
         where=f"{robot} {name}",
         at_s=joint["peak_acceleration_at_s"],

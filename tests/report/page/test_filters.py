@@ -2,6 +2,7 @@
 
 import pytest
 
+from cellplan.report.page.figures import _acceleration_figures
 from cellplan.report.page.filters import against, small, stated
 
 
@@ -25,3 +26,13 @@ def test_a_value_far_from_its_limit_has_three_digits_and_one_equal_to_it_is_equa
     assert against(0.0123456, 0.1) == small(0.0123456) == "0.0123"
     assert against(0.1, 0.1) == stated(0.1) == "0.1"
     assert against(None, 0.1) == "–"
+
+
+@pytest.mark.parametrize("ratio", [0.998, 0.9998, 1.0004, 7.813])
+def test_an_acceleration_next_to_its_limit_does_not_look_like_it(ratio: float) -> None:
+    limit = {"acceleration_limit": 480.0, "acceleration_limit_source": "assumed", "unit": "deg"}
+    joint = {"acceleration_ratio": ratio, "peak_acceleration": 480.0 * ratio, "peak_acceleration_at_s": 1.0, **limit}
+    (figure,) = _acceleration_figures({"joints": {"arm": {"A1": joint}}}, lambda *_: 0.0)
+
+    assert float(figure["value"]) != 100.0
+    assert (float(figure["value"]) > 100.0) is figure["is_bad"] is (ratio > 1.0)
