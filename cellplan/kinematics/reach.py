@@ -14,6 +14,8 @@ START_COUNT: Final = 4  # configurations the search climbs from; the bundled arm
 GRID_COUNT: Final = 25  # positions tried per joint and round
 SWEEP_COUNT: Final = 24  # rounds over all joints; the grid shrinks by half in each, down to a rounding error
 ROUNDING: Final = 1e-9  # [m] poses are worked out to less than that
+UPRIGHT: Final = 1.0 - 1e-9  # [-] cosine of the angle between an upright axis and the vertical
+DIRECTION_COUNT: Final = 48  # [-] in which the farthest place is sought
 UNLIMITED_RANGE: Final = 2.0 * np.pi  # [rad] range of a joint that may turn without end
 
 
@@ -43,10 +45,36 @@ def arm_reach(model: RobotModel, *, rounds: int = SWEEP_COUNT) -> float:
         lever = np.cross(from_point, first.axis_B) if first.is_revolute else from_point
         return np.sqrt(np.sum(lever**2, axis=1))
 
-    lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * UNLIMITED_RANGE)
-    upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
-    starts = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
-    return _climb(distances, starts, (lower, upper), rounds)
+    return float(distances(_best(distances, model, rounds)).max())
+
+
+def has_round_reach(robot: Robot) -> bool:
+    """Whether a placed robot turns about an upright first axis, so that its reach from above is a circle about it."""
+    model = robot.model
+    return model.joints[0].is_revolute and abs(float(robot.X_WB[2, :3] @ model.joints[0].axis_B)) > UPRIGHT
+
+
+def reach_outline(robot: Robot, *, rounds: int = SWEEP_COUNT) -> Array:
+    """Farthest places from above that the flange of a placed robot reaches, all round, in [m], shape (K, 2).
+
+    The robot may stand on a rail, hang or be mounted on a wall. Between two of these places the outline bulges out by
+    0.2 % of its radius of curvature at most.
+
+    Args:
+        robot: The robot.
+        rounds: Number of rounds of the search in each direction.
+    """
+    chain = ScrewChain(robot)
+    corners = []
+    for angle in 2.0 * np.pi * np.arange(DIRECTION_COUNT) / DIRECTION_COUNT:
+        along = np.array([np.cos(angle), np.sin(angle)])
+
+        def heights(q: Array, along: Array = along) -> Array:
+            return chain.flange_poses(q)[:, :2, 3] @ along
+
+        best = _best(heights, robot.model, rounds)
+        corners.append(chain.flange_poses(best)[int(np.argmax(heights(best))), :2, 3])
+    return np.array(corners)
 
 
 def reach_bound(robot: Robot) -> float:
@@ -67,11 +95,12 @@ def reach_bound(robot: Robot) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum() + sum(strokes)) + ROUNDING
 
 
-def _climb(distances: Callable[[Array], Array], starts: Array, limits: tuple[Array, Array], rounds: int) -> float:
-    """Distance at the best configuration found from any of ``starts``, shape (S, n), in [m]."""
-    best, rows = starts.copy(), np.arange(len(starts))
-    lower, upper = limits
-    width = upper - lower
+def _best(distances: Callable[[Array], Array], model: RobotModel, rounds: int) -> Array:
+    """The best configurations within the limits that are found from several, shape (S, n)."""
+    lower = np.where(np.isfinite(model.lower), model.lower, -0.5 * UNLIMITED_RANGE)
+    upper = np.where(np.isfinite(model.upper), model.upper, 0.5 * UNLIMITED_RANGE)
+    best = np.random.default_rng(0).uniform(lower, upper, size=(START_COUNT, len(lower)))
+    rows, width = np.arange(START_COUNT), upper - lower
     for _ in range(rounds):
         for joint in range(best.shape[1]):
             tried = np.repeat(best[:, None], GRID_COUNT, axis=1)
@@ -80,4 +109,4 @@ def _climb(distances: Callable[[Array], Array], starts: Array, limits: tuple[Arr
             found = distances(tried.reshape(-1, tried.shape[2])).reshape(len(rows), GRID_COUNT)
             best = tried[rows, np.argmax(found, axis=1)]
         width = 0.5 * width
-    return float(distances(best).max())
+    return best

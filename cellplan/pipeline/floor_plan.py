@@ -11,7 +11,7 @@ from cellplan.geometry.outlines import outlines, swept_outlines
 from cellplan.geometry.raster import contours, covered, stretches
 from cellplan.geometry.shapes import HalfSpace, Solid
 from cellplan.geometry.transforms import transform_points
-from cellplan.kinematics.reach import arm_reach
+from cellplan.kinematics.reach import arm_reach, has_round_reach, reach_outline
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Schedule
@@ -101,7 +101,8 @@ def _robot(robot: Robot, colour: str, squares: Mapping[str, Indices]) -> PlanRob
         base=np.round(MM * robot.X_WB[:3, 3], 3) + 0.0,
         turn_deg=round(float(DEG * np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0])), 3) + 0.0,
         centre=MM * centre[:2],
-        reach=MM * _reach(robot.model),
+        reach=MM * _reach(robot.model) if has_round_reach(robot) else None,
+        reach_outline=np.zeros((0, 2)) if has_round_reach(robot) else MM * reach_outline(robot, rounds=REACH_ROUNDS),
         swept=_contours(squares[robot.name]) if robot.name in squares else (),
     )
 

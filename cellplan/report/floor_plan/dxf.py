@@ -99,7 +99,11 @@ def _draw_areas(space: "Modelspace", plan: FloorPlan) -> None:
         space.add_line(first, second, dxfattribs={"layer": str(Layer.SURROUNDINGS)})
     for robot in plan.robots:
         colour = {"true_color": int(robot.colour[1:], 16)}
-        space.add_circle(_point(robot.centre), _number(robot.reach), dxfattribs={"layer": str(Layer.REACH), **colour})
+        of_reach = {"layer": str(Layer.REACH), **colour}
+        if robot.reach is None:
+            _closed(space, robot.reach_outline, of_reach)
+        else:
+            space.add_circle(_point(robot.centre), _number(robot.reach), dxfattribs=of_reach)
         for line in robot.swept:
             _closed(space, line, {"layer": str(Layer.SWEPT), **colour})
     for line in plan.whole:

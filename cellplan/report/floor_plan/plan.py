@@ -73,7 +73,8 @@ class PlanRobot:
         base: Coordinates of the base, shape (3,).
         turn_deg: Direction of the x axis of the base, from that of the world.
         centre: Where its first axis stands, shape (2,).
-        reach: Largest distance of the flange from there.
+        reach: Largest distance of the flange from there; None where the reach is no circle: on a rail, on a wall.
+        reach_outline: Farthest places of the flange all round in that case, shape (K, 2); none where it is a circle.
         swept: Contours of what links and tools cover during the motion; none without a motion.
     """
 
@@ -83,7 +84,8 @@ class PlanRobot:
     base: Array
     turn_deg: float
     centre: Array
-    reach: float
+    reach: float | None
+    reach_outline: Array
     swept: tuple[Array, ...]
 
 
@@ -157,7 +159,8 @@ class FloorPlan:
         points += [line for robot in self.robots for line in robot.swept] + [
             robot.base[None, :2] for robot in self.robots
         ]
-        circles = [(robot.centre, robot.reach) for robot in self.robots]
+        circles = [(robot.centre, robot.reach) for robot in self.robots if robot.reach is not None]
+        points += [robot.reach_outline for robot in self.robots]
         points += [np.stack([centre - radius, centre + radius]) for centre, radius in circles]
         every = np.concatenate(points)
         return every.min(axis=0), every.max(axis=0)

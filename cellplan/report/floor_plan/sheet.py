@@ -93,11 +93,7 @@ def _areas(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     for wall in plan.walls:
         yield f'<path class="wall" d="{_wall(wall, sheet)}"><title>{escape(wall.name)}</title></path>'
     for robot in plan.robots:
-        (x, y), radius = sheet.place(robot.centre), UNIT * robot.reach / sheet.scale
-        yield (
-            f'<circle class="reach r{numbers[robot.name]}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}">'
-            f"<title>{escape(robot.name)}: reach {robot.reach:.0f} mm</title></circle>"
-        )
+        yield _reach(robot, sheet, f"reach r{numbers[robot.name]}")
     for robot in plan.robots:
         if robot.swept:
             path = _closed(sheet.place(line) for line in robot.swept)
@@ -162,6 +158,17 @@ def _length(length: float) -> str:
     return f"{length:.1f}".removesuffix(".0")
 
 
+def _reach(robot: PlanRobot, sheet: Sheet, kind: str) -> str:
+    """The reach of a robot: a circle, or the outline of what it reaches."""
+    name = escape(robot.name)
+    if robot.reach is None:
+        course = _closed([sheet.place(robot.reach_outline)])
+        return f'<path class="{kind}" d="{course}"><title>{name}: reach</title></path>'
+    (x, y), radius = sheet.place(robot.centre), UNIT * robot.reach / sheet.scale
+    title = f"<title>{name}: reach {robot.reach:.0f} mm</title>"
+    return f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}">{title}</circle>'
+
+
 def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
     """Directions, scale bar, coordinates of the bases and what the lines mean."""
     left, top = UNIT * WIDTH_MM - MARGIN - COLUMN, MARGIN + HEADING
@@ -183,7 +190,8 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE))
         y += TEXT * (_lines(robot) - 1)
         cells = (*(_length(float(each)) for each in robot.base), f"{robot.turn_deg:.1f}°".replace(".0°", "°"))
-        for text, (_, offset) in zip((*cells, f"{robot.reach:.0f}"), columns[1:], strict=True):
+        reach = "–" if robot.reach is None else f"{robot.reach:.0f}"
+        for text, (_, offset) in zip((*cells, reach), columns[1:], strict=True):
             yield _text("key right", left + offset, y, text)
     if len(plan.robots) > len(shown):
         y += TEXT
