@@ -1,6 +1,7 @@
 """The program ``cellplan``: its commands, and the one place where errors become lines and exit statuses."""
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -33,6 +34,8 @@ from cellplan.cli.verbosity import with_verbosity
 from cellplan.cli.verify import verify
 from cellplan.cli.view import view
 from cellplan.errors import ExitStatus
+
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # schemas need none, and the search for them takes 20 ms
 
 INTERRUPTIONS: Final = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
