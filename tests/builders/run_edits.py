@@ -11,6 +11,7 @@ import numpy as np
 
 from cellplan.io.input.files import digest
 from cellplan.io.run.joint_tables import program_digest
+from cellplan.io.run.manifest import MADE_LATER
 
 ROBOTS = ("idle", "left", "right")
 
@@ -31,7 +32,7 @@ class Copy:
 
     def any_file(self, rng: np.random.Generator) -> Path:
         """Any file of the run; every second time one that matters to the motion."""
-        files = sorted(path for path in self.run.rglob("*") if path.is_file())
+        files = sorted(path for path in self.run.rglob("*") if path.is_file() and path.name not in MADE_LATER)
         return pick(rng, [path for path in files if path.parent.name != "plots"] if rng.random() < 0.5 else files)
 
 

@@ -48,6 +48,7 @@ def coarse(mode: Mode, *, is_open: bool) -> Cell:
         )
         for is_open in (False, True)
         for mode in Mode
+        if mode is not Mode.SEMI_COORDINATED  # for programs from home to home only
     ],
 )
 def test_each_toolpath_is_put_on_the_clock_once(clocked: Counter[str], mode: Mode, is_open: bool) -> None:
