@@ -94,6 +94,7 @@ def _robot(robot: Robot, colour: str, squares: Mapping[str, Indices]) -> PlanRob
     """A robot of the plan."""
     first = robot.model.axes[0] if robot.model.axes else None
     centre = robot.X_WB[:3, 3] if first is None else transform_points(robot.X_WB, first.point_B[None])[0]
+    is_round = has_round_reach(robot)
     return PlanRobot(
         name=robot.name,
         model=robot.model.name,
@@ -101,8 +102,8 @@ def _robot(robot: Robot, colour: str, squares: Mapping[str, Indices]) -> PlanRob
         base=np.round(MM * robot.X_WB[:3, 3], 3) + 0.0,
         turn_deg=round(float(DEG * np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0])), 3) + 0.0,
         centre=MM * centre[:2],
-        reach=MM * _reach(robot.model) if has_round_reach(robot) else None,
-        reach_outline=np.zeros((0, 2)) if has_round_reach(robot) else MM * reach_outline(robot, rounds=REACH_ROUNDS),
+        reach=MM * _reach(robot.model) if is_round else None,
+        reach_outline=np.zeros((0, 2)) if is_round else MM * reach_outline(robot, rounds=REACH_ROUNDS),
         swept=_contours(squares[robot.name]) if robot.name in squares else (),
     )
 

@@ -12,6 +12,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.stored import read_stored_run
+from cellplan.io.run.whole_file import replace_own
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.check import check
@@ -24,7 +25,6 @@ from cellplan.pipeline.view.run_scene import stored_series
 from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
-from cellplan.study.folder import write_whole
 
 OWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
 
@@ -86,14 +86,8 @@ def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = Pla
         InputError: The place holds something else or cannot be written, or ``ezdxf`` is missing.
     """
     kind = PlanFormat(form)
-    if target.is_symlink() or (target.exists() and not _is_floor_plan(target)):
-        raise InputError(f"{target}: holds something that is no floor plan; choose another file with -o")
     content = (floor_plan_svg(plan) if kind is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(target, content)
-    except OSError as error:
-        raise InputError(f"{target}: cannot write the floor plan: {(error.strerror or str(error)).lower()}") from error
+    replace_own(target, content, is_own=_is_floor_plan, kind="floor plan")
     return len(content)
 
 

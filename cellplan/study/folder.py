@@ -1,7 +1,6 @@
 """Folder of a study: the journal, the result once all trials are there, and the runs of variants that are kept."""
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.io.input.files import digest
 from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
+from cellplan.io.run.whole_file import write_whole
 from cellplan.study.running import STATE, require_idle
 
 SCHEMA: Final = "cellplan.study/1"
@@ -69,24 +69,6 @@ def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
             write_whole(folder / name, content)
         except OSError as error:
             raise _cannot_write(folder / name, error) from error
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all.
-
-    Raises:
-        OSError: It cannot be written; what was there stays.
-    """
-    draft = path.with_name(f".{path.name}.draft")
-    try:
-        with draft.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
-    except (OSError, KeyboardInterrupt):
-        draft.unlink(missing_ok=True)
-        raise
 
 
 def _foreign(folder: Path) -> str | None:

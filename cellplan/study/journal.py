@@ -11,7 +11,8 @@ from typing import IO, Any, Final, Self
 
 from cellplan.errors import InputError, StudyStoppedError
 from cellplan.io.input.files import read_regular_file
-from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA, write_whole
+from cellplan.io.run.whole_file import write_whole
+from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA
 from cellplan.study.trial import Trial, Variant
 
 MAX_BYTES: Final = 500_000_000

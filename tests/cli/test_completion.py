@@ -13,7 +13,7 @@ from cellplan.cli.main import run
 from cellplan.io.robots.bundled import bundled_names
 from cellplan.model.cell import Mode
 from cellplan.model.solver import METHODS, Integrator
-from cellplan.pipeline.export import require_format
+from cellplan.pipeline.export import EXPORTERS
 from cellplan.search.programs.objective import Objective, Timing
 
 
@@ -74,7 +74,7 @@ def test_the_words_are_those_of_the_program() -> None:
     assert set(completion.OBJECTIVES) == {str(objective) for objective in Objective}
     assert set(completion.TIMINGS) == {str(timing) for timing in Timing}
     assert completion.robot_models("")[: len(bundled_names())] == list(bundled_names())
-    assert [require_format(name) for name in completion.FORMATS] == [None] * len(completion.FORMATS)
+    assert list(completion.FORMATS) == list(EXPORTERS)
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="this system has no bash")

@@ -10,6 +10,17 @@ from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
 
 ROUNDING = 1e-9  # [m] the search ends on a grid far below this; errors grow with its square
 
+RAIL = Joint(
+    name="rail",
+    kind=JointKind.PRISMATIC,
+    parent=BASE,
+    axis_B=np.array([1.0, 0.0, 0.0]),
+    point_B=np.zeros(3),
+    lower=0.0,
+    upper=2.0,
+    velocity=1.0,
+)
+
 
 def arm(*joints: Joint, flange: tuple[float, float, float]) -> RobotModel:
     return RobotModel(
@@ -49,17 +60,7 @@ def test_a_joint_without_end_may_turn_all_the_way() -> None:
 
 
 def test_a_rail_counts_its_own_length() -> None:
-    rail = Joint(
-        name="rail",
-        kind=JointKind.PRISMATIC,
-        parent=BASE,
-        axis_B=np.array([1.0, 0.0, 0.0]),
-        point_B=np.zeros(3),
-        lower=0.0,
-        upper=2.0,
-        velocity=1.0,
-    )
-    model = arm(rail, turning(0, (0, 0, 0)), flange=(0.5, 0, 0))
+    model = arm(RAIL, turning(0, (0, 0, 0)), flange=(0.5, 0, 0))
 
     assert arm_reach(model) == pytest.approx(2.5, abs=ROUNDING)
 
@@ -70,17 +71,7 @@ def placed(model: RobotModel, X_WB: np.ndarray) -> Robot:
 
 
 def test_from_above_an_arm_on_a_rail_reaches_a_stadium() -> None:
-    slide = Joint(
-        name="rail",
-        kind=JointKind.PRISMATIC,
-        parent=BASE,
-        axis_B=np.array([1.0, 0.0, 0.0]),
-        point_B=np.zeros(3),
-        lower=0.0,
-        upper=2.0,
-        velocity=1.0,
-    )
-    robot = placed(arm(slide, turning(0, (0, 0, 0), lower=-3.2, upper=3.2), flange=(0.5, 0, 0)), pose((1.0, 3.0, 0.5)))
+    robot = placed(arm(RAIL, turning(0, (0, 0, 0), lower=-3.2, upper=3.2), flange=(0.5, 0, 0)), pose((1.0, 3.0, 0.5)))
 
     corners = reach_outline(robot) - [1.0, 3.0]
 

@@ -10,21 +10,17 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
-from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Report
 from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.fastest.shortest import ShortestCycles
-from cellplan.pipeline.fastest.write import fastest_record
 from cellplan.pipeline.present.pictures import record_pictures, run_pictures
-from cellplan.pipeline.present.result_tables import NOWHERE, record_at, run_records, tables_of
+from cellplan.pipeline.present.result_tables import NOWHERE, record_at, record_of, run_records, tables_of
 from cellplan.pipeline.solution import Solution
 from cellplan.planning.layout_screening import Screening
 from cellplan.report.page.figures import figure, key_figures
 from cellplan.report.page.filters import fixed, small
 from cellplan.report.page.notebook import Card, Grid
 from cellplan.report.record.common import Record
-from cellplan.report.record.rehearsal import rehearsal_record
 from cellplan.report.record.rows import format_of, run_tables
 from cellplan.report.record.summary import summary_record
 
@@ -77,8 +73,8 @@ def card_of(result: object) -> Card:
     Raises:
         InputError: It is no result that can be shown.
     """
-    record = getattr(result, "record", None)  # of a layout search, or a repair
-    if isinstance(record, Mapping):
+    record = record_of(result)
+    if record is not None:
         return _record_card(record)
     raise InputError(f"to_html: expected a result, a record or a path, got {type(result).__name__}")
 
@@ -165,16 +161,6 @@ def _(result: Screening) -> Card:
         ],
         grids=[_grid("Layouts", tables["candidates"](), (), "candidates")],
     )
-
-
-@card_of.register
-def _(result: ShortestCycles) -> Card:
-    return _record_card(fastest_record(result))
-
-
-@card_of.register
-def _(result: Rehearsal) -> Card:
-    return _record_card(rehearsal_record(result, provenance=NOWHERE))
 
 
 def _part_text(cell: Cell) -> str:

@@ -46,6 +46,23 @@ NOWHERE: Final = Provenance(versions={}, digests={})
 
 
 @singledispatch
+def record_of(result: object) -> Record | None:
+    """The record of a result whose tables and card are those of its JSON file; None for others."""
+    record = getattr(result, "record", None)  # of a layout search, or a repair
+    return record if isinstance(record, Mapping) else None
+
+
+@record_of.register
+def _(result: ShortestCycles) -> Record:
+    return fastest_record(result)
+
+
+@record_of.register
+def _(result: Rehearsal) -> Record:
+    return rehearsal_record(result, provenance=NOWHERE)
+
+
+@singledispatch
 def tables_of(result: object) -> Tables:
     """The tables of a result by name, each made when it is called.
 
@@ -55,8 +72,8 @@ def tables_of(result: object) -> Tables:
     Raises:
         InputError: It is no result that has tables.
     """
-    record = getattr(result, "record", None)  # of a layout search, or a repair
-    if isinstance(record, Mapping):
+    record = record_of(result)
+    if record is not None:
         return tables_of_record(record)
     raise InputError(f"to_frame: expected a result, a record or a path, got {type(result).__name__}")
 
@@ -118,16 +135,6 @@ def _(result: Report) -> Tables:
 @tables_of.register
 def _(result: Screening) -> Tables:
     return {"candidates": lambda: _candidates(result), "joints": lambda: columns_of(_candidate_joints(result))}
-
-
-@tables_of.register
-def _(result: ShortestCycles) -> Tables:
-    return tables_of_record(fastest_record(result))
-
-
-@tables_of.register
-def _(result: Rehearsal) -> Tables:
-    return tables_of_record(rehearsal_record(result, provenance=NOWHERE))
 
 
 def record_at(path: Path) -> Record:

@@ -10,6 +10,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.io.run.content import is_run_folder
 from cellplan.io.run.folder import MANIFEST
 from cellplan.io.run.stored import StoredRun, read_stored_run
+from cellplan.io.run.whole_file import replace_own
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
@@ -23,7 +24,7 @@ from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study
 from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.view import is_view_page, view_page
 from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
-from cellplan.study.folder import JOURNAL, RESULT, write_whole
+from cellplan.study.folder import JOURNAL, RESULT
 
 STUDY_PAGE: Final = "study-view.html"  # in the folder of a study
 ADVICE: Final = "advice.json"  # in the folder of a repair
@@ -105,14 +106,8 @@ def write_view(record: ViewRecord, target: Path) -> int:
     Raises:
         InputError: The place holds something else, or cannot be written.
     """
-    if target.is_symlink() or (target.exists() and not is_view_page(target)):
-        raise InputError(f"{target}: holds something that is no 3-D page; choose another file with -o")
     content = view_page(record).encode()
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(target, content)
-    except OSError as error:
-        raise InputError(f"{target}: cannot write the page: {(error.strerror or str(error)).lower()}") from error
+    replace_own(target, content, is_own=is_view_page, kind="3-D page")
     return len(content)
 
 

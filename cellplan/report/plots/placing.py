@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -173,17 +173,7 @@ def _panel(
         words=(),
     )
     words = [*_headings(panel, size[0]), *_tick_labels(box, has_x_labels=has_x_labels), *_words_within(box)]
-    return PlacedPanel(
-        panel=panel,
-        x=figure.x,
-        left=corner[0],
-        top=corner[1],
-        width=size[0],
-        height=size[1],
-        x_ticks=ticks[0],
-        y_ticks=ticks[1],
-        words=[each for each in words if each.text],
-    )
+    return replace(box, words=[each for each in words if each.text])
 
 
 def _headings(panel: Panel, width: float) -> Iterator[Words]:

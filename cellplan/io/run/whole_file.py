@@ -1,0 +1,46 @@
+"""Single files that appear whole or not at all."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from cellplan.errors import InputError
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        OSError: It cannot be written; what was there stays.
+    """
+    draft = path.with_name(f".{path.name}.draft")
+    try:
+        with draft.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        draft.replace(path)
+    except (OSError, KeyboardInterrupt):
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool], kind: str) -> None:
+    """Write a file whole or not at all, where there is none or an older one of its kind.
+
+    Args:
+        target: The file; missing folders above it are made.
+        content: Its content.
+        is_own: Whether a file is of that kind and written by cellplan.
+        kind: What it is called in messages.
+
+    Raises:
+        InputError: The place holds something else, or cannot be written.
+    """
+    if target.is_symlink() or (target.exists() and not is_own(target)):
+        raise InputError(f"{target}: holds something that is no {kind}; choose another file with -o")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(target, content)
+    except OSError as error:
+        raise InputError(f"{target}: cannot write the {kind}: {(error.strerror or str(error)).lower()}") from error
