@@ -1,6 +1,7 @@
 """Reproduce the papers' figures: ``python docs/make_reproduction.py`` writes page, plots and record anew.
 
-The record, `docs/reproduction/measured.json`, holds every figure of the page; ``--page`` writes the page from it alone.
+The record, `docs/reproduction/measured.json`, holds every figure of the page; ``--page`` writes the page from it alone,
+and with it `docs/reproduction/lines.json`, every line for machines.
 """
 
 import json
@@ -11,11 +12,12 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 
-from reproduction import ellipse, nicolato, places, ribeiro, vargas  # noqa: E402
-from reproduction.page import page  # noqa: E402
+from reproduction import davies_planar, ellipse, filtered, nicolato, places, planar_search, ribeiro, vargas  # noqa: E402
+from reproduction.page import lines, page  # noqa: E402
 from reproduction.runs import Numbers, rounded  # noqa: E402
 
 RECORD = DOCS / "reproduction" / "measured.json"
+LINES = DOCS / "reproduction" / "lines.json"
 PAGE = DOCS / "reproduction.md"
 CASES: dict[str, Callable[[], Numbers]] = {
     "vargas_1": lambda: vargas.measure(1),
@@ -30,6 +32,11 @@ CASES: dict[str, Callable[[], Numbers]] = {
     "ribeiro_places": places.measure,
     "ribeiro_first_layout": ribeiro.measure_first_layout,
     "ribeiro_appendix_e": ribeiro.measure_appendix,
+    "ribeiro_appendix_d": davies_planar.measure,
+    "ribeiro_load_sharing": ribeiro.measure_load_sharing,
+    "vargas_filter": filtered.measure,
+    "nicolato_planar": planar_search.measure,
+    "nicolato_cooperation": ribeiro.measure_search,
 }
 
 
@@ -48,6 +55,7 @@ def main(words: list[str]) -> None:
             numbers[name] = rounded(measure())
     record = {name: numbers[name] for name in CASES if name in numbers}
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    LINES.write_text(json.dumps(lines(record), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     PAGE.write_text(page(record), encoding="utf-8")
 
 

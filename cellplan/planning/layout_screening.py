@@ -15,7 +15,7 @@ from cellplan.model.presented import Presented
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settled, settling_joints
-from cellplan.planning.collocation.solver import Collocation, Indices, Precision, repeated
+from cellplan.planning.collocation.solver import Collocation, Indices, NullSpaceMotion, Precision, repeated
 from cellplan.planning.collocation.windows import Window, windows_between
 from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.motion_task import closures
@@ -181,8 +181,8 @@ class _Screen:
         q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         found = Screening.unknown(q.T.copy())
         found.lost_at[arrived] = 0.0
-        drift = None if self._given is None else self._given.speeds
-        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, drift=drift)
+        beside = None if self._given is None else NullSpaceMotion(drift=self._given.speeds)
+        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, null_space=beside)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)

@@ -10,6 +10,8 @@ FILTERED = ("filtered_inverse", "filtered_inverse_ii")
 NIL = 1.0  # [mm] practically nil in a plot whose axis ends at 0.6 m
 DAMPED_BELOW = 1.0  # w0
 FASTEST = 4.0  # [rad/s]
+PRECISE = 1e-3  # [-] of a closed form
+STUCK = 0.5  # [m] half of the way that is to be made from a stretched start
 
 
 def case_rows(case: int, numbers: Numbers) -> list[Row]:
@@ -116,5 +118,102 @@ def _third(numbers: Numbers) -> list[Row]:
             holds=second["late_speed_rad_s"] < first["late_speed_rad_s"]
             and second["late_acceleration_rad_s2"] < first["late_acceleration_rad_s2"],
             difference="II is faster",
+        ),
+    ]
+
+
+def filter_rows(numbers: Numbers) -> list[Row]:
+    """What the text says beside the figures of the three cases."""
+    return [*_scalar_rows(numbers["scalar"]), *_setting_rows(numbers), *_outlook_rows(numbers)]
+
+
+def _scalar_rows(scalar: Numbers) -> list[Row]:
+    """The filter of one function."""
+    off = abs(scalar["time_constant_s"] - scalar["expected_s"])
+    end = abs(scalar["theta_at_end"] / scalar["closed_form_at_end"] - 1.0)
+    return [
+        claim(
+            "one constant k: time constant of the filter",
+            "1 / (gamma k²)",
+            f"{shown(scalar['time_constant_s'])} s, the formula {shown(scalar['expected_s'])} s (gamma 25, k 0.5)",
+            holds=off < PRECISE * scalar["expected_s"],
+        ),
+        claim(
+            "k that falls to zero: theta grows, slowly and without end",
+            "no escape in finite time",
+            f"{shown(scalar['theta_at_end'])} at {shown(scalar['end_s'])} s, as the square root of time",
+            holds=end < PRECISE and scalar["value_error"] < PRECISE,
+        ),
+    ]
+
+
+def _setting_rows(numbers: Numbers) -> list[Row]:
+    """Settings of damped least squares, and the one gain of the filter."""
+    damping, gain = numbers["damping"], numbers["gain"]
+    printed = damping["printed"]
+    rows = [
+        claim(
+            f"DLS in case II with half of {name}",
+            "comes nearer to the singular point",
+            f"{found['nearest_mm']:.4g} mm instead of {printed['nearest_mm']:.4g} mm, error {shown(found['error_mm'])} "
+            f"instead of {shown(printed['error_mm'])} mm",
+            holds=found["nearest_mm"] < printed["nearest_mm"],
+        )
+        for name, found in (("lambda_0", damping["lambda0_halved"]), ("w_0", damping["w0_halved"]))
+    ]
+    errors = ", ".join(f"{shown(gain[of]['I']['error_mm'])} and {shown(gain[of]['II']['error_mm'])}" for of in gain)
+    return [
+        *rows,
+        Row(
+            what=f"gains {', '.join(gain)} per second of the filter in case II: error of laws I and II",
+            published="-",
+            ours=f"{errors} mm",
+            difference="a larger gain, a smaller error",
+            verdict=ALONE,
+        ),
+    ]
+
+
+def _outlook_rows(numbers: Numbers) -> list[Row]:
+    """Section 5: singular starts, orientation, goals that exclude each other, and the cost."""
+    start, turn, left = numbers["singular_start"], numbers["orientation"], numbers["unreachable"]
+    place, hand = left["position"], left["orientation"]
+    planar, four = numbers["products"]["planar"], numbers["products"]["four_robots"]
+    return [
+        claim(
+            "stretched start, Theta = 0",
+            "the filter has too little rank, and fails",
+            f"stays stretched: {shown(start['zero_I_m'])} m off with I, {shown(start['zero_II_m'])} m with II",
+            holds=min(start["zero_I_m"], start["zero_II_m"]) > STUCK,
+        ),
+        claim(
+            "the same, Theta with independent columns, law I",
+            "goes well",
+            f"{shown(1e3 * start['chosen_I_m'])} mm off",
+            holds=1e3 * start["chosen_I_m"] < NIL,
+        ),
+        claim("the same, law II", "fails", f"{shown(start['chosen_II_m'])} m off", holds=start["chosen_II_m"] > STUCK),
+        claim(
+            "position and orientation at once",
+            "similar performance",
+            f"I {shown(turn['I_mm'])} mm and {shown(turn['I_rad'])} rad, "
+            f"II {shown(turn['II_mm'])} mm and {shown(turn['II_rad'])} rad",
+            holds=max(turn["I_mm"], turn["II_mm"]) < NIL,
+        ),
+        claim(
+            "position and orientation that cannot both be reached",
+            "gains give one of them priority",
+            f"{shown(place['position_m'])} m and {shown(place['orientation_rad'])} rad with ten times the gain on "
+            f"position, {shown(hand['position_m'])} m and {shown(hand['orientation_rad'])} rad with it on orientation",
+            holds=place["position_m"] < hand["position_m"] and hand["orientation_rad"] < place["orientation_rad"],
+        ),
+        claim(
+            "cost against DLS: multiplications of one step",
+            "more efficient, as no matrix is inverted",
+            f"{planar['filtered']:g} against {planar['damped']:g} for 2 rows and 3 joints, "
+            f"{four['filtered']:g} against {four['damped']:g} for 18 and 24",
+            holds=planar["filtered"] < planar["damped"] and four["filtered"] < four["damped"],
+            difference=f"{shown(planar['filtered'] / planar['damped'])} and "
+            f"{shown(four['filtered'] / four['damped'])} times as many",
         ),
     ]

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from cellplan import Report, solve
-from reproduction.runs import Array, Numbers, paper_cell
+from cellplan import Report, load_cell, solve
+from reproduction.joints import joint_numbers
+from reproduction.runs import PAPERS, Array, Numbers, paper_cell
 from reproduction.sheet import Sheet, draw, draw_joints
 
 TASKS = {"circle": "kuka", "rhombus": "abb", "rectangle": "staubli"}
@@ -31,6 +32,7 @@ def measure_modes() -> Numbers:
         for name in WORN
     }
     numbers["abb"] = {f"mode_{mode}": _of_joints(reports[mode], "abb") for mode in (1, 2, 3)}
+    numbers["joints"] = joint_numbers(reports)
     numbers["worn"]["wrist_deg"] = np.rad2deg(np.abs(reports[3][0].q["staubli"][:, 4]).min())
     return numbers
 
@@ -71,6 +73,24 @@ def measure_appendix() -> Numbers:
     draw(sheet.panel("orientation error", "time [s]", "[rad]"), report.times, {"": turn})
     sheet.save("ribeiro_appendix_e")
     return {"error_mm": 1e3 * error.max(), "turn_below_1e_12_rad": bool(turn.max() < 1e-12)}
+
+
+def measure_load_sharing() -> Numbers:
+    """Two holders of one part (section 4.5): how far the second one's grasp moves in the part."""
+    (run,) = solve(load_cell(PAPERS.parent / "load_sharing_planar.yaml")).runs
+    (closure,) = run.report.closures
+    return {
+        "position_mm": 1e3 * np.linalg.norm(closure.position_error, axis=1).max(),
+        "turn_deg": np.rad2deg(np.linalg.norm(closure.orientation_error, axis=1).max()),
+        "travel_deg": {robot: _travel(run.report, robot) for robot in run.report.q},
+    }
+
+
+def measure_search() -> Numbers:
+    """Cooperating robots by recursive search, which Nicolato 2007 leaves to later work: the two arms of Appendix E."""
+    cell = paper_cell("ribeiro_appendix_e", values={"solver.method": "recursive_search"})
+    (run,) = solve(cell).runs
+    return {"passed": run.report.passed, "error_mm": max(_errors(run.report).values())}
 
 
 def _of_mode(reports: Sequence[Report]) -> Numbers:

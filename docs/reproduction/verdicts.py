@@ -1,15 +1,16 @@
 """Verdicts: a published figure beside ours, and what that amounts to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 REPRODUCED, NOT = "reproduced", "**not reproduced**"
 CHOSEN = "chosen"  # what the text leaves open was chosen so that this comes out: it proves nothing
+CIRCULAR = "circular"  # the figure is the stopping rule of the method itself: it proves that the method ended, no more
 ALONE = "ours alone"  # nothing was published: shown for comparison
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One line of a table: what is claimed, what is published, what we find, and the verdict."""
+    """One line of a table: what is claimed and where, what is published, what we find, and the verdict."""
 
     what: str
     published: str
@@ -17,9 +18,9 @@ class Row:
     difference: str
     verdict: str
 
-    def text(self) -> str:
-        """The line in Markdown."""
-        return f"| {self.what} | {self.published} | {self.ours} | {self.difference} | {self.verdict} |"
+    def text(self, where: str) -> str:
+        """The line in Markdown, with the place in the paper."""
+        return f"| {self.what} | {where} | {self.published} | {self.ours} | {self.difference} | {self.verdict} |"
 
 
 def bound(what: str, ours: float, limit: float, unit: str) -> Row:
@@ -31,6 +32,12 @@ def bound(what: str, ours: float, limit: float, unit: str) -> Row:
         difference=f"{shown(limit - ours)} {unit} below" if ours < limit else f"{shown(ours - limit)} {unit} above",
         verdict=REPRODUCED if ours < limit else NOT,
     )
+
+
+def circular(what: str, ours: float, limit: float, unit: str) -> Row:
+    """A published bound that is the tolerance at which the method stops: kept by every run that ends."""
+    row = bound(what, ours, limit, unit)
+    return row if row.verdict == NOT else replace(row, verdict=CIRCULAR)
 
 
 def chosen(what: str, published: str, ours: str, difference: str) -> Row:

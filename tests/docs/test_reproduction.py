@@ -124,6 +124,10 @@ def test_a_pose_is_followed_and_ends_at_the_published_configuration(script: Modu
         "ribeiro_modes",
         "ribeiro_first_layout",
         "ribeiro_appendix_e",
+        "ribeiro_appendix_d",
+        "ribeiro_load_sharing",
+        "vargas_filter",
+        "nicolato_planar",
     ],
 )
 def test_what_is_recorded_is_what_comes_out(script: ModuleType, unwritten: Path, name: str) -> None:

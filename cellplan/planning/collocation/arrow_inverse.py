@@ -44,7 +44,8 @@ class ArrowInverse:
             mobility: Inverse weights of the own joints, 0 for those that may not move, shape (n, tasks, 1 or batch).
             coupling_weights: Weights of the shared joints, shape (m, 1 or batch); columns of those that may not move
                 are 0.
-            idle: 1 for components that a task leaves open, whose rows are 0, shape (6, tasks, 1).
+            idle: What is added to the diagonal of each block: 1 for components that a task leaves open, whose rows are
+                0, and the square of a damping factor for the others, shape (6, tasks, 1).
             is_given: Which shared joints have a given motion, shape (m,); they move the tools but never follow them.
         """
         self._A, self._C = A, C

@@ -57,7 +57,14 @@ class BatchTasks:
         self._may_move, self._is_given = constraints.may_move, constraints.follows_path > 0.0
 
     def linearise(
-        self, q: Array, desired: Desired, placement: Placement, *, mobile: Array, weights: Array | None = None
+        self,
+        q: Array,
+        desired: Desired,
+        placement: Placement,
+        *,
+        mobile: Array,
+        weights: Array | None = None,
+        damping: float = 0.0,
     ) -> "Linearisation":
         """The tasks at stacked joint vectors, shape (nq, batch), to first order.
 
@@ -67,6 +74,7 @@ class BatchTasks:
             placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
             weights: Joint weights, shape (nq, 1 or batch); those of the cell when None.
+            damping: Square of a damping factor.
         """
         weights = self._weights if weights is None else weights
         state = self.chains.state(q, placement)
@@ -79,7 +87,7 @@ class BatchTasks:
             columns[:, : len(shared), count:] * (self._share * shared),
             mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._own,
             coupling_weights=weights[self._shared_columns],
-            idle=1.0 - self._kept,
+            idle=1.0 - self._kept + damping * self._kept,
             is_given=self._is_given[self._shared_columns],
         )
         rows = seen.R_WR if self._is_whole else None
@@ -216,6 +224,11 @@ class Linearisation:
             return self._tasks.stacked(*self._arrow.speeds(b))
         u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
         return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
+
+    def null_space_projection(self, u: Array) -> Array:
+        """What of joint velocities moves no tool, ``(I - J^# J) u``, shape (nq, batch)."""
+        twists = self._arrow.twists(*self._tasks.unstacked(u))
+        return u - self._tasks.stacked(*self._arrow.speeds(twists))
 
     def correction(self, moved: Array) -> Array:
         """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, batch)."""

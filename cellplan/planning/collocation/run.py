@@ -11,11 +11,21 @@ from cellplan.model.cell import Cell
 from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
+from cellplan.model.solver import GoalKind
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
-from cellplan.planning.collocation.solver import Collocation, Drift, Indices, Precision, largest
+from cellplan.planning.collocation.redundancy import redundancy
+from cellplan.planning.collocation.solver import (
+    CONFIGURATION_SHARE,
+    Collocation,
+    Drift,
+    Indices,
+    NullSpaceMotion,
+    Precision,
+    largest,
+)
 from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
@@ -29,6 +39,7 @@ TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint
 STEADY: Final = (
     1e-11  # [rad] and [m]: configurations this near to their limit depend smoothly on a drift, as a search asks
 )
+KINKED: Final = 1e-4  # [rad] and [m] to which passes settle where nearest points slide round edges: no nearer do they
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 
 
@@ -64,7 +75,7 @@ class AccurateRun:
         offset = start_offset(tasks, desired, placement, start=motion.start, until=until, accuracy=accuracy)
         self._precision = Precision(
             accuracy=accuracy,
-            configuration_tol=STEADY if cell.motion.cyclic else None,
+            configuration_tol=_configuration_tol(cell),
             shortest=min(cell.motion.finer or cell.motion.step, SHORTEST_SHARE * self.end),
         )
         self.sweeps = self.solves = 0
@@ -73,7 +84,9 @@ class AccurateRun:
         self._locked_since, self._progress = locked_since(cell), progress
         self._given = GivenPath.of(cell, schedule, motion.moving)
         knots = np.zeros(0) if self._given is None else self._given.knots
-        inner = np.concatenate([jumps, self._locked_since, knots, *([] if offset is None else [until])])
+        self._redundancy = redundancy(motion, tasks)
+        switched = np.zeros(0) if self._redundancy is None else self._redundancy.breaks
+        inner = np.concatenate([jumps, self._locked_since, knots, switched, *([] if offset is None else [until])])
         self._breaks = distinct(inner[(inner > 0.0) & (inner < self.end)])
         self._knots = breaks
 
@@ -104,7 +117,12 @@ class AccurateRun:
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
             collocation = Collocation(
-                self._tasks, self._desired_at, self._placement, self._precision, mobile=mobile, drift=paced
+                self._tasks,
+                self._desired_at,
+                self._placement,
+                self._precision,
+                mobile=mobile,
+                null_space=NullSpaceMotion(drift=paced, redundancy=self._redundancy),
             )
             windows = windows_between(breaks, whole=self.end, knots=self._knots)
             arrived = collocation.carry(windows, at, ONLY, record)
@@ -146,6 +164,15 @@ class AccurateRun:
         is_lock = np.min(np.abs(breaks[:, None] - self._locked_since), axis=1) <= TIME_TOLERANCE
         cuts = [0, *(np.flatnonzero(is_lock[1:-1]) + 1).tolist(), len(breaks) - 1]
         return [breaks[low : high + 1] for low, high in pairwise(cuts)]
+
+
+def _configuration_tol(cell: Cell) -> float | None:
+    """How near configurations have to be to their limit in [rad] and [m]; None for what goes with the accuracy."""
+    if cell.motion.cyclic:
+        return STEADY
+    if any(goal.kind is GoalKind.OBSTACLES for goal in cell.solver.goals):
+        return max(KINKED, CONFIGURATION_SHARE * cell.solver.accuracy)
+    return None
 
 
 def _paced(drift: Array, begin: float, end: float) -> Drift:

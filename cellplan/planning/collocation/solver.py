@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
 from cellplan.planning.collocation.batch_targets import DesiredAt, in_windows
-from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
+from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
+from cellplan.planning.collocation.redundancy import Redundancy
 from cellplan.planning.collocation.windows import Window
 
 Indices = NDArray[np.intp]
@@ -70,6 +71,19 @@ class Precision:
     shortest: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NullSpaceMotion:
+    """What decides about the redundancy besides the smallest velocities with constant weights.
+
+    Attributes:
+        drift: Joint velocities that are added in the null space of the tasks; None for none.
+        redundancy: Goals and changing weights of a single cell; None for none.
+    """
+
+    drift: Drift | None = None
+    redundancy: Redundancy | None = None
+
+
 class Collocation:
     """Resolves one run of many cells that differ in bases, tools and start configurations only.
 
@@ -86,7 +100,7 @@ class Collocation:
         precision: Precision,
         *,
         mobile: Array | None = None,
-        drift: Drift | None = None,
+        null_space: NullSpaceMotion | None = None,
     ) -> None:
         """Take tasks, robots and joints.
 
@@ -96,13 +110,13 @@ class Collocation:
             placement: Where the robots of the cells stand; one for all, or one per cell.
             precision: How exact the motion has to be.
             mobile: 1 for joints that are not locked, 0 for those that are, shape (nq,); None for all free.
-            drift: Joint velocities that are added in the null space of the tasks; None for none.
+            null_space: What decides about the redundancy besides constant weights; None for nothing.
         """
         self._tasks, self._desired_at, self._placement = tasks, desired_at, placement
         self._accuracy, self._shortest, tolerance = precision.accuracy, precision.shortest, precision.configuration_tol
         self._configuration_tol = CONFIGURATION_SHARE * precision.accuracy if tolerance is None else tolerance
         self._mobile = np.ones(tasks.joint_count) if mobile is None else mobile
-        self._drift = drift
+        self._null_space = null_space or NullSpaceMotion()
         self.sweeps = self.solves = 0
 
     def carry(self, windows: tuple[Window, ...], q: Array, cells: Indices, record: Record) -> Indices:
@@ -172,13 +186,23 @@ class Collocation:
         """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
-        linear = self._tasks.linearise(q.reshape(len(q), -1), desired, placement, mobile=self._mobile)
-        drift = None if self._drift is None else np.tile(self._drift(window.times[: window.count]), q.shape[1])
-        speeds = linear.speeds(drift).reshape(q.shape)
+        linear, found = self._velocities(np.tile(window.times[: window.count], q.shape[1]), q, desired, placement)
+        speeds = found.reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
         return moved, np.abs(linear.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
+
+    def _velocities(
+        self, times: Array, q: Array, desired: Desired, placement: Placement
+    ) -> tuple[Linearisation, Array]:
+        """The tasks to first order at the nodes, times of shape (cells * nodes,), and the joint velocities there."""
+        at, mobile, beside = q.reshape(len(q), -1), self._mobile, self._null_space
+        drift = None if beside.drift is None else beside.drift(times)
+        if beside.redundancy is not None:
+            return beside.redundancy.velocities(times, at, desired, placement=placement, mobile=mobile, drift=drift)
+        linear = self._tasks.linearise(at, desired, placement, mobile=mobile)
+        return linear, linear.speeds(drift)
 
     def _errors(self, window: Window, X: Array, q: Array, placement: Placement) -> Array:
         r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).

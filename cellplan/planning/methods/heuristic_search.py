@@ -33,7 +33,7 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     before: dict[int, Array] = {}  # configuration at the time before the last one, by that one's number
 
     def advance(k: int, q: Array) -> Advance:
-        problem.first_order(k, q)  # refuses a lost path
+        problem.weights(k, q)  # refuses a lost path
         last = before.pop(k, None)
         before.clear()
         before[k + 1] = q

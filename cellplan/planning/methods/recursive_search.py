@@ -1,7 +1,8 @@
 """Recursive search: one joint after the other in a fixed sequence, each within its limits of position and speed."""
 
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     sequence = _sequence(problem.cell)
 
     def advance(k: int, q: Array) -> Advance:
-        weights = problem.first_order(k, q).weights[sequence]  # refuses a lost path
+        weights = problem.weights(k, q)[sequence]  # refuses a lost path
         limits = speed_bounds(problem, k, q)
         bounds = Bounds(np.where(stands, q, limits.lowest), np.where(stands, q, limits.highest))
         return search.advance(k, q, bounds, rounds.on(search.cost, weights.min(initial=np.inf) / weights))
@@ -79,10 +80,11 @@ class _Rounds:
     def __init__(self, cell: Cell, sequence: Indices) -> None:
         """Take limits for the brakes and the tolerance."""
         self._sequence = sequence
-        self._lower = cell.joint_limits.lower[sequence]
-        self._upper = cell.joint_limits.upper[sequence]
-        self._has_range = np.isfinite(self._upper - self._lower)
-        self._has_brakes = cell.solver.search.brakes
+        lower, upper = cell.joint_limits.lower[sequence], cell.joint_limits.upper[sequence]
+        self._limits = [
+            _Brake.of(float(low), float(high)) if cell.solver.search.brakes and np.isfinite(high - low) else None
+            for low, high in zip(lower, upper, strict=True)
+        ]
         self._target = AIM * cell.solver.search.tolerance**2
 
     def on(self, cost: SearchCost, shares: Array) -> Pass:
@@ -112,55 +114,110 @@ class _Rounds:
     def _to_first_order(self, expansion: Expansion, bounds: Bounds, shares: Array, rounds: int) -> tuple[Array, int]:
         """Rounds over the sequence on one expansion: the configuration they lead to and how many they were."""
         chosen = self._sequence
-        a, e, q = expansion.a[:, chosen], expansion.e, expansion.q[chosen]
-        k0 = np.einsum("ij,ij->j", a, a)
-        moves = k0 > NO_EFFECT * k0.max(initial=0.0)
-        chosen, a, q, k0 = chosen[moves], a[:, moves], q[moves], k0[moves]
-        lowest, highest = bounds.lowest[chosen], bounds.highest[chosen]
-        shares = shares[moves]
-        at_once = np.linalg.inv(np.tril(a.T @ a, -1) + np.diag(k0 / shares))
-        cost, used = float(e @ e), 0
+        a, e = expansion.a[:, chosen], expansion.e
+        gram = a.T @ a
+        k0 = gram.diagonal()
+        moves = np.flatnonzero(k0 > NO_EFFECT * k0.max(initial=0.0))
+        chosen = chosen[moves]
+        line = _Line(
+            expansion.q[chosen],
+            (e @ a)[moves],
+            gram[np.ix_(moves, moves)],
+            shares=shares[moves],
+            bounds=Bounds(bounds.lowest[chosen], bounds.highest[chosen]),
+        )
+        brakes = [self._limits[place] for place in moves.tolist()]
+        cost, used = expansion.cost, 0
         while used < rounds and cost > self._target:
-            reached = q + at_once @ (e @ a)
-            if self._has_brakes or np.any((reached < lowest) | (reached > highest)):
-                factors = shares / k0 * self._brakes(q, moves)
-                reached = _one_by_one(q, a, e=e, factors=factors, bounds=Bounds(lowest, highest))
-            e = e - a @ (reached - q)
-            q, before, cost, used = reached, cost, float(e @ e), used + 1
+            before, cost, used = cost, cost - line.round(brakes), used + 1
             if not cost < (1.0 - STALLED) * before:
                 break
         configuration = expansion.q.copy()
-        configuration[chosen] = q
+        configuration[chosen] = line.q
         return configuration, used
 
-    def _brakes(self, q: Array, moves: NDArray[np.bool_]) -> Array:
-        """Factors of moves down and up from a configuration, shape (2, n): Eq. 3.29 towards the nearer limit."""
-        factors = np.ones((2, len(q)))
-        lower, upper, braked = self._lower[moves], self._upper[moves], self._has_range[moves] & self._has_brakes
-        lower, upper, here = lower[braked], upper[braked], q[braked]
-        width = np.maximum(upper - lower, SMALLEST_TRUST)
-        factor = np.maximum(4.0 * (upper - here) * (here - lower) / width**2, 0.0)
-        rises = here > 0.5 * (lower + upper)
-        factors[0, braked] = np.where(rises, 1.0, factor)
-        factors[1, braked] = np.where(rises, factor, 1.0)
-        return factors
+
+class _Brake(NamedTuple):
+    """What slows a joint down towards its nearer limit: the limits, the middle between them, and ``4 / width^2``."""
+
+    lower: float
+    upper: float
+    middle: float
+    scale: float
+
+    @classmethod
+    def of(cls, lower: float, upper: float) -> "_Brake":
+        """The brake of a joint with limits on both sides."""
+        return cls(lower, upper, 0.5 * (lower + upper), 4.0 / max(upper - lower, SMALLEST_TRUST) ** 2)
+
+    def brake(self, q: float) -> float:
+        """Factor of a move towards the nearer limit from a position (Eq. 3.29); moves away from it are whole."""
+        return max(self.scale * (self.upper - q) * (q - self.lower), 0.0)
 
 
-def _one_by_one(q: Array, a: Array, *, e: Array, factors: Array, bounds: Bounds) -> Array:
-    """One round in which every joint heeds its bounds and brakes before the next one moves.
+class _Line:
+    """The joints of a sequence on one expansion of the cost, which each round moves.
 
-    Args:
+    Attributes:
         q: Positions in the order of the sequence, shape (n,).
-        a: Derivatives of the actual by them, shape (m, n).
-        e: Reference minus actual, shape (m,).
-        factors: What ``e . a_i`` is multiplied by for a move downwards and upwards, shape (2, n).
-        bounds: Lowest and highest positions, shape (n,).
     """
-    reached = q.copy()
-    ways = np.ascontiguousarray(a.T)
-    for i, way in enumerate(ways):
-        slope = float(e @ way)
-        move = slope * factors[int(slope > 0.0), i]
-        reached[i] = min(max(q[i] + move, bounds.lowest[i]), bounds.highest[i])
-        e = e - way * (reached[i] - q[i])
-    return reached
+
+    def __init__(self, q: Array, slopes: Array, gram: Array, *, shares: Array, bounds: Bounds) -> None:
+        """Take the cost along all joints.
+
+        Args:
+            q: Positions in the order of the sequence, shape (n,).
+            slopes: ``e . a_i`` there: half the slope of the cost along each joint, downwards, shape (n,).
+            gram: ``a_i . a_j`` of all pairs, shape (n, n).
+            shares: Share of each joint's best move that it makes without brakes, shape (n,).
+            bounds: Lowest and highest positions, shape (n,) each.
+        """
+        self.q, self._slopes, self._gram, self._bounds = q, slopes, gram, bounds
+        self._factors = shares / gram.diagonal()
+
+    def round(self, brakes: Sequence["_Brake | None"]) -> float:
+        """Move every joint once; by how much the cost falls.
+
+        Joints that reach no bound and have no brakes move at once: a round is one triangular system.
+        """
+        if any(brakes):
+            return self._one_by_one(brakes)
+        move: Array = self._at_once @ self._slopes
+        reached = self.q + move
+        if np.any((reached < self._bounds.lowest) | (reached > self._bounds.highest)):
+            return self._one_by_one(brakes)
+        before, self.q = self._slopes, reached
+        self._slopes = before - self._gram @ move
+        gained: Array = before + self._slopes
+        return float(move @ gained)
+
+    @cached_property
+    def _at_once(self) -> Array:
+        """Moves of one round for the slopes at its beginning, where nothing is in the way, shape (n, n)."""
+        return np.asarray(np.linalg.inv(np.tril(self._gram, -1) + np.diag(1.0 / self._factors)), dtype=np.float64)
+
+    @cached_property
+    def _plain(self) -> tuple[list[list[float]], list[float], list[float], list[float]]:
+        """Products, factors and bounds as plain numbers."""
+        factors, lowest, highest = (
+            each.tolist() for each in (self._factors, self._bounds.lowest, self._bounds.highest)
+        )
+        return self._gram.tolist(), factors, lowest, highest
+
+    def _one_by_one(self, brakes: Sequence["_Brake | None"]) -> float:
+        """The same, each joint within its bounds before the next one moves; plain numbers, as one joint is few."""
+        gram, factors, lowest, highest = self._plain
+        q, slopes, gained = self.q.tolist(), self._slopes.tolist(), 0.0
+        for i, row in enumerate(gram):
+            slope, here, limits = slopes[i], q[i], brakes[i]
+            move = slope * factors[i]
+            if limits is not None and (slope > 0.0) == (here > limits.middle):
+                move *= limits.brake(here)
+            reached = min(max(here + move, lowest[i]), highest[i])
+            move = reached - here
+            if move != 0.0:
+                gained += move * (2.0 * slope - move * row[i])
+                slopes = [each - move * product for each, product in zip(slopes, row, strict=True)]
+                q[i] = reached
+        self.q, self._slopes = np.array(q), np.array(slopes)
+        return gained

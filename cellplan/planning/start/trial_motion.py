@@ -154,10 +154,10 @@ class StartTrials:
         """Trials with the shares of the whole motion on the accurate clock, which sees what lies between samples.
 
         A trial that the accurate mode cannot follow keeps the shares of the coarse clock, and so do all of them where
-        the cell asks for another mode.
+        the cell asks for another mode, for goals or for changing weights.
         """
         cell = self._once
-        if len(trials) < 2 or not cell.solver.is_accurate:
+        if len(trials) < 2 or not cell.solver.is_accurate or cell.solver.is_varied:
             return list(trials)
         schedules = [schedule_paths(cell, self._paths_of(run.tasks)) for run in self._phases]
         if max(len(each.breaks) for each in schedules) > MOST_BREAKS:

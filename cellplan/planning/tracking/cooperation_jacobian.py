@@ -26,13 +26,14 @@ def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array, *, X_WR: A
         X_WR: Reference frame of each task, see `TaskConstraints.reference_frames`, shape (tasks, 4, 4); P when None.
 
     Returns:
-        Linear part in [m] before angular part in [rad], expressed in P, shape (tasks, 6, nq).
+        Linear part in [m] before angular part in [rad], expressed in P, shape (tasks, 6, nq). Where state, tips and
+        frames have further axes before these, so has the result.
     """
-    R = state.X_WP[:3, :3].T if X_WR is None else np.swapaxes(X_WR[:, :3, :3], 1, 2)
-    to_tip = np.zeros((len(p_WT), 6, 6))
-    to_tip[:, :3, :3] = to_tip[:, 3:, 3:] = R
-    to_tip[:, :3, 3:] = -R @ skew(p_WT)
-    return to_tip @ (state.screws_W * signs[:, None, :])
+    R = state.X_WP[:3, :3].T if X_WR is None else np.swapaxes(X_WR[..., :3, :3], -1, -2)
+    to_tip = np.zeros((*p_WT.shape[:-1], 6, 6))
+    to_tip[..., :3, :3] = to_tip[..., 3:, 3:] = R
+    to_tip[..., :3, 3:] = -R @ skew(p_WT)
+    return to_tip @ (state.screws_W[..., None, :, :] * signs[:, None, :])
 
 
 def pose_errors(X_PT_desired: Array, X_PT: Array, is_spin_free: Sequence[bool] | NDArray[np.bool_]) -> Array:

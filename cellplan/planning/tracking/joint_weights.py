@@ -16,11 +16,16 @@ HEADING_DAMPING: Final = 1e-4  # squared damping factor of the motion that tells
 
 
 class JointWeights:
-    """The diagonal of W along the motion; it depends on sample and configuration only, not on what went before."""
+    """The diagonal of W along the motion; it depends on sample and configuration only, not on what went before.
+
+    Attributes:
+        constant: The weights that the cell states, shape (nq,).
+        varies: Whether the weights of a sample are others than these.
+    """
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
-        self._constant = np.concatenate([robot.weights for robot in cell.robots])
+        self.constant = np.concatenate([robot.weights for robot in cell.robots])
         self._near_limits, self._load = cell.solver.weighting.near_limits, cell.solver.weighting.load
         self._lower, self._upper = cell.joint_limits.lower, cell.joint_limits.upper
         self._turning = TURNING * cell.joint_limits.velocity
@@ -28,7 +33,7 @@ class JointWeights:
         self._tools = np.array([robot.tool.mass or 0.0 for robot in cell.robots])
         self._shares = np.array([_part_share(cell, robot.name) for robot in cell.robots])
         self._p_PS = cell.part.X_PS[:3, 3]
-        self._varies = self._near_limits > 0.0 or self._load > 0.0
+        self.varies = self._near_limits > 0.0 or self._load > 0.0
 
     def at(self, state: CellState, q: Array, *, J: Array, xdot: Array, secondary: Array | None) -> Array:
         r"""Weights at one sample and configuration.
@@ -48,20 +53,32 @@ class JointWeights:
         Returns:
             Weights, shape (nq,).
         """
-        if not self._varies:
-            return self._constant
-        factors = np.ones_like(self._constant)
+        if not self.varies:
+            return self.constant
+        heading = np.zeros_like(q)
         if self._near_limits > 0.0:
-            inverse = WeightedInverse(J, self._constant)
+            inverse = WeightedInverse(J, self.constant)
             heading = inverse.speeds(xdot, HEADING_DAMPING)
             if secondary is not None:
                 heading += inverse.null_space_projection(secondary)
+        return self.along(state, q, heading=heading)
+
+    def along(self, state: CellState, q: Array, *, heading: Array) -> Array:
+        """Weights at one configuration or at several, which are the first axis then; see ``at``.
+
+        Args:
+            state: Kinematics there.
+            q: Stacked joint vector, shape (nq,).
+            heading: Joint velocities with the constant weights, shape (nq,).
+        """
+        factors = np.ones_like(q)
+        if self._near_limits > 0.0:
             slope = limit_slope(q, self._lower, self._upper)
             towards = np.clip(np.sign(slope) * heading / self._turning, 0.0, 1.0)
             factors *= 1.0 + self._near_limits * np.abs(slope) * towards
         if self._load > 0.0:
             factors *= 1.0 + self._load * self.load(state)
-        return self._constant * np.minimum(factors, LARGEST_FACTOR)
+        return self.constant * np.minimum(factors, LARGEST_FACTOR)
 
     def load(self, state: CellState) -> Array:
         r"""Torque or force with which each joint holds the masses it carries, as a share of a reference.
@@ -79,13 +96,13 @@ class JointWeights:
         """
         heaviest = float(np.max(self._tools + self._shares))
         if heaviest == 0.0:
-            return np.zeros_like(self._constant)
-        p_WS = state.X_WP[:3, :3] @ self._p_PS + state.X_WP[:3, 3]
-        tips = state.X_WT[:, :3, 3]
+            return np.zeros_like(self.constant)
+        p_WS = state.X_WP[..., :3, :3] @ self._p_PS + state.X_WP[..., :3, 3]
+        tips = state.X_WT[..., :3, 3]
         moments = self._tools[:, None] * _rising(state.screws_W, tips) + self._shares[:, None] * _rising(
-            state.screws_W, np.broadcast_to(p_WS, tips.shape)
+            state.screws_W, np.broadcast_to(p_WS[..., None, :], tips.shape)
         )
-        return np.abs((self._carries * moments).sum(axis=0)) / heaviest
+        return np.abs((self._carries * moments).sum(axis=-2)) / heaviest
 
 
 def limit_slope(q: Array, lower: Array, upper: Array) -> Array:
@@ -116,5 +133,5 @@ def _part_share(cell: Cell, robot: str) -> float:
 
 def _rising(screws_W: Array, points: Array) -> Array:
     """Speed at which points rise per unit speed of each joint, shape (n, nq), for points in W of shape (n, 3)."""
-    linear, angular = screws_W[:3], screws_W[3:]
-    return linear[2] + np.outer(points[:, 1], angular[0]) - np.outer(points[:, 0], angular[1])
+    x, y = points[..., 0, None], points[..., 1, None]
+    return screws_W[..., None, 2, :] + y * screws_W[..., None, 3, :] - x * screws_W[..., None, 4, :]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -11,14 +12,12 @@ from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.model.cell import Cell, Grasp, Relation
-from cellplan.model.motion import Schedule
-from cellplan.planning.timing.common_cycles import common_cycles
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.given_path import GivenRows
 from cellplan.planning.tracking.joint_weights import JointWeights
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
-from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, share_within
+from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 
 Drift = Callable[[int, Array], Array]
@@ -123,7 +122,10 @@ class TrackingProblem:
         self._given_signs = every * self.constraints.follows_path
         self.gain, self.damping = cell.solver.gain, cell.solver.damping
         self.motion, self.drift = motion, drift
-        self._goals = self._secondary_goals() if cell.solver.goals else None
+        self._last: tuple[Array, CellState] | None = None
+        goals = partial(SecondaryGoals, cell, self._model, tasks=self.tasks, start=motion.start)
+        self._goals = goals(rests=rests_of(cell, schedule)) if cell.solver.goals else None
+        self._goal_step = float(self.times[1] - self.times[0]) if len(self.times) > 1 else cell.motion.step
         self._locked_since = locked_since(cell)
 
     def step(self, k: int) -> float:
@@ -131,8 +133,10 @@ class TrackingProblem:
         return float(self.times[k + 1] - self.times[k])
 
     def state(self, q: Array) -> CellState:
-        """Kinematics of the whole cell at a stacked joint vector, shape (nq,)."""
-        return self._model.state(q)
+        """Kinematics of the whole cell at a stacked joint vector, shape (nq,); not to be changed."""
+        if self._last is None or not np.array_equal(q, self._last[0]):  # a search ends where its next step begins
+            self._last = q.copy(), self._model.state(q)
+        return self._last[1]
 
     def mobile(self, k: int) -> Array:
         """1 for joints that may move for the tasks at sample k, 0 for all others, shape (nq,)."""
@@ -170,6 +174,20 @@ class TrackingProblem:
         weights = self._weights.at(state, q, J=rows, xdot=twist + self.gain * errors, secondary=drift)
         return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
+    def weights(self, k: int, q: Array) -> Array:
+        """Joint weights at sample k and configuration q, shape (nq,), for methods without a Jacobian.
+
+        Raises:
+            DivergedError: A tool lost its path.
+        """
+        if self._weights.varies:
+            return self.first_order(k, q).weights
+        state = self.state(q)
+        X_WR, X_WT = self.constraints.reference_frames(state.X_WP), state.X_WT[self.constraints.operators]
+        away = self.desired[k, :, :3, 3] - (inverse(X_WR) @ X_WT)[:, :3, 3]
+        self._refuse_lost_path(k, away)
+        return self._weights.constant
+
     def _constrained(self, k: int, J: Array, error: Array, twists: Array) -> tuple[Array, Array, Array]:
         """Rows, desired twists and errors of the components that the tasks and grasps constrain."""
         if self.constraints.is_whole:
@@ -187,18 +205,6 @@ class TrackingProblem:
         other.drift = drift
         return other
 
-    def _secondary_goals(self) -> SecondaryGoals:
-        """The goals of the cell, which may lead back to the start posture."""
-        motion = self.motion
-        return SecondaryGoals(
-            self.cell,
-            self._model,
-            tasks=self.tasks,
-            times=self.times,
-            start=motion.start,
-            rests=_rests(motion.cell, motion.schedule),
-        )
-
     def _drift(self, k: int, q: Array) -> Array | None:
         """Joint velocities that are added to close a cycle, of those joints that may move."""
         if self.drift is None:
@@ -212,12 +218,13 @@ class TrackingProblem:
         stance = Stance(
             q=q,
             state=state,
+            screws_W=lambda: self._model.links(q).screws_W,
             J=first.J,
             picks=[rows[k] for rows in self._rows],
             signs=signs,
             mobility=np.any(signs != 0.0, axis=0) / first.weights,
         )
-        secondary = self._goals.speeds(k, stance)
+        secondary = self._goals.speeds(self.times[k], stance, step=self._goal_step)
         if first.secondary is not None:
             secondary = secondary + first.secondary
         return replace(first, secondary=secondary, bounds=self._goals.bounds(q))
@@ -253,10 +260,3 @@ def _tolerance(cell: Cell, task: Relation) -> float:
 def _settled_from(task: Relation) -> float:
     """Time in [s] until which a tool may come to its path; -inf when it is there from the start."""
     return task.start + task.settle if not isinstance(task, Grasp) and task.settle else -np.inf
-
-
-def _rests(cell: Cell, schedule: Schedule) -> Array:
-    """Times in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
-    bounds = common_cycles(schedule) if cell.motion.cyclic else None
-    ends = schedule.times[[0, -1]]
-    return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))

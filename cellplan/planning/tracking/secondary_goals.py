@@ -20,8 +20,10 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.model.cell import Cell, Relation
+from cellplan.model.motion import Schedule
 from cellplan.model.solver import GoalKind, SecondaryGoal
 from cellplan.model.task import Frame
+from cellplan.planning.timing.common_cycles import common_cycles
 from cellplan.planning.tracking.manipulability import ManipulabilityGradient
 from cellplan.planning.tracking.obstacle_distances import ClosestPairs
 from cellplan.scene.scene import Scene
@@ -34,11 +36,14 @@ FADE_SHARE: Final = 0.25  # [-] of the whole motion that this may take at most
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stance:
-    """The cell at one sample and configuration, as goals evaluate it.
+    """The cell at one sample and configuration, or at several, as goals evaluate it.
+
+    Of several, all arrays but ``signs`` have them as first axis.
 
     Attributes:
         q: Stacked joint vector, shape (nq,), in [rad] or [m].
         state: Kinematics there.
+        screws_W: Gives the screws of all axes as ``LinkState`` has them, shape (6, axes).
         J: Task rows, shape (m, nq).
         picks: Rows that pick what each task constrains, shape (m_i, 6) each.
         signs: Sign of each joint in each task, 0 for joints that may not move, shape (tasks, nq).
@@ -47,6 +52,7 @@ class Stance:
 
     q: Array
     state: CellState
+    screws_W: Callable[[], Array]
     J: Array
     picks: Sequence[Array]
     signs: Array
@@ -55,15 +61,15 @@ class Stance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slope:
-    """A goal to second order.
+    """A goal to second order, at one configuration or at several, which are the first axis then.
 
     Attributes:
         gradient: Gradient of w, shape (nq,).
-        curvature: About the largest curvature of ``-w``, in the metric of W.
+        curvature: About the largest curvature of ``-w``, in the metric of W, shape ().
     """
 
     gradient: Array
-    curvature: float
+    curvature: Array
 
 
 Pull = Callable[[Stance], Slope]
@@ -73,7 +79,7 @@ class SecondaryGoals:
     """All secondary goals of a cell along one motion."""
 
     def __init__(
-        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], times: Array, start: Array, rests: Array
+        self, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array, rests: Array
     ) -> None:
         """Make ready what each goal needs.
 
@@ -81,18 +87,22 @@ class SecondaryGoals:
             cell: The cell.
             model: The combined model of its robots.
             tasks: The tasks and closures, one block row each.
-            times: Times of the motion in [s], shape (N,).
             start: Stacked configuration at the first time, shape (nq,).
             rests: Times in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
         self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
         limits = cell.joint_limits
         self._lower, self._upper, self._limits = limits.lower, limits.upper, SPEED_SHARE * limits.velocity
-        self._step = float(times[1] - times[0]) if len(times) > 1 else cell.motion.step
-        self._fade = _fade(times, rests)
+        self._rests = rests
+        self._length = min(FADE, FADE_SHARE * float(np.diff(rests).max()))
 
-    def speeds(self, k: int, stance: Stance) -> Array:
-        r"""Joint speeds that the goals ask for at a time, shape (nq,), in [rad/s] or [m/s].
+    @property
+    def breaks(self) -> Array:
+        """Times in [s] at which the goals set in, are in full, begin to leave off and have left off."""
+        return np.concatenate([self._rests - self._length, self._rests, self._rests + self._length])
+
+    def speeds(self, t: Array, stance: Stance, *, step: float) -> Array:
+        r"""Joint speeds that the goals ask for at times in [s], shape of ``stance.q``, in [rad/s] or [m/s].
 
         The gain of each goal is taken as in an implicit step of length ``h``, with the curvature ``c`` of ``-w``,
 
@@ -101,13 +111,25 @@ class SecondaryGoals:
         which is ``k_0`` for all gains that make sense, and does not overshoot for those that do not. No goal asks for
         more than a joint can do: its speeds are scaled together, so their direction stays. The goals set in and leave
         off smoothly, so that the cell starts and ends at rest.
+
+        Args:
+            t: Time in [s] of each configuration, shape ().
+            stance: The cell there.
+            step: Length ``h`` in [s]; 0 where no step is taken.
         """
         total = np.zeros_like(stance.q)
         for gain, pull in self._pulls:
             slope = pull(stance)
-            speeds = gain / (1.0 + gain * self._step * slope.curvature) * slope.gradient * stance.mobility
-            total += speeds / max(1.0, float(np.max(np.abs(speeds) / self._limits, initial=0.0)))
-        return self._fade[k] * total
+            implicit = gain / (1.0 + gain * step * slope.curvature)
+            speeds = implicit[..., None] * slope.gradient * stance.mobility
+            total += speeds / np.maximum(1.0, np.max(np.abs(speeds) / self._limits, axis=-1, initial=0.0))[..., None]
+        return self._fade(t)[..., None] * total
+
+    def _fade(self, t: Array) -> Array:
+        """Share of the goals at times in [s]: 0 at every rest, 1 away from them, smooth in between."""
+        away = np.min(np.abs(np.asarray(t)[..., None] - self._rests), axis=-1)
+        x = np.clip(away / max(self._length, np.finfo(float).tiny), 0.0, 1.0)
+        return x * x * (3.0 - 2.0 * x)
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
         """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""
@@ -117,28 +139,30 @@ class SecondaryGoals:
         )
 
 
-def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) -> float:
+def rests_of(cell: Cell, schedule: Schedule) -> Array:
+    """Times in [s] at which goals ask for nothing: the ends of the motion, and of each cycle that is to close."""
+    bounds = common_cycles(schedule) if cell.motion.cyclic else None
+    ends = schedule.times[[0, -1]]
+    return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))
+
+
+def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) -> Array:
     """Largest share of extra joint speeds, at most 1, that takes no joint beyond its bounds.
 
     A joint that is beyond them already, on behalf of the tasks, is not taken farther.
 
     Args:
-        speeds: Joint speeds that the tasks need, shape (nq,).
-        extra: Joint speeds to add, shape (nq,).
-        lowest: Lowest allowed speeds, shape (nq,).
-        highest: Highest allowed speeds, shape (nq,).
+        speeds: Joint speeds that the tasks need, shape (..., nq).
+        extra: Joint speeds to add, shape (..., nq).
+        lowest: Lowest allowed speeds, shape (..., nq).
+        highest: Highest allowed speeds, shape (..., nq).
+
+    Returns:
+        Shape (...).
     """
     moves = extra != 0.0
-    room = np.where(extra > 0.0, highest - speeds, lowest - speeds)[moves] / extra[moves]
-    return float(np.clip(room.min(initial=1.0), 0.0, 1.0))
-
-
-def _fade(times: Array, rests: Array) -> Array:
-    """Share of the goals at each sample: 0 at every rest, 1 away from them, smooth in between."""
-    length = float(np.diff(rests).max())
-    away = np.min(np.abs(times[:, None] - rests), axis=1)
-    x = np.clip(away / max(min(FADE, FADE_SHARE * length), np.finfo(float).tiny), 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
+    room = np.where(extra > 0.0, highest - speeds, lowest - speeds) / np.where(moves, extra, 1.0)
+    return np.clip(np.min(np.where(moves, room, 1.0), axis=-1, initial=1.0), 0.0, 1.0)
 
 
 def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
@@ -166,9 +190,9 @@ def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation])
     gradients = ManipulabilityGradient(model, operators, cell.carrier, on_part=on_part)
 
     def pull(stance: Stance) -> Slope:
-        gradient = gradients.at(stance.q, stance.state, J=stance.J, picks=stance.picks, signs=stance.signs)
-        most = len(stance.signs) * float(np.max(stance.mobility, initial=0.0))
-        return Slope(gradient, float(stance.mobility @ gradient**2) + most)
+        gradient = gradients.at(stance.screws_W(), stance.state, J=stance.J, picks=stance.picks, signs=stance.signs)
+        most = len(stance.signs) * np.max(stance.mobility, axis=-1, initial=0.0)
+        return Slope(gradient, np.sum(stance.mobility * gradient**2, axis=-1) + most)
 
     return pull
 
@@ -200,7 +224,7 @@ def _springs(stiffness: Array, middle: Array) -> Pull:
     """``w = -1/2 sum c_i (q_i - m_i)^2``."""
 
     def pull(stance: Stance) -> Slope:
-        curvature = float(np.max(stiffness * stance.mobility, initial=0.0))
+        curvature = np.max(stiffness * stance.mobility, axis=-1, initial=0.0)
         return Slope(-stiffness * (stance.q - middle), curvature)
 
     return pull
@@ -215,10 +239,13 @@ def _obstacles(cell: Cell, within: float) -> Pull:
     closest = _closest_pairs(cell)
 
     def pull(stance: Stance) -> Slope:
-        pairs = closest.at(stance.q, within=within)
-        shortfall = np.array([within - pair.distance for pair in pairs])
-        gradients = np.array([pair.gradient for pair in pairs]).reshape(-1, len(stance.q))
-        return Slope(shortfall @ gradients / within**2, float(np.sum(gradients**2 @ stance.mobility)) / within**2)
+        q = stance.q.reshape(-1, stance.q.shape[-1])
+        near = closest.near(q, within=within)
+        pulls, squares = np.zeros_like(q), np.zeros_like(q)
+        np.add.at(pulls, near.samples, (within - near.distances)[:, None] * near.by_joints)
+        np.add.at(squares, near.samples, near.by_joints**2)
+        curvature = np.sum(squares.reshape(stance.q.shape) * stance.mobility, axis=-1)
+        return Slope(pulls.reshape(stance.q.shape) / within**2, curvature / within**2)
 
     return pull
 

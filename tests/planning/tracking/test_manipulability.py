@@ -42,7 +42,9 @@ class Tasks:
 
     def gradient(self, q):
         state = self.model.state(q)
-        return self._gradient.at(q, state, J=self.rows(q), picks=self.picks, signs=self.signs)
+        return self._gradient.at(
+            self.model.links(q).screws_W, state, J=self.rows(q), picks=self.picks, signs=self.signs
+        )
 
 
 def test_a_task_in_the_world_keeps_its_frame_while_the_part_turns() -> None:

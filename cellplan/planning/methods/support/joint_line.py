@@ -86,11 +86,12 @@ class JointLines:
 
 def joint_lines(expansion: Expansion) -> JointLines:
     """The cost along every joint from a configuration."""
+    e, a, n = expansion.e, expansion.a, expansion.n
     return JointLines(
-        ae=expansion.e @ expansion.a,
-        ne=expansion.e @ expansion.n,
-        aa=np.einsum("ij,ij->j", expansion.a, expansion.a),
-        nn=np.einsum("ij,ij->j", expansion.n, expansion.n),
-        an=np.einsum("ij,ij->j", expansion.a, expansion.n),
+        ae=e @ a,
+        ne=e @ n,
+        aa=np.einsum("ij,ij->j", a, a),
+        nn=np.einsum("ij,ij->j", n, n),
+        an=np.einsum("ij,ij->j", a, n),
         turns=expansion.turns,
     )

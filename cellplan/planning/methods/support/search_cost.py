@@ -31,21 +31,47 @@ class Expansion:
         q: Stacked joint vector, shape (nq,).
         e: Reference minus actual, all entries, shape (m,).
         a: First derivative of the actual by each joint, shape (m, nq).
-        n: Second derivative of the actual by each joint, shape (m, nq); zero for joints that do not turn on a circle.
         turns: Whether a joint moves the tools on circles; False also for one that drives others through a linkage,
             whose way has no simple form, shape (nq,).
+        bends: What the second derivative is made of: about which axis and by how much each joint turns each point or
+            direction, and its first derivative without weights, shape (m / 3, 3, nq) each; the weights, shape (m, 1).
     """
 
     q: Array
     e: Array
     a: Array
-    n: Array
     turns: NDArray[np.bool_]
+    bends: tuple[Array, Array, Array]
+
+    @property
+    def n(self) -> Array:
+        """Second derivative of the actual by each joint, shape (m, nq); zero for those that turn on no circle."""
+        axes, ways, weights = self.bends
+        return weights * (_cross(axes, ways) * self.turns).reshape(self.a.shape)
 
     @property
     def cost(self) -> float:
         """The cost h in [m^2]."""
         return float(self.e @ self.e)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Geometry:
+    """What of an expansion does not depend on the goal: a step of a search begins where the one before it ended.
+
+    Attributes:
+        q: Stacked joint vector, shape (nq,).
+        signs: Signs of the joints in the tasks.
+        x: Points and directions that count, in the frames of their tasks, shape (m / 3, 3).
+        a: See ``Expansion``.
+        bends: Likewise.
+    """
+
+    q: Array
+    signs: Array
+    x: Array
+    a: Array
+    bends: tuple[Array, Array, Array]
 
 
 class SearchCost:
@@ -77,6 +103,7 @@ class SearchCost:
         self._turns = turning_joints(problem.cell)
         self._kinds = [_kind(task) for task in problem.tasks]
         self._is_examined = False
+        self._here: _Geometry | None = None
         gamma = problem.cell.solver.search.orientation_weight
         owners: list[int] = []
         columns: list[int] = []  # column of the tool's pose: 3 is the tip, 0 to 2 its axes
@@ -94,7 +121,9 @@ class SearchCost:
     def aim(self, k: int, q: Array) -> None:
         """Take the desired poses at sample k as the goal, and the joints that may move on the way there from q."""
         problem = self._problem
-        self._signs = problem.signs * problem.mobile(k - 1)
+        signs = problem.signs * problem.mobile(k - 1)
+        if not np.array_equal(signs, self._signs):
+            self._signs = signs
         desired = problem.desired[k]
         if "turn" in self._kinds:
             self._require_parallel_axes(q)
@@ -103,6 +132,14 @@ class SearchCost:
 
     def expand(self, q: Array) -> Expansion:
         """The cost at a configuration, and what each joint does to it."""
+        here = self._here
+        if here is None or here.signs is not self._signs or not np.array_equal(q, here.q):
+            here = self._here = self._geometry(q.copy())
+        e = (self._weights * (self._goal - here.x)).ravel()
+        return Expansion(q=here.q, e=e, a=here.a, turns=self._turns, bends=here.bends)
+
+    def _geometry(self, q: Array) -> "_Geometry":
+        """All points and directions at a configuration, and how the joints move them."""
         state = self._problem.state(q)
         X_WR = self._problem.constraints.reference_frames(state.X_WP)
         R, p = np.swapaxes(X_WR[:, :3, :3], 1, 2), X_WR[:, :3, 3]
@@ -111,19 +148,11 @@ class SearchCost:
         poses = R @ state.X_WT[self._problem.constraints.operators][:, :3, :]
         poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
         x = poses[self._owners, :, self._columns]
-        signs = self._signs[self._owners][:, None, :]
-        turns = signs * w[self._owners]
-        a = signs * (self._is_tip * v[self._owners]) - skew(x) @ turns
-        n = _cross(turns, a) * self._turns
-        scale = self._weights[:, :, None]
-        m = x.size
-        return Expansion(
-            q=q,
-            e=(self._weights * (self._goal - x)).reshape(m),
-            a=(scale * a).reshape(m, -1),
-            n=(scale * n).reshape(m, -1),
-            turns=self._turns,
-        )
+        turns = self._signs[self._owners][:, None, :] * w[self._owners]
+        ways = self._signs[self._owners][:, None, :] * (self._is_tip * v[self._owners]) - skew(x) @ turns
+        scale = self._weights.reshape(-1, 1)
+        a = scale * ways.reshape(x.size, -1)
+        return _Geometry(q=q, signs=self._signs, x=x, a=a, bends=(turns, ways, scale))
 
     def _require_parallel_axes(self, q: Array) -> None:
         """Refuse once and for all what a search cannot take apart."""

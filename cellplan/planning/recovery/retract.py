@@ -1,0 +1,193 @@
+"""Retract: every robot that is nearer to something than is demanded goes straight off it, together or one by one.
+
+A robot leaves along the axis of its tool, which is also how tools come to their paths; where that is not free, in a few
+other directions. A motion counts as free when every pair that begins too near only comes apart (``certify.growth``).
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.certify.growth import Growth, rows_too_near, sampled_growth, signed_distances
+from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
+from cellplan.errors import TransferNotFoundError
+from cellplan.geometry.transforms import Array
+from cellplan.model.units import MM
+from cellplan.planning.recovery.lines import Lines, RetractLine
+from cellplan.scene.bodies import Kind
+from cellplan.scene.scene import Scene
+
+ROOMS: Final = (0.05, 0.02, 0.1, 0.005, 0.2)  # [m] beyond the largest demand that a tool goes, in the order of trial
+SAMPLES: Final = 31  # configurations of robots that retract together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RetractLeg:
+    """One straight retract of one robot, or of several together.
+
+    Attributes:
+        q: Stacked joint positions in [rad] or [m] along it, shape (M, nq).
+        lines: The line of each robot.
+    """
+
+    q: Array
+    lines: tuple[RetractLine, ...]
+
+    @property
+    def length(self) -> float:
+        """How far the tool comes that goes farthest, in [m]."""
+        return max(float(line.lengths[-1]) for line in self.lines)
+
+    @property
+    def words(self) -> str:
+        """What is done."""
+        return ", ".join(f"{line.robot} {MM * line.lengths[-1]:g} mm {line.words}" for line in self.lines)
+
+
+def find_retract(scene: Scene, q: Array, *, may_move: Collection[str]) -> tuple[RetractLeg, ...]:
+    """Retracts after which every pair keeps its demand; none where all do already.
+
+    Args:
+        scene: See ``certify.growth.scene_at_stop``.
+        q: Stacked joint positions in [rad] or [m] at which the cell stands, shape (nq,).
+        may_move: Names of the robots that may retract; all others stand.
+
+    Raises:
+        TransferNotFoundError: A pair that is too near belongs to robots that stand, or no free retract was found.
+    """
+    near = rows_too_near(scene, q)
+    if not near:
+        return ()
+    search = _RetractSearch(scene, q, near, may_move)
+    legs = search.one_by_one()
+    return (search.together(legs) or legs) if len(legs) > 1 else legs
+
+
+class _RetractSearch:
+    """The retract from one configuration."""
+
+    def __init__(self, scene: Scene, q: Array, near: Sequence[int], may_move: Collection[str]) -> None:
+        self._scene, self._q, self._near = scene, q, near
+        self._lines = Lines(scene.cell, q)
+        self._pairs: dict[str, list[int]] = {}
+        self._demand = max(scene.pairs[row].demand for row in near)
+        self._at_work: dict[str, tuple[str, ...]] = {}
+        for row in near:
+            self._add(row, may_move)
+
+    def _add(self, row: int, may_move: Collection[str]) -> None:
+        """Find who is to come off a pair: operators before the holder of the part."""
+        scene, pair = self._scene, self._scene.pairs[row]
+        bodies = [scene.bodies[pair.first], scene.bodies[pair.second]]
+        robots = {body.robot for body in bodies if body.robot is not None}
+        held = next((str(body.robot) for body in bodies if body.kind is Kind.PART and body.robot), None)
+        others = tuple(sorted(robots - {held}))
+        able = [name for name in others if name in may_move] or [name for name in sorted(robots) if name in may_move]
+        if not able or len(robots) == 0 or (len(robots) == 1 and held is None and _is_within_robot(bodies)):
+            first, second = scene.names(pair)
+            distance = float(signed_distances(scene, pair, self._q[None])[0])
+            raise TransferNotFoundError(
+                f"'{first}' is {_shown(distance)} '{second}' and no robot that may move takes them apart: "
+                f"{MM * pair.demand:g} mm are demanded"
+            )
+        for name in able:
+            self._pairs.setdefault(name, []).append(row)
+            if name == held:
+                self._at_work[name] = tuple({*self._at_work.get(name, ()), *others})
+
+    def one_by_one(self) -> tuple[RetractLeg, ...]:
+        """One robot after the other, each as soon as a line of it is free among those that have retracted."""
+        legs: list[RetractLeg] = []
+        state, waiting, faults = self._q.copy(), list(self._pairs), dict[str, str]()
+        while waiting:
+            for name in waiting:
+                leg = self._leg(name, state, waiting, faults)
+                if leg is not None:
+                    break
+            else:
+                raise TransferNotFoundError("; ".join(faults[name] for name in waiting))
+            legs.append(leg)
+            state = leg.q[-1]
+            waiting.remove(name)
+            still = set(rows_too_near(self._scene, state))
+            waiting = [each for each in waiting if still & set(self._pairs[each])]
+        return tuple(legs)
+
+    def together(self, legs: Sequence[RetractLeg]) -> tuple[RetractLeg] | None:
+        """All robots at once; None where that is not free."""
+        lines = tuple(line for leg in legs for line in leg.lines)
+        q = np.tile(self._q, (SAMPLES, 1))
+        for line in lines:
+            at = np.linspace(0.0, line.lengths[-1], SAMPLES)
+            columns = self._scene.cell.columns(line.robot)
+            q[:, columns] = np.column_stack([np.interp(at, line.lengths, column) for column in line.q.T])
+        growth = sampled_growth(self._scene, q, near=self._near, moved=range(len(self._scene.pairs)))
+        return (RetractLeg(q=q, lines=lines),) if growth.is_clear else None
+
+    def _leg(self, robot: str, state: Array, waiting: Sequence[str], faults: dict[str, str]) -> RetractLeg | None:
+        """The first line of a robot that is free while all others stand; None where none is."""
+        near = rows_too_near(self._scene, state)
+        others = {row for name in waiting if name != robot for row in self._pairs[name]}
+        own = set(self._pairs[robot]) - others or set(self._pairs[robot])
+        moved = rows_moved_by(self._scene, robot)
+        first_fault, tried = "", 0
+        for line in self._candidates(robot):
+            tried += 1
+            q = np.tile(state, (len(line.q), 1))
+            q[:, self._scene.cell.columns(robot)] = line.q
+            growth = sampled_growth(self._scene, q, near=near, moved=moved)
+            left = {row for row, pair in zip(near, growth.apart, strict=False) if pair.row is None}
+            if growth.is_proved and not left & own:
+                return RetractLeg(q=q, lines=(line,))
+            if not first_fault:
+                fault = _fault(growth, self._scene, q, near)
+                first_fault = f"{robot}: the retract of {MM * line.lengths[-1]:g} mm {line.words} {fault}"
+        faults[robot] = (
+            f"{first_fault}; tried {tried} directions and lengths"
+            if tried
+            else (f"{robot}: its tool comes no millimetre off in any direction within the joint limits")
+        )
+        return None
+
+    def _candidates(self, robot: str) -> Iterator[RetractLine]:
+        """Lines of a robot, the best first."""
+        longest = self._demand + max(ROOMS)
+        for direction, words in self._lines.directions(robot, self._at_work.get(robot, ())):
+            line = self._lines.line(robot, direction, words, longest=longest)
+            lengths = dict.fromkeys(line.up_to(self._demand + room).lengths[-1] for room in ROOMS) if line else {}
+            for length in lengths:
+                if line is not None and length > 0.0:
+                    yield line.up_to(float(length))
+
+
+def _is_within_robot(bodies: Sequence[object]) -> bool:
+    """Whether both bodies belong to one robot."""
+    return len({getattr(body, "robot", None) for body in bodies}) == 1
+
+
+def _fault(growth: Growth, scene: Scene, q: Array, near: Sequence[int]) -> str:
+    """Why a retract is not free."""
+    if growth.faults:
+        (first, second), what = growth.faults[0]
+        return f"is not free: '{first}' to '{second}' {what}"
+    if not growth.kept.is_kept:
+        others = [row for row in range(len(scene.pairs)) if row not in set(near)]
+        kept = certify(scene_of_rows(scene, others), q, with_curves=False)
+        pairs = [pair for pair in kept.pairs if not pair.is_kept]
+        if pairs:
+            worst = min(pairs, key=lambda pair: pair.proved - pair.demand)
+            first, second = kept.names(worst)
+            return f"brings '{first}' {_shown(worst.proved)} '{second}', {MM * worst.demand:.3g} mm are demanded"
+    left = [pair for pair in growth.apart if pair.row is None]
+    if left:
+        first, second = left[0].names
+        return f"leaves '{first}' {_shown(left[0].end)} '{second}', {MM * left[0].demand:.3g} mm are demanded"
+    return "is not free"
+
+
+def _shown(distance: float) -> str:
+    """A signed distance in words."""
+    return f"{MM * distance:.3g} mm from" if distance > 0.0 else f"{-MM * distance:.3g} mm deep in"
