@@ -29,7 +29,7 @@ help:
 	@echo "make constraints  write the installed versions to constraints.txt"
 	@echo "make docs      write the documentation as a site to site/; warnings are errors"
 	@echo "make bench     measure speed, beside other libraries and brute force, and write docs/benchmarks.md"
-	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about six minutes"
+	@echo "make reproduce solve the cells of the three papers and write docs/reproduction.md, about eight minutes"
 	@echo "make bench-methods  run every method on the same cells (a quarter of an hour); writes docs/guides/which-method.md"
 	@echo "make format    put the code into shape"
 	@echo "make clean     remove .venv, caches and results"

@@ -21,7 +21,8 @@ from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Solid, Sphere, bo
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
 from cellplan.io.robots.bundled import load_bundled
 from cellplan.io.robots.urdf.load import load_urdf
-from cellplan.model.cell import Cell, CheckSettings, Mode, MotionSettings, Obstacle, Part, Robot, Tool
+from cellplan.model.cell import Cell, Mode, MotionSettings, Obstacle, Part, Robot, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.solver import SolverSettings

@@ -12,16 +12,16 @@ The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
 - compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``map_study``,
-  ``search_layout``, ``repair``, ``rehearse``
+  ``search_layout``, ``repair``, ``rehearse``, ``recover``
 - verify: ``verify``, ``open_gate``
 - write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
-  ``export_program``; 3-D pages: ``view``, ``write_view``; floor plans:
+  ``write_recovery``, ``export_program``, ``export_programs``; 3-D pages: ``view``, ``write_view``; floor plans:
   ``requested_floor_plan``, ``write_floor_plan``
 - show: ``tables``, ``to_frame``, ``to_html``: results as pandas frames, and in a notebook
 - inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``, ``FloorPlanRequest``
+  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``, ``FloorPlanRequest``, ``Choice``
 - results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
-  ``LayoutResult``, ``Repair``, ``VerifiedRun``
+  ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``
 - errors: ``CellplanError``
 
 All values are frozen data in metres, radians and seconds, with NumPy arrays; frames, pages and files are in mm, deg and
@@ -54,7 +54,9 @@ if TYPE_CHECKING:
     from cellplan.pipeline.base_map.prepared import MapRequest
     from cellplan.pipeline.base_map.study import map_study
     from cellplan.pipeline.compare import CompareJob, compare
-    from cellplan.pipeline.export import export_program
+    from cellplan.pipeline.export.choice import Choice
+    from cellplan.pipeline.export.program import export_program
+    from cellplan.pipeline.export.several import Exported, export_programs
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
     from cellplan.pipeline.fastest.write import write_fastest
     from cellplan.pipeline.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
@@ -63,6 +65,8 @@ if TYPE_CHECKING:
     from cellplan.pipeline.layout.search import LayoutResult, search_layout
     from cellplan.pipeline.present.frames import tables, to_frame
     from cellplan.pipeline.present.notebook import to_html
+    from cellplan.pipeline.recover.recover import Recovery, recover
+    from cellplan.pipeline.recover.write import write_recovery
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.write import write_rehearsal
     from cellplan.pipeline.repair.repair import Repair, repair
@@ -85,7 +89,9 @@ _HOME: Final = {
     "Cell": "model.cell",
     "CellplanError": "errors",
     "Check": "model.report",
+    "Choice": "pipeline.export.choice",
     "CompareJob": "pipeline.compare",
+    "Exported": "pipeline.export.several",
     "FloorPlanRequest": "pipeline.floor_plan_file",
     "LayoutRequest": "pipeline.layout.request",
     "LayoutResult": "pipeline.layout.search",
@@ -93,6 +99,7 @@ _HOME: Final = {
     "Motion": "model.motion",
     "Part": "model.cell",
     "Program": "model.motion",
+    "Recovery": "pipeline.recover.recover",
     "Repair": "pipeline.repair.repair",
     "Report": "model.report",
     "Robot": "model.cell",
@@ -107,12 +114,14 @@ _HOME: Final = {
     "ViewRequest": "pipeline.view.write",
     "base_map": "pipeline.base_map.judged",
     "compare": "pipeline.compare",
-    "export_program": "pipeline.export",
+    "export_program": "pipeline.export.program",
+    "export_programs": "pipeline.export.several",
     "fastest": "pipeline.fastest.shortest",
     "load_cell": "io.cell.load",
     "load_errors": "io.cell_errors",
     "map_study": "pipeline.base_map.study",
     "open_gate": "pipeline.gate.open_gate",
+    "recover": "pipeline.recover.recover",
     "rehearse": "pipeline.rehearsal.rehearse",
     "repair": "pipeline.repair.repair",
     "requested_floor_plan": "pipeline.floor_plan_file",
@@ -129,6 +138,7 @@ _HOME: Final = {
     "write_fastest": "pipeline.fastest.write",
     "write_floor_plan": "pipeline.floor_plan_file",
     "write_repair": "pipeline.repair.write",
+    "write_recovery": "pipeline.recover.write",
     "write_rehearsal": "pipeline.rehearsal.write",
     "write_run": "pipeline.write_run",
     "write_view": "pipeline.view.write",
@@ -141,7 +151,9 @@ __all__ = [
     "Cell",
     "CellplanError",
     "Check",
+    "Choice",
     "CompareJob",
+    "Exported",
     "FloorPlanRequest",
     "LayoutRequest",
     "LayoutResult",
@@ -149,6 +161,7 @@ __all__ = [
     "Motion",
     "Part",
     "Program",
+    "Recovery",
     "Repair",
     "Report",
     "Robot",
@@ -165,11 +178,13 @@ __all__ = [
     "base_map",
     "compare",
     "export_program",
+    "export_programs",
     "fastest",
     "load_cell",
     "load_errors",
     "map_study",
     "open_gate",
+    "recover",
     "rehearse",
     "repair",
     "requested_floor_plan",
@@ -185,6 +200,7 @@ __all__ = [
     "write_base_map",
     "write_fastest",
     "write_floor_plan",
+    "write_recovery",
     "write_rehearsal",
     "write_repair",
     "write_run",

@@ -1,45 +1,68 @@
-"""A program format of your own: one JSON file per robot, read back and verified before it is written.
+"""A program format of your own: one file of rows per robot, read back and verified before it is written.
 
-A format is an entry of ``EXPORTERS``: a function that renders a verified run, an independent reader of the text,
-and the number of decimals. ``export_program`` makes every check again on what the reader returns.
+A format is a ``Dialect`` among ``DIALECTS``: a function that renders a job, an independent reader of the text, which
+knows the cell and the names of robots and programs but no row, and what the format can promise. ``export_program``
+makes every check again on what the reader returns.
 """
 
-import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from cellplan import export_program, load_cell, open_gate, solve, write_run
-from cellplan.pipeline.export import EXPORTERS, Exporter
+from cellplan.errors import InputError
+from cellplan.export.dialect import Dialect
+from cellplan.export.text import comment, fixed
+from cellplan.model.exported import ProgramRows, Promise, RobotRows
+from cellplan.pipeline.export.dialects import DIALECTS
 
 CELL = Path(__file__).resolve().parent / "plate.yaml"
-RUN, PROGRAMS = Path("outputs/examples/run"), Path("outputs/examples/json")
-DECIMALS = 9  # of a second, and of a degree: this example is for revolute joints
+RUN, PROGRAMS = Path("outputs/examples/run"), Path("outputs/examples/rows")
+DECIMALS = 9  # of a second, and of a degree: this example is for revolute joints of one program
 
 
-def render(run):
-    """One file per robot: times in [s] and joint positions in [deg], a list per sample."""
-    (motion,) = run.motions
-    return {f"{name}.json": json.dumps(rows(table)) for name, table in motion.tables.items()}
+def render(job):
+    """One file per robot: what is promised as comments, then time in [s] and joint positions in [deg], a row a line."""
+    head = [line for note in job.notes for line in comment(note, "#")]
+    (program,) = job.programs
+    return {f"{name}.rows": "\n".join([*head, *lines(program.robots[name])]) + "\n" for name in job.frame.robots}
 
 
-def rows(table):
-    """Time and joint positions of each sample, rounded."""
-    return np.column_stack([table.times, np.rad2deg(table.q)]).round(DECIMALS).tolist()
+def lines(rows):
+    """The rows of a robot as text."""
+    numbers = np.column_stack([rows.times, np.rad2deg(rows.q)])
+    return [" ".join(fixed(number, DECIMALS) for number in row) for row in numbers]
 
 
-def read(run, files):
-    """The joint tables that the files hold."""
-    (motion,) = run.motions
-    tables = {}
-    for name, table in motion.tables.items():
-        numbers = np.array(json.loads(files[f"{name}.json"]))
-        tables[name] = replace(table, times=numbers[:, 0].copy(), q=np.deg2rad(numbers[:, 1:]))
-    return (tables,)
+def read(frame, files):
+    """The rows that the files hold."""
+    return (ProgramRows(name=None, robots={name: own_rows(frame, files, name) for name in frame.robots}),)
 
 
-EXPORTERS["json"] = Exporter(render=render, read=read, decimals=DECIMALS)
+def own_rows(frame, files, name):
+    """The rows of one robot, with the file and the line of what is wrong."""
+    found = []
+    for number, line in enumerate(files[f"{name}.rows"].splitlines(), start=1):
+        if line.startswith("#"):
+            continue
+        try:
+            found.append([float(field) for field in line.split(" ")])
+        except ValueError:
+            raise InputError(f"{name}.rows:{number}: expected numbers, got {line[:40]!r}") from None
+        if len(found[-1]) != 1 + len(frame.robot(name).model.joints):
+            raise InputError(f"{name}.rows:{number}: expected a time and all joints, got {len(found[-1])} numbers")
+    numbers = np.array(found)
+    return RobotRows(robot=name, times=numbers[:, 0].copy(), q=np.deg2rad(numbers[:, 1:]))
+
+
+DIALECTS["rows"] = Dialect(
+    name="rows",
+    title="lines of numbers",
+    render=render,
+    read=read,
+    decimals=DECIMALS,
+    promises=(Promise.TIMED,),
+)
 cell = load_cell(CELL)
 write_run(solve(cell), RUN)
-print("written:", *export_program(open_gate(RUN), PROGRAMS, form="json"))
+print("written:", *export_program(open_gate(RUN), PROGRAMS, form="rows"))

@@ -9,7 +9,7 @@ import pytest
 from nbclient import NotebookClient
 
 import cellplan.planning.methods
-from cellplan.pipeline.export import EXPORTERS
+from cellplan.pipeline.export.dialects import DIALECTS
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 NOTEBOOK = EXAMPLES / "gallery" / "first_look.ipynb"
@@ -38,7 +38,7 @@ PRINTED = {
         "subject  used",
     ],
     "layout": ["certified after 1 trial, 1 solved", "solved again: passed True"],
-    "own_exporter": ["written: left.json right.json"],
+    "own_exporter": ["written: left.rows right.rows"],
     "own_method": ["circle: 150 Euler steps, position error 0.2"],
     "plot_joint": ["picture: outputs/examples/joint.png"],
     "rehearse": ["as planned: largest position error of the real tool on the real part 0.8000 mm", "corrected: "],
@@ -49,7 +49,7 @@ PRINTED = {
 WRITTEN = {
     "gallery/solve_and_plot": ["outputs/examples/gallery/feed.png"],
     "layout": ["outputs/examples/layout/best.yaml", "outputs/examples/layout/study.html"],
-    "own_exporter": ["outputs/examples/json/left.json", "outputs/examples/json/right.json"],
+    "own_exporter": ["outputs/examples/rows/left.rows", "outputs/examples/rows/right.rows"],
     "plot_joint": ["outputs/examples/joint.png"],
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],
 }
@@ -68,7 +68,7 @@ def test_an_example_runs_and_prints_what_it_announces(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cellplan.planning.methods, "__path__", [*cellplan.planning.methods.__path__])
-    monkeypatch.setattr("cellplan.pipeline.export.EXPORTERS", dict(EXPORTERS))
+    monkeypatch.delitem(DIALECTS, "rows", raising=False)  # what an example adds is gone after it
 
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
 

@@ -91,6 +91,10 @@ class LeverArms:
         """By how much each axis moves from row to row, without its sign, in [rad] or [m], shape (n - 1, axes)."""
         return np.abs(np.diff(q[:, self._columns], axis=0) * self._ratios)
 
+    def kinks(self, q: Array) -> Array:
+        """By how much the motion of each axis changes from step to step, without its sign, shape (n - 2, axes)."""
+        return np.abs(np.diff(q[:, self._columns], n=2, axis=0) * self._ratios)
+
     def chain(self, first: int | None, second: int) -> Chain:
         """The joints between two of the engine's bodies; ``first`` is None for the ground."""
         chain = self._known.get((first, second))

@@ -8,6 +8,8 @@ import numpy as np
 from cellplan.checks.clearance.check import UNKNOWN, check_clearance
 from cellplan.checks.clearance.idle import check_idle
 from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.clearance.skew import allowed_skew, has_clocks
+from cellplan.checks.clearance.stops import check_stops, stop_report
 from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
@@ -128,17 +130,42 @@ def verify_motion(
     )
 
 
-def with_clearance(report: Report, scene: Scene, schedule: Schedule, *, progress: Progress = silent) -> Report:
+def with_clearance(
+    report: Report, scene: Scene, schedule: Schedule, *, is_reported: bool = True, progress: Progress = silent
+) -> Report:
     """The report of ``verify_motion``, completed by the clearance of all bodies and the depth of mounted ones.
 
     Args:
         report: The report on the motion.
         scene: The scene that it was made with.
         schedule: Likewise.
+        is_reported: See ``with_clocks``.
         progress: Called with the stage and the fraction done.
     """
     q = stacked(scene.cell, report.q)
-    return completed(report, run_clearance(scene, schedule, q, progress=progress))
+    found = completed(report, run_clearance(scene, schedule, q, progress=progress))
+    return with_clocks(found, scene, schedule, is_reported=is_reported, progress=progress)
+
+
+def with_clocks(
+    report: Report, scene: Scene, schedule: Schedule, *, is_reported: bool = True, progress: Progress = silent
+) -> Report:
+    """The report with what only a cell with controllers has: the allowed skew of their clocks, and stops of a robot.
+
+    Args:
+        report: The report with its clearance.
+        scene: The scene that it was made with.
+        schedule: Likewise.
+        is_reported: Whether figures that no check judges are worked out too: not in a search, of which no report is
+            written. Stops count there only if the cell demands something of them.
+        progress: Called with the stage and the fraction done.
+    """
+    if is_reported and has_clocks(scene.cell):
+        report = replace(report, skew=allowed_skew(scene, schedule, report.q, report.depths, progress=progress))
+    if not is_reported and scene.cell.checks.stop is None:
+        return report
+    stops = stop_report(scene, schedule, report.q, progress=progress)
+    return replace(report, stops=stops, checks=(*report.checks, *check_stops(scene.cell, stops)))
 
 
 def run_clearance(

@@ -89,6 +89,13 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start_found": list(result.found),
         "start_choice": result.choice,
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
+        "controllers": {
+            name: {
+                "kind": str(controller.kind),
+                "robots": [it.name for it in result.cell.robots if it.control and it.control.controller == name],
+            }
+            for name, controller in result.cell.controllers.items()
+        },
         "direction": {task.name: direction_record(task) for task in result.cell.tasks},
         "checks": [check_record(each) for each in result.checks],
         "open_surfaces": open_surfaces,

@@ -1,30 +1,75 @@
 """``cellplan export``: controller programs from a verified run."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cellplan.cli.completion import FORMATS, one_of
+from cellplan.cli.completion import FORMATS, TARGETS, one_of
+from cellplan.cli.errors import error_lines, exit_status
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
-from cellplan.cli.output import json_failure, say_json, show
+from cellplan.cli.output import Result, json_failure, present
 from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 
+if TYPE_CHECKING:
+    from cellplan.model.exported import Targets
+    from cellplan.model.progress import Progress
+    from cellplan.model.verified_run import VerifiedRun
+    from cellplan.pipeline.export.several import Exported
+
 SCHEMA = "cellplan.exported/1"
 
-Format = Annotated[
-    str,
+Formats = Annotated[
+    list[str],
     typer.Option(
         "--format",
         metavar="NAME",
-        help="Format: csv, or wide: one table of all robots.",
+        help="Format: csv, json or ros2 for any controller; krl, rapid, urscript or val3 for those of a maker; stream: "
+        "rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: every one that can "
+        "take the run.",
         show_default=False,
-        autocompletion=one_of(FORMATS),
+        autocompletion=one_of((*FORMATS, "all")),
     ),
 ]
+Robots = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME",
+        help="Only this robot; may be repeated (default: all whose controller plays the format).",
+        show_default=False,
+    ),
+]
+TargetsOf = Annotated[
+    str,
+    typer.Option(
+        "--targets",
+        metavar="KIND",
+        help="What rows state: joints, or part: tool poses on the part.",
+        autocompletion=one_of(TARGETS),
+    ),
+]
+Split = Annotated[
+    int | None, typer.Option("--split", metavar="N", help="Most rows of a file or routine (default: of the format).")
+]
+ThinMm = Annotated[
+    float | None,
+    typer.Option("--thin-mm", metavar="MM", help="How far a tool may be off where rows are left out (default: 0.05)."),
+]
+ThinDeg = Annotated[
+    float | None,
+    typer.Option("--thin-deg", metavar="DEG", help="How far a turning joint may be off there (default: 0.05)."),
+]
 Output = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Folder (default: RUN/programs/<format>).")
+    Path | None,
+    typer.Option(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="Folder (default: RUN/programs/<format>); for several formats DIR/<format> each.",
+    ),
 ]
 WithoutCell = Annotated[
     bool,
@@ -34,8 +79,13 @@ WithoutCell = Annotated[
 
 def export(  # noqa: PLR0913, PLR0917 - the options of the command
     run: RunDir,
-    form: Format,
+    form: Formats,
     output: Output = None,
+    robot: Robots = None,
+    targets: TargetsOf = "joints",
+    split: Split = None,
+    thin_mm: ThinMm = None,
+    thin_deg: ThinDeg = None,
     cell: OriginalCell = None,
     without_cell: WithoutCell = False,
     as_json: AsJson = False,
@@ -45,29 +95,136 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
     """Write controller programs, from a verified run only.
 
     The run is verified first, and the rounded numbers of the programs after that. Exit status: 0 written, 1 a check
-    fails, 2 bad input, or a run that is changed or stale, 4 internal error. Nothing is written unless it is 0.
+    fails, 2 bad input, or a run that is changed or stale, 4 internal error. One format is written only if it is 0. Of
+    several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
     """
     with json_failure(SCHEMA, desired=as_json):
-        from cellplan.pipeline.export import default_folder, export_program, refuse_unless_exportable, require_format
+        from cellplan.io.run.folder import PROGRAMS
+        from cellplan.pipeline.export.choice import Choice
+        from cellplan.pipeline.export.program import default_folder, refuse_choice
+        from cellplan.pipeline.export.several import chosen_formats, refuse_unless_writable
         from cellplan.pipeline.gate.open_gate import open_gate
 
-        require_format(form)
-        _require_choice(cell, without_cell=without_cell)
-        folder = output or default_folder(run, form)
-        refuse_unless_exportable(folder, run)
+        formats = chosen_formats(form)
+        require_choice(cell, without_cell=without_cell)
+        choice: dict[str, Any] = {"robots": tuple(robot or ()), "targets": _targets(targets), "split": split}
+        choice |= {"thin_mm": thin_mm, "thin_deg": thin_deg}
+        single = next(iter(formats)) if list(formats.values()) == [True] else None
+        if single:
+            refuse_choice(single, Choice(**choice))
+        folder = output or (default_folder(run, single) if single else run / PROGRAMS)
+        refuse_unless_writable([folder] if single else [folder / name for name in formats], run)
         with progress_listener(quiet=quiet) as progress:
             verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), progress=progress)
-            files = export_program(verified, folder, form=form, progress=progress)
-    if as_json:
-        status = {"status": "exported", "exit": int(ExitStatus.PASSED)}
-        about = {"folder": str(folder), "format": form, "run": verified.digest, "files": list(files)}
-        say_json({"schema": SCHEMA, **status, **about, "remarks": list(verified.remarks)})
-        return
-    lines = [f"{verified.cell.name}: exported", *(f"  note: {remark}" for remark in verified.remarks)]
-    show([*lines, f"programs: {folder}"], passed=True)
+            if single:
+                result = _one(verified, folder, single, choice=choice, progress=progress)
+            else:
+                result = _several(verified, folder, form, choice=choice, progress=progress)
+    present(result, as_json=as_json)
+    raise typer.Exit(result.status)
 
 
-def _require_choice(cell: Path | None, *, without_cell: bool) -> None:
+def _one(verified: "VerifiedRun", folder: Path, form: str, *, choice: dict[str, Any], progress: "Progress") -> Result:
+    """Write one format into a folder."""
+    from cellplan.pipeline.export.choice import Choice
+    from cellplan.pipeline.export.program import export_program
+    from cellplan.pipeline.export.stored import read_stored_export
+
+    files = export_program(verified, folder, form=form, choice=Choice(**choice), progress=progress)
+    record = read_stored_export(folder).record
+    status = {"status": "exported", "exit": int(ExitStatus.PASSED)}
+    about = {"folder": str(folder), "format": form, "run": verified.digest, "files": list(files)}
+    remarks = {"remarks": list(verified.remarks), "export": record}
+    lines = [f"{verified.cell.name}: exported", *promise_lines(record), *_notes(verified), f"programs: {folder}"]
+    return Result(status=ExitStatus.PASSED, lines=lines, record={"schema": SCHEMA, **status, **about, **remarks})
+
+
+def _several(
+    verified: "VerifiedRun", folder: Path, forms: Sequence[str], *, choice: dict[str, Any], progress: "Progress"
+) -> Result:
+    """Write several formats, each into a folder of its own within a folder."""
+    from cellplan.pipeline.export.choice import Choice
+    from cellplan.pipeline.export.several import export_programs
+
+    found = export_programs(verified, folder, formats=forms, choice=Choice(**choice), progress=progress)
+    status, written = _status(found), [each.form for each in found if each.refusal is None]
+    word = "exported" if status == ExitStatus.PASSED else "refused"
+    about = {"status": word, "exit": int(status), "folder": str(folder), "run": verified.digest}
+    record = {
+        "schema": SCHEMA,
+        **about,
+        "remarks": list(verified.remarks),
+        "exports": [_record(each) for each in found],
+    }
+    lines = [f"{verified.cell.name}: exported {', '.join(written) or 'nothing'}"]
+    for each in found:
+        lines += [f"  {each.form}: {'refused' if each.refusal else each.folder}"]
+        lines_of_it = error_lines(each.refusal) if each.refusal else promise_lines(each.record or {"files": ()})
+        lines += [f"  {line}" if each.record else f"    {line.removeprefix('error: ')}" for line in lines_of_it]
+    return Result(status=status, lines=[*lines, *_notes(verified), f"programs: {folder}"], record=record)
+
+
+def _status(found: Sequence["Exported"]) -> ExitStatus:
+    """How the command ends: what was named must be written, and something of all."""
+    refused = [each.refusal for each in found if each.refusal is not None]
+    if len(refused) < len(found) and not any(each.is_named and each.refusal for each in found):
+        return ExitStatus.PASSED
+    if len(refused) == len(found) and all(isinstance(each, InputError) for each in refused):
+        return ExitStatus.BAD_INPUT
+    return ExitStatus.CHECK_FAILED
+
+
+def _record(each: "Exported") -> dict[str, Any]:
+    """What came of one format among several, for machines."""
+    about = {"format": each.form, "folder": str(each.folder)}
+    if each.refusal is not None:
+        return {
+            **about,
+            "status": "refused",
+            "exit": int(exit_status(each.refusal)),
+            "errors": error_lines(each.refusal),
+        }
+    return {**about, "status": "exported", "exit": 0, "files": list(each.files), "export": each.record}
+
+
+def _notes(verified: "VerifiedRun") -> list[str]:
+    """What to know before relying on the run."""
+    return [f"  note: {remark}" for remark in verified.remarks]
+
+
+def promise_lines(record: Mapping[str, Any]) -> Iterator[str]:
+    """What is promised of exported programs and why not more, and what was found in them.
+
+    Args:
+        record: What their ``export.json`` says.
+    """
+    if "promise" in record:
+        yield f"  promise: {record['promise']}"
+        yield from (f"    {reason}" for reason in [*record["reasons"], *record["remarks"]])
+        if record["allowed_skew"] is not None:
+            yield f"  {record['allowed_skew']['line']}"
+        if record["marks"]:
+            count = sum(len(marks["times_s"]) for marks in record["marks"])
+            yield f"  marks: all robots of the cell wait for one another at {count}"
+        yield f"  {record['deviation']}"
+        yield from (f"  not judged: {text}" for text in record["not_judged"])
+    yield f"  files: {len(record['files'])}"
+
+
+def _targets(word: str) -> "Targets":
+    """What rows state.
+
+    Raises:
+        InputError: There is no such kind of row.
+    """
+    from cellplan.model.exported import Targets
+
+    if word not in TARGETS:
+        raise InputError(f"--targets: expected one of {', '.join(TARGETS)}, got '{word}'")
+    return Targets(word)
+
+
+def require_choice(cell: Path | None, *, without_cell: bool) -> None:
     """Require exactly one of the cell file that was solved and ``--without-cell``.
 
     Raises:

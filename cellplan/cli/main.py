@@ -25,6 +25,7 @@ from cellplan.cli.init import init
 from cellplan.cli.layout import layout
 from cellplan.cli.output import say
 from cellplan.cli.overview import FIRST_STEPS, WIDEST, Overview, examples
+from cellplan.cli.recover import recover
 from cellplan.cli.rehearse import rehearse
 from cellplan.cli.robots import robots
 from cellplan.cli.schema import schema
@@ -54,7 +55,7 @@ COMMANDS: Final[dict[str, dict[str, Callable[..., None]]]] = {
     "Begin": {"init": init, "robots": robots, "check": check, "explain": explain, "schema": schema},
     "Solve": {"solve": solve, "view": view, "floorplan": floor_plan, "verify": verify, "export": export},
     "Improve": {"layout": layout, "map": base_map, "fastest": fastest, "sweep": sweep, "compare": compare},
-    "Real cell": {"rehearse": rehearse},
+    "Real cell": {"rehearse": rehearse, "recover": recover},
 }  # by group, in the order of work
 
 

@@ -38,6 +38,10 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     "sweep": ("cellplan sweep cell.yaml --vary motion.duration_s=3:6:0.5",),
     "compare": ("cellplan compare cell.yaml", "cellplan compare outputs/one outputs/two"),
     "rehearse": ("cellplan rehearse cell.yaml --errors errors.yaml --feedback",),
+    "recover": (
+        "cellplan recover outputs/cell --at 1.32 --cell cell.yaml",
+        "cellplan recover outputs/cell --at 1.32 --frozen kuka@1.30 --keep abb --without-cell",
+    ),
     "robots": ("cellplan robots kuka_kr16_2", "cellplan robots arm.urdf --flange tool0"),
 }  # by command; each is understood
 

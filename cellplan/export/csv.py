@@ -7,54 +7,76 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.export.dialect import Dialect
 from cellplan.export.rounding import from_file_unit, rounded_inside, rounded_quanta
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
+from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.motion import JointTable
-from cellplan.model.verified_run import VerifiedRun
 
 DECIMALS: Final = 9  # of a degree, millimetre or second: a joint's speed over 1 ms is kept to a millionth of a degree/s
 CLOCK: Final = "time_s"
 _NUMBER: Final = rf"-?[0-9]{{1,7}}\.[0-9]{{{DECIMALS}}}"
 
 
-def render_csv(run: VerifiedRun) -> dict[str, str]:
+def render_csv(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.csv``, or ``<task>/<robot>.csv``.
 
     A program from home to home is one file for each robot.
 
     Args:
-        run: The verified run.
+        job: What is written; every row has its time.
 
     Raises:
-        InputError: A joint cannot be written with the decimals of the format.
+        InputError: A joint or a time cannot be written with the decimals of the format.
     """
     return {
-        file_name(name, robot): _render(run.cell.robot(robot), table)
-        for name, tables in run.programs.items()
-        for robot, table in tables.items()
+        file_name(program.name, name): _render(job.frame.robot(name), program.robots[name])
+        for program in job.programs
+        for name in job.frame.robots
     }
 
 
-def read_csv(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, JointTable], ...]:
-    """Read the files of an export back, strictly: the tables of each motion, by robot name.
+def read_csv(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back, strictly: the rows of each program.
 
     Args:
-        run: The run that they were made from.
+        frame: Robots and programs.
         files: Text by path, as ``render_csv`` gives it.
 
     Raises:
-        InputError: With file and line, when a text is not such a file.
+        InputError: With file and line, when a text is not such a file; a file is missing, or is one too many.
     """
-    found = [
-        {
-            robot: read_table(run.cell.robot(robot), files[path], path)
-            for robot in tables
-            for path in [file_name(name, robot)]
-        }
-        for name, tables in run.programs.items()
-    ]
-    return run.by_phase(found)
+    paths = {file_name(program, robot): (program, robot) for program in frame.programs for robot in frame.robots}
+    refuse_other_files(files, paths)
+    tables = {paths[path]: _table_of_program(frame.robot(paths[path][1]), files[path], path) for path in paths}
+    for program in frame.programs:
+        _refuse_other_clocks(frame, program, {robot: tables[program, robot] for robot in frame.robots})
+    return tuple(
+        ProgramRows(
+            name=program,
+            robots={
+                robot: RobotRows(robot=robot, q=table.q, times=table.times)
+                for robot in frame.robots
+                for table in [tables[program, robot]]
+            },
+        )
+        for program in frame.programs
+    )
+
+
+def refuse_other_files(files: Mapping[str, str], expected: Mapping[str, object]) -> None:
+    """Refuse files that a format does not write, and those that are missing.
+
+    Raises:
+        InputError: There is such a file.
+    """
+    for name in files:
+        if name not in expected:
+            raise InputError(f"{name}: expected no such file among the programs")
+    for name in expected:
+        if name not in files:
+            raise InputError(f"{name}: expected this file among the programs, got none")
 
 
 def file_name(program: str | None, robot: str) -> str:
@@ -87,9 +109,11 @@ def joint_fields(robot: Robot, q: Array) -> dict[str, list[str]]:
     }
 
 
-def _render(robot: Robot, table: JointTable) -> str:
+def _render(robot: Robot, rows: RobotRows) -> str:
     """The file of one robot."""
-    columns = [time_fields(table.times), *joint_fields(robot, table.q).values()]
+    if rows.times is None:
+        raise InputError(f"robot '{robot.name}': expected a time of every row, got none")
+    columns = [time_fields(rows.times), *joint_fields(robot, rows.q).values()]
     return "\n".join([_names(robot), *map(",".join, zip(*columns, strict=True))]) + "\n"
 
 
@@ -133,3 +157,40 @@ def read_table(robot: Robot, text: str, file: str) -> JointTable:
         times=numbers[:, 0].copy(),
         q=np.stack(positions, axis=1),
     )
+
+
+def _table_of_program(robot: Robot, text: str, file: str) -> JointTable:
+    """The file of one robot, whose times rise from zero."""
+    table = read_table(robot, text, file)
+    if not len(table.times) or table.times[0] != 0.0:
+        raise InputError(f"{file}:2: expected a first row at 0 s")
+    falling = np.flatnonzero(np.diff(table.times) <= 0.0)
+    if len(falling):
+        row = int(falling[0]) + 1
+        raise InputError(
+            f"{file}:{row + 2}: expected a time after {table.times[row - 1]:g} s, got {table.times[row]:g} s"
+        )
+    return table
+
+
+def _refuse_other_clocks(frame: ExportFrame, program: str | None, tables: Mapping[str, JointTable]) -> None:
+    """Refuse robots of one program whose rows have other times than those of its first one."""
+    first = tables[frame.robots[0]]
+    for robot, table in tables.items():
+        file, most = file_name(program, robot), min(len(table.times), len(first.times))
+        other = np.flatnonzero(table.times[:most] != first.times[:most])
+        row = int(other[0]) if len(other) else most
+        if len(other) or len(table.times) != len(first.times):
+            expected = f"{first.times[row]:.{DECIMALS}f} s" if row < len(first.times) else "the end"
+            got = f"{table.times[row]:.{DECIMALS}f} s" if row < len(table.times) else "the end"
+            raise InputError(f"{file}:{row + 2}: expected {expected} as in the file of '{first.robot}', got {got}")
+
+
+CSV: Final = Dialect(
+    name="csv",
+    title="one table for each robot, for any controller",
+    render=render_csv,
+    read=read_csv,
+    decimals=DECIMALS,
+    promises=(Promise.TIMED,),
+)

@@ -4,6 +4,8 @@ Times and joint positions are written as in the plain format, so that they are v
 else is what the checks found in these rows. A field without a value is empty.
 """
 
+from typing import Final
+
 import numpy as np
 
 from cellplan.errors import InputError
@@ -11,6 +13,8 @@ from cellplan.export.csv import DECIMALS, joint_fields, read_table, time_fields
 from cellplan.export.wide_columns import TIME, Column, ProgramRows, wide_columns
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import JointTable
+
+_FIXED: Final = f"%.{DECIMALS}f"
 
 
 def file_name(program: str | None) -> str:
@@ -77,9 +81,11 @@ def _fields(column: Column) -> list[str]:
     if column.dtype == np.int8:
         return [str(value) for value in column.tolist()]
     rounded = np.round(column.astype(np.float64), DECIMALS) + 0.0  # without -0
-    return ["" if np.isnan(value) else _number(value) for value in rounded.tolist()]
+    if len(rounded) and np.all(rounded == rounded[0]):
+        return [_number(float(rounded[0]))] * len(rounded)
+    return list(map(_number, rounded.tolist()))
 
 
 def _number(value: float) -> str:
-    """A number without an exponent and without zeros at its end."""
-    return f"{value:.{DECIMALS}f}".rstrip("0").rstrip(".")
+    """A number without an exponent and without zeros at its end; empty where there is none."""
+    return (_FIXED % value).rstrip("0").rstrip(".") if value == value else ""  # noqa: PLR0124 - not so for no number

@@ -127,6 +127,10 @@ class CombinedModel:
         """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
         return per_axis @ self._spread
 
+    def by_flange(self, per_axis: Array) -> Array:
+        """The same over those axes only that are on the way to a flange."""
+        return per_axis @ self._spread_to_flange
+
     def to_flange(self, per_joint: Array) -> Array:
         """Share of each axis on the way to a flange in what belongs to the joints, shape (..., nq) to (..., links)."""
         return per_joint @ self._spread_to_flange.T

@@ -1,8 +1,7 @@
 """Cell: the content of a cell file, as immutable data."""
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -12,6 +11,8 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
+from cellplan.model.check_settings import CheckSettings
+from cellplan.model.controllers import Controller, RobotControl
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.joint_spline import JointSpline
 from cellplan.model.layout import LayoutSettings
@@ -77,6 +78,7 @@ class Robot:
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
         order: Names of its tasks and of marks in their order; empty for that of the cell's tasks.
         path: Its joints over the whole clock; None where they follow from the tasks.
+        control: Where it is connected; None when no controller is stated.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Robot:
     gripper: tuple[str, ...] = ()
     order: tuple[str, ...] = ()
     path: JointSpline | None = None
+    control: RobotControl | None = None
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:
@@ -243,41 +246,6 @@ class MotionSettings:
     finer: float | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Exclusion:
-    """A pair of bodies the user wants left out of the collision check, and why."""
-
-    bodies: tuple[str, str]
-    reason: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckSettings:
-    """Requirements of the checks.
-
-    Attributes:
-        clearance: Smallest allowed distance in [m] between things that must not touch.
-        adds_accuracy: Whether the accuracy of both bodies is added to the demanded clearance of a pair.
-        contact_zone: Radius in [m] round the tool tip within which tool and part may touch.
-        exclusions: Pairs left out at the user's word.
-        closure_position: Largest distance in [m] of a further holder's tool from its grasp.
-        closure_orientation: Largest angle in [rad] between the two.
-        standing_depth: By how much in [m] bodies that never move may overlap where one stands on the other.
-        part_acceleration: Largest allowed acceleration of the part in [m/s^2]; None: it is only reported.
-        tool_speed: Largest allowed speed of any tool tip in the world in [m/s]; None: it is only reported.
-    """
-
-    clearance: float
-    contact_zone: float
-    exclusions: tuple[Exclusion, ...] = ()
-    closure_position: float = 3e-6
-    closure_orientation: float = 1e-3 * math.pi / 180.0
-    standing_depth: float = 0.005
-    part_acceleration: float | None = None
-    tool_speed: float | None = None
-    adds_accuracy: bool = False
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cell(Presented):
     """Robots, part, tasks and surroundings.
@@ -296,6 +264,7 @@ class Cell(Presented):
         remarks: Key of the cell file, and what was not read of the file that it names.
         program: What is done from home to home; None for tasks that begin and end where they are worked on.
         layout: What a layout search may change; None for a cell that was built in Python.
+        controllers: Its controllers by name; empty when none are stated.
     """
 
     name: str
@@ -311,6 +280,7 @@ class Cell(Presented):
     remarks: tuple[tuple[str, str], ...] = ()
     program: ProgramSettings | None = None
     layout: LayoutSettings | None = None
+    controllers: Mapping[str, Controller] = field(default_factory=dict)
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

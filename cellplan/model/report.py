@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-import numpy as np
-
 from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
 from cellplan.model.between_rows import BetweenRows
@@ -13,6 +11,9 @@ from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
 from cellplan.model.phase import Phase
 from cellplan.model.presented import Presented
+from cellplan.model.repeatability import Repeatability
+from cellplan.model.skew import SkewReport
+from cellplan.model.stops import StopReport
 from cellplan.model.units import DisplayUnit, joint_unit
 from cellplan.model.verdict import verdict
 
@@ -20,7 +21,6 @@ CAUTION = (
     "offline result: run first at reduced speed; not a safety function; the risk assessment stays with the integrator"
 )
 
-CYCLE_TOL = 1e-9  # [-] of the whole time: cycles that differ by less are equally long
 REDUCED_SPEED = 0.25  # [m/s] of the tool tip: what ISO 10218-1 allows while people are near
 
 ASSUMPTION = "every joint moves linearly from each sample to the next"  # between the samples
@@ -283,58 +283,6 @@ class Conditioning:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointDrift:
-    """How far one joint is at the end of each cycle from where it was at its start.
-
-    Attributes:
-        robot: Name of the robot.
-        joint: Name of the joint.
-        is_revolute: Whether it turns rather than slides.
-        drift: Position at the end less position at the start of each cycle in [rad] or [m], shape (cycles,).
-        worst: Largest drift of a cycle, without its sign.
-        at_cycle: The cycle in which it is largest, counted from 1.
-    """
-
-    robot: str
-    joint: str
-    is_revolute: bool
-    drift: Array
-    worst: float
-    at_cycle: int
-
-    @property
-    def display_unit(self) -> DisplayUnit:
-        """Unit in which its positions are printed."""
-        return joint_unit(is_revolute=self.is_revolute)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Repeatability:
-    """Whether the joints come back when all tools do.
-
-    Attributes:
-        cycle_times: Times in [s] at which all tools are at their start together, shape (cycles + 1,).
-        drifts: One entry per joint of every robot.
-        closes: Whether every joint comes back in every cycle, so that the program may be repeated as it is.
-    """
-
-    cycle_times: Array
-    drifts: tuple[JointDrift, ...]
-    closes: bool
-
-    @property
-    def cycles(self) -> int:
-        """How many cycles there are."""
-        return len(self.cycle_times) - 1
-
-    @property
-    def period(self) -> float | None:
-        """Length of a cycle in [s]; None when the cycles differ in length."""
-        lengths = np.diff(self.cycle_times)
-        return float(lengths.mean()) if np.ptp(lengths) <= CYCLE_TOL * self.cycle_times[-1] else None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Report(Presented):
     """The verdict of one run and everything behind it.
 
@@ -357,10 +305,11 @@ class Report(Presented):
         depths: Depth of tools in the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
         loads: Load of each robot.
-        phases: All phases of the program on its nominal time, those that are not part of it among them; the times of
-            this report count from the begin of the phase that it is for.
+        phases: All phases on the nominal time of the program; times of this report count from the begin of its own.
         idle: Names of the robots that stand at their homes all the time.
         phase: Name of the phase that it is for; None for the only one of a program.
+        skew: How far the clocks of controllers may be apart; None for a cell that states no controllers.
+        stops: What happens at worst when one robot stops; None where no controller states how its robots go on.
     """
 
     cell: str
@@ -384,6 +333,8 @@ class Report(Presented):
     phases: tuple[Phase, ...] = ()
     idle: tuple[str, ...] = ()
     phase: str | None = None
+    skew: SkewReport | None = None
+    stops: StopReport | None = None
 
     @property
     def passed(self) -> bool:

@@ -77,8 +77,10 @@ class Integrator(StrEnum):
     EULER = "euler"
 
 
-def against_accurate(method: MethodName, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
-    """Keys of the solver's settings, as in the cell file, that rule the accurate mode out.
+def beside_smallest(method: MethodName, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
+    """Keys of the solver's settings by which the motion is another than that of the smallest weighted joint velocities.
+
+    Searches and screenings of many cells know only that one, by the weighted pseudo-inverse with constant weights.
 
     Args:
         method: The resolution method.
@@ -238,16 +240,21 @@ class SolverSettings:
     accuracy: float = 1e-7
 
     @property
-    def against_accurate(self) -> tuple[str, ...]:
-        """Keys of these settings that rule the accurate mode out."""
-        return against_accurate(
+    def beside_smallest(self) -> tuple[str, ...]:
+        """Keys of these settings by which the motion is not that of the smallest weighted joint velocities."""
+        return beside_smallest(
             self.method, has_goals=bool(self.goals), near_limits=self.weighting.near_limits, load=self.weighting.load
         )
 
     @property
+    def is_varied(self) -> bool:
+        """Whether goals or changing weights have a say in the null space of the tasks."""
+        return bool(self.goals) or self.weighting.near_limits > 0.0 or self.weighting.load > 0.0
+
+    @property
     def is_accurate(self) -> bool:
-        """Whether the motion is resolved accurately: Euler's steps are not prescribed, and nothing rules it out."""
-        return self.integrator is not Integrator.EULER and not self.against_accurate
+        """Whether the motion is resolved accurately: Euler's steps are not prescribed, and the method allows it."""
+        return self.integrator is not Integrator.EULER and self.traits.is_accurate
 
     @property
     def traits(self) -> MethodTraits:

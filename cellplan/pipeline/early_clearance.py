@@ -17,6 +17,9 @@ class EarlyClearance:
     """Works out the clearance of runs as ``solve`` does, with or without the curves that only the page of a run shows.
 
     A clearance that was begun belongs to its schedule and its rows; for any others it is worked out anew.
+
+    Attributes:
+        with_curves: Whether it is worked out with these curves.
     """
 
     def __init__(self, begin: Begin | None = None, *, with_curves: bool = False) -> None:
@@ -27,7 +30,7 @@ class EarlyClearance:
                 where all is done here.
             with_curves: Whether the distances over time are worked out sharply enough to be drawn.
         """
-        self._begin = begin
+        self.with_curves, self._begin = with_curves, begin
         self._clearance = run_clearance if with_curves else without_curves
         self._begun: list[tuple[Schedule, Array, Callable[[], Clearance]]] = []
 

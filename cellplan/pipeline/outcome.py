@@ -35,7 +35,7 @@ def solved_outcome(
     try:
         cell = read()
         require_task(cell, task)
-        solution = solve(cell, task=task)
+        solution = solve(cell, task=task, is_reported=folder is not None)
     except (InputError, NoSolutionError) as error:
         status = TrialStatus.BAD_INPUT if isinstance(error, InputError) else TrialStatus.NO_SOLUTION
         reason = str(error).splitlines()[0].replace(str(file), file.name)  # the same wherever the cell file lies

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from cellplan.checks.joints.joins import with_joins
-from cellplan.checks.verify import completed, stacked, verify_motion, with_clearance
+from cellplan.checks.verify import completed, run_clearance, stacked, verify_motion, with_clocks
 from cellplan.geometry.transforms import Array
 from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
@@ -31,7 +31,7 @@ from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 
-def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
+def solve(cell: Cell, *, task: str | None = None, is_reported: bool = True, progress: Progress = silent) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
     A program that violates a limit or collides is returned like any other: its reports state where, when and how much.
@@ -39,6 +39,8 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
     Args:
         cell: The cell, as ``load_cell`` gives it.
         task: Name of the only task to work on; the other operators stay at their homes.
+        is_reported: Whether figures of clocks that no check judges are worked out too, which a search does not need:
+            the allowed skew, and stops of a robot.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -46,7 +48,7 @@ def solve(cell: Cell, *, task: str | None = None, progress: Progress = silent) -
         NoSolutionError: No start posture or no home was found, or a tool lost its path.
     """
     scene, solution = solve_motion(cell, task=task, progress=progress)
-    return certified(solution, scene, progress=progress)
+    return certified(solution, scene, is_reported=is_reported, progress=progress)
 
 
 def solve_motion(
@@ -101,27 +103,39 @@ def _solve_program(
     )
 
 
-def certified(solution: Solution, scene: Scene, *, progress: Progress, early: EarlyClearance | None = None) -> Solution:
+def certified(
+    solution: Solution,
+    scene: Scene,
+    *,
+    is_reported: bool = True,
+    progress: Progress,
+    early: EarlyClearance | None = None,
+) -> Solution:
     """The solution with the clearance of every phase checked and the verdict in the headers of its tables.
 
     Args:
         solution: The solution of ``solve_motion``.
         scene: Its scene.
+        is_reported: See ``solve``; never of a clearance without the curves of a report.
         progress: Called with the stage and the fraction done.
         early: Has the clearance.
     """
-    reports = [_with_clearance(run, run.scene or scene, early, progress) for run in solution.runs]
+    reports = []
+    for run in solution.runs:
+        own = run.scene or scene
+        q = stacked(own.cell, run.report.q)
+        found = (
+            run_clearance(own, run.schedule, q, progress=progress)
+            if early is None
+            else (early.of(own, run.schedule, q, progress))
+        )
+        with_figures = is_reported and (early is None or early.with_curves)
+        report = completed(run.report, found)
+        reports.append(with_clocks(report, own, run.schedule, is_reported=with_figures, progress=progress))
     reports = with_joins(solution.cell, reports)
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))
-
-
-def _with_clearance(run: Run, scene: Scene, early: EarlyClearance | None, progress: Progress) -> Report:
-    """The report of a run, completed by its clearance."""
-    if early is None:
-        return with_clearance(run.report, scene, run.schedule, progress=progress)
-    return completed(run.report, early.of(scene, run.schedule, stacked(scene.cell, run.report.q), progress))
 
 
 def _runs(

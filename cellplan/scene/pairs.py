@@ -7,7 +7,8 @@ from enum import StrEnum
 from itertools import combinations
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell, CheckSettings
+from cellplan.model.cell import Cell
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE

@@ -8,7 +8,8 @@ from builders.random_cells import random_cell, random_model, random_pose
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, CheckSettings, Obstacle
+from cellplan.model.cell import Cell, Obstacle
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import BASE, Body
 from cellplan.scene.scene import Scene
 

@@ -6,16 +6,8 @@ import numpy as np
 
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
-from cellplan.model.cell import (
-    Cell,
-    CheckSettings,
-    Grasp,
-    Mode,
-    MotionSettings,
-    Part,
-    Robot,
-    Tool,
-)
+from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.solver import SolverSettings

@@ -6,13 +6,8 @@ import numpy as np
 
 from cellplan.geometry.shapes import Cylinder, Solid
 from cellplan.geometry.transforms import Array, pose, rotation_vector
-from cellplan.model.cell import (
-    Cell,
-    CheckSettings,
-    Mode,
-    MotionSettings,
-    Part,
-)
+from cellplan.model.cell import Cell, Mode, MotionSettings, Part
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (

@@ -6,17 +6,8 @@ import numpy as np
 
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
-from cellplan.model.cell import (
-    Cell,
-    CheckSettings,
-    Grasp,
-    Mode,
-    MotionSettings,
-    Obstacle,
-    Part,
-    Robot,
-    Tool,
-)
+from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel

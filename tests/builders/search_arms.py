@@ -11,7 +11,8 @@ from builders.random_cells import make_task
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_about, rotation_vector
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, CheckSettings, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.cell import Cell, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel

@@ -122,12 +122,14 @@ def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
 def _clearance(real: Callable[..., Any]) -> Callable[..., Any]:
     """The second part of ``solve``."""
 
-    def with_clearance(solution: Solution, scene: Any, *, progress: Progress, early: Any = None) -> Solution:
+    def with_clearance(
+        solution: Solution, scene: Any, *, progress: Progress, early: Any = None, is_reported: bool = True
+    ) -> Solution:
         if isinstance(scene, Solved):
             _say(scene.clearance_events, progress)
             return scene.whole
-        if early is not None:  # without curves
-            return real(solution, scene, progress=progress, early=early)
+        if early is not None or not is_reported:  # without curves, or without figures that only a report states
+            return real(solution, scene, progress=progress, early=early, is_reported=is_reported)
         entry = _state.making
         if entry is None or entry.motion is not solution:
             return real(solution, scene, progress=progress)

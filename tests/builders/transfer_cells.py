@@ -9,7 +9,8 @@ from builders.scene_builders import body, joint, make_cell, placed, stick
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.bundled import load_bundled
-from cellplan.model.cell import CheckSettings, Obstacle, Robot
+from cellplan.model.cell import Obstacle, Robot
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
 from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer

@@ -10,7 +10,7 @@ from builders.scene_builders import body, floor, joint, make_cell, placed, slide
 from cellplan.certify.certify import certify
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import CheckSettings
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import RobotModel
 from cellplan.scene.scene import Scene

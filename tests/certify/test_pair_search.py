@@ -14,7 +14,8 @@ from cellplan.collision.distance import APART_TOL, measure
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
 from cellplan.geometry.transforms import Array, frame_from_axes, pose, pose_from
-from cellplan.model.cell import Cell, CheckSettings
+from cellplan.model.cell import Cell
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
 from cellplan.scene.scene import Scene
 

@@ -7,6 +7,7 @@ import pytest
 from builders.stored_cells import write_cell
 
 from cellplan.cli.main import run
+from cellplan.report.text.check import check_lines
 
 
 def test_a_sound_cell_is_reported_with_postures_and_paths_and_nothing_is_written(
@@ -57,3 +58,18 @@ def test_names_that_were_read_over_are_notes_of_the_check(tmp_path: Path, capsys
 
     assert note.startswith(f"  note: {cell}:10: robots.right.model: right.urdf:")
     assert note.endswith("attribute 'command_effort' of <limit> is not known and was not read (and 2 more)")
+
+
+def test_controllers_are_listed_with_their_robots(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (cells / "planar_pair.yaml").read_text(encoding="utf-8")
+    for model in ("xyz_mm: [0, 0, 500]}", "rpy_deg: [0, 0, 180]}"):
+        text = text.replace(model, f"{model}\n    controller: {{id: master}}", 1)
+    path = tmp_path / "one_controller.yaml"
+    path.write_text(f"{text}controllers:\n  master: {{kind: other}}\n", encoding="utf-8")
+
+    assert run(["check", str(path), "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["controllers"] == {"master": {"kind": "other", "robots": ["left", "right"]}}
+    assert ["controller", "master", "other", "left,", "right"] in [line.split() for line in check_lines(record)]

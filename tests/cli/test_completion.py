@@ -13,7 +13,7 @@ from cellplan.cli.main import run
 from cellplan.io.robots.bundled import bundled_names
 from cellplan.model.cell import Mode
 from cellplan.model.solver import METHODS, Integrator
-from cellplan.pipeline.export import EXPORTERS
+from cellplan.pipeline.export.program import EXPORTERS
 from cellplan.search.programs.objective import Objective, Timing
 
 
@@ -48,7 +48,8 @@ def folder(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         ("map cells/four_robots.yaml --robot k", ["kuka"]),
         ("robots kuka_kr6", ["kuka_kr6", "kuka_kr6_maker_zero"]),
         ("robots ar", ["arm.urdf"]),
-        ("export outputs/run --format ", ["csv", "wide"]),
+        ("export outputs/run --format ", [*completion.FORMATS, "all"]),
+        ("export outputs/run --targets ", ["joints", "part"]),
         ("layout cells/four_robots.yaml --objective c", ["conforming", "cycle", "clearance", "change"]),
         ("--install-completion ", ["bash", "zsh", "fish"]),
     ],

@@ -167,16 +167,16 @@ def test_the_integrator_is_chosen_on_the_command_line_and_reported(
 def test_an_integrator_that_does_not_go_with_the_cell_names_its_line(
     coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = coarse_cell.read_text(encoding="utf-8").replace("gain_per_s: 200", "gain_per_s: 200, weighting: {load: 1}")
+    text = coarse_cell.read_text(encoding="utf-8").replace("weighted_pseudo_inverse", "jacobian_transpose")
     coarse_cell.write_text(text, encoding="utf-8")
-    line = 1 + text[: text.index("weighting")].count("\n")
+    line = 1 + text[: text.index("jacobian_transpose")].count("\n")
 
     status = run(["solve", str(coarse_cell), "-o", str(tmp_path / "out"), "--integrator", "accurate"])
 
     assert status == 2
     assert capsys.readouterr().err == (
-        f"{coarse_cell}:{line} with solver.integrator = accurate: solver.weighting.load: expected 0 in the accurate "
-        "mode, got 1; remove it, or choose solver.integrator: euler\n"
+        f"{coarse_cell}:{line} with solver.integrator = accurate: solver.method: expected weighted_pseudo_inverse in "
+        "the accurate mode, got 'jacobian_transpose'; choose it, or choose solver.integrator: euler\n"
     )
 
 

@@ -100,7 +100,15 @@ def test_programs_are_written_into_the_run(copy: Copy, capsys: pytest.CaptureFix
 
     out, err = capsys.readouterr()
     place = copy.run / "programs" / "csv"
-    assert (status, err, out) == (0, "", f"small-pair: exported\nprograms: {place}\n")
+    assert (status, err) == (0, "")
+    assert out.splitlines() == [
+        "small-pair: exported",
+        "  promise: timed",
+        "    timed for one controller; several controllers agree only to their start skew",
+        "  largest deviation from the run: joints below 1e-06 deg, tools below 1e-06 mm, tools below 1e-06 deg",
+        "  files: 3",
+        f"programs: {place}",
+    ]
     assert sorted(path.name for path in place.iterdir()) == ["export.json", "idle.csv", "left.csv", "right.csv"]
     assert run(["verify", str(copy.run), "--cell", str(copy.cell)]) == 0
 
@@ -121,12 +129,57 @@ def test_an_export_without_the_cell_must_be_asked_for_by_name(
     assert not (tmp_path / "programs").exists()
 
 
-@pytest.mark.parametrize("name", ["krl", "rapid", "CSV", ""])
+def test_exported_programs_are_verified_against_the_run_around_them(
+    copy: Copy, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    place, cell = copy.run / "programs" / "csv", ["--cell", str(copy.cell)]
+    assert run(["export", str(copy.run), *cell, "--format", "csv", "--robot", "right", "--json"]) == 0
+    exported = json.loads(capsys.readouterr().out)
+    assert (exported["files"], exported["export"]["promise"]) == (["right.csv"], "timed")
+
+    assert run(["verify", str(place), *cell]) == 0
+    assert capsys.readouterr().out.splitlines()[:3] == [
+        "small-pair: programs verified (csv)",
+        f"  run: {copy.run}",
+        "  promise: timed",
+    ]
+    shutil.copytree(place, tmp_path / "elsewhere")
+    assert run(["verify", str(tmp_path / "elsewhere"), *cell]) == 2
+    assert "--run: expected the run folder that the programs in" in capsys.readouterr().err
+    assert run(["verify", str(tmp_path / "elsewhere"), *cell, "--run", str(copy.run), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["export"]["robots"] == ["right"]
+    assert run(["verify", str(copy.run), *cell, "--run", str(copy.run)]) == 2
+    assert "--run: expected a folder of exported programs with it" in capsys.readouterr().err
+    (place / "right.csv").write_text((place / "right.csv").read_text().replace("\n0.050000000,", "\n0.05,"))
+    assert run(["verify", str(place), *cell]) == 2
+    assert f"{place / 'right.csv'}:4: expected 4 numbers with 9 decimals" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--robot", "other"], "--robot: expected one of left, right, idle, got 'other'"),
+        (["--targets", "tools"], "--targets: expected one of joints, part, got 'tools'"),
+        (["--targets", "part"], "--targets: expected joints with csv, got part"),
+        (["--split", "7"], "--split: expected no --split with csv"),
+        (["--thin-mm", "0.1"], "--thin-mm: expected no thinning with csv"),
+    ],
+)
+def test_what_a_format_cannot_do_is_refused(
+    copy: Copy, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["export", str(copy.run), "--cell", str(copy.cell), "--format", "csv", *words]) == 2
+
+    assert message in capsys.readouterr().err
+    assert not (copy.run / "programs").exists()
+
+
+@pytest.mark.parametrize("name", ["apt", "KRL", "CSV", ""])
 def test_other_formats_are_refused_by_name(copy: Copy, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["export", str(copy.run), "--cell", str(copy.cell), "--format", name])
 
     assert status == 2
-    assert capsys.readouterr().err.startswith(f"error: --format: expected one of csv, wide, got '{name}'")
+    assert capsys.readouterr().err.startswith("error: --format: expected one of csv, ")
 
 
 def test_a_rehearsal_is_no_run(copy: Copy, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -135,3 +188,41 @@ def test_a_rehearsal_is_no_run(copy: Copy, tmp_path: Path, capsys: pytest.Captur
 
     assert run(["verify", str(tmp_path / "rehearsal")]) == 2
     assert "expected the folder of a run, got no manifest.json in it" in capsys.readouterr().err
+
+
+def test_several_formats_have_a_folder_each_and_what_was_not_named_may_be_refused(
+    copy: Copy, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["export", str(copy.run), "--cell", str(copy.cell)]
+
+    status = run([*words, "--format", "all", "--robot", "right"])
+
+    out, err = capsys.readouterr()
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "small-pair: exported csv, json, ros2, stream"
+    place = lines.index("  krl: refused")
+    assert lines[place + 1] == "    robots.right.controller: expected the controller that plays krl, got none"
+    assert lines[-1] == f"programs: {copy.run / 'programs'}"
+    assert sorted(path.name for path in (copy.run / "programs").iterdir()) == ["csv", "json", "ros2", "stream"]
+    for name in ("csv", "stream"):
+        assert run(["verify", str(copy.run / "programs" / name), "--run", str(copy.run), "--cell", str(copy.cell)]) == 0
+
+
+@pytest.mark.parametrize(("names", "status"), [(["csv", "krl"], 1), (["all", "krl"], 1), (["val3", "krl"], 2)])
+def test_a_format_that_was_named_and_is_refused_is_an_error(
+    names: list[str], status: int, copy: Copy, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word for name in names for word in ("--format", name)]
+
+    given = run(["export", str(copy.run), "--cell", str(copy.cell), *words, "-o", str(tmp_path / "out"), "--json"])
+
+    reported = json.loads(capsys.readouterr().out)
+    by_name = {each["format"]: each for each in reported["exports"]}
+    assert (given, reported["exit"], reported["status"]) == (status, status, "refused")
+    assert by_name["krl"]["status"] == "refused"
+    assert by_name["krl"]["errors"] == [
+        "error: robots.left.controller: expected the controller that plays krl, got none"
+    ]
+    for name, each in by_name.items():
+        assert (tmp_path / "out" / name / "export.json").exists() is (each["status"] == "exported")

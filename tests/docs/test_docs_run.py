@@ -95,6 +95,8 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "own-part-and-path.md",
     "hand-over.md",
     "templates.md",
+    "programs.md",
+    "recover.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 

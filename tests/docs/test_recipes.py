@@ -20,7 +20,7 @@ RECIPES = dict(re.findall(r"^### A new ([^\n]+)\n(.*?)(?=^##)", PAGE, re.MULTILI
 TRACES = {
     "resolution method": r"\bjacobian_transpose\b",
     "check": r"\bcheck_locked\b",
-    "program format": r"\brender_csv\b",
+    "program format": r"\brender_csv\b|\bimport CSV\b",
     "command": r"\bcellplan\.cli\.verify\b",
     "bundled robot": r"\bplanar_3r\b",
     "template": r"\bown-urdf\b",
@@ -64,17 +64,22 @@ def check_travel(q, *, limit):
 '''
 FORMAT = '''"""CSV with semicolons."""
 
-from cellplan.export.csv import read_csv, render_csv
+from dataclasses import replace
+
+from cellplan.export.csv import CSV, read_csv, render_csv
 
 
-def render_semicolons(run):
+def render_semicolons(job):
     """The text of the plain format with another separator."""
-    return {name: text.replace(",", ";") for name, text in render_csv(run).items()}
+    return {name: text.replace(",", ";") for name, text in render_csv(job).items()}
 
 
-def read_semicolons(run, files):
-    """The joint tables of such files."""
-    return read_csv(run, {name: text.replace(";", ",") for name, text in files.items()})
+def read_semicolons(frame, files):
+    """The rows of such files."""
+    return read_csv(frame, {name: text.replace(";", ",") for name, text in files.items()})
+
+
+SEMICOLONS = replace(CSV, name="semicolons", title="with semicolons", render=render_semicolons, read=read_semicolons)
 '''
 
 
@@ -165,12 +170,9 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     insert(copy / "checks" / "verify.py", "        checks=tuple(checks", ") + tuple(check_travel(q, limit=10.0)")
     (copy / "export" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
-    insert(copy / "pipeline" / "export.py", "import numpy as np\n", "from cellplan.export.semicolons import *\n")
-    insert(
-        copy / "pipeline" / "export.py",
-        "EXPORTERS: Final[Mapping[str, Exporter]] = {",
-        '"semicolons": Exporter(render=render_semicolons, read=read_semicolons, decimals=CSV_DECIMALS),',
-    )
+    dialects = copy / "pipeline" / "export" / "dialects.py"
+    insert(dialects, "from typing import Final\n", "\nfrom cellplan.export.semicolons import SEMICOLONS\n")
+    insert(dialects, "dialect.name: dialect for dialect in (", "SEMICOLONS, ")
     cell = (ROOT / "examples" / "plate.yaml").read_text(encoding="utf-8")
     loose = re.sub(r"tolerance: \{.*\}", "tolerance: {position_mm: 1, orientation_deg: 1}", cell)
     (folder / "plate.yaml").write_text(loose, encoding="utf-8")

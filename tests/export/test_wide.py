@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from builders.home_to_home import PICK_AND_PLACE
+from builders.run_jobs import job_of_run
 
 from cellplan import Solution, VerifiedRun, export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
@@ -49,7 +50,7 @@ def in_turns(sound: Path) -> Solution:
 
 
 def test_times_and_joints_are_those_of_the_plain_format(run: VerifiedRun, table: pd.DataFrame) -> None:
-    for name, plain in render_csv(run).items():
+    for name, plain in render_csv(job_of_run(run)).items():
         expected = pd.read_csv(io.StringIO(plain))
         robot = name.removesuffix(".csv")
         columns = ["time_s", *(f"{robot}.{joint}" for joint in expected.columns[1:])]

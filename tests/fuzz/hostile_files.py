@@ -74,6 +74,11 @@ def csv_timed() -> bytes:
     return "\n".join(["t_s,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows, ""]).encode()
 
 
+def zero_yaml() -> bytes:
+    lines = ["zero_deg: {B4: 90, C4: -12.5}", "sign: {D4: -1}", "coupling: {C4: {B4: 1}}", 'source: "a handbook"', ""]
+    return "\n".join(lines).encode()
+
+
 SOUND: dict[str, Callable[[], bytes]] = {
     "binary.stl": stl_binary,
     "text.stl": stl_text,
@@ -83,6 +88,7 @@ SOUND: dict[str, Callable[[], bytes]] = {
     "arm.urdf": urdf,
     "plain.csv": csv_plain,
     "timed.csv": csv_timed,
+    "zero.yaml": zero_yaml,
 }
 
 
@@ -203,6 +209,8 @@ def cell_with(file: str) -> str:
     box = "{box: {size_mm: [200, 200, 200]}}"
     line = "{polyline: {points_mm: [[0, 0, 100], [50, 0, 100]]}}"
     model = file if file.endswith(".urdf") else "abb_irb1600"
+    if file.endswith(".yaml"):
+        model = f"staubli_rx90l\n    controller_zero: {file}"
     part = f"{{mesh: {file}, unit: mm}}" if file.endswith((".stl", ".obj", ".ply")) else box
     path = f"{{csv: {file}}}" if file.endswith(".csv") else line
     return CELL.format(model=model, part=part, path=path)

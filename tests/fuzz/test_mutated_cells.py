@@ -50,6 +50,8 @@ ODD_KEYS = ("extra", "__class__", "unit", "'k k'", "<<", "~", "1", "[1]", "Robot
 
 
 def needs_number(place: Place) -> bool:
+    if "handshake" in place.path:  # a signal is a number or a name
+        return False
     try:
         float(place.node.value)
     except (TypeError, ValueError):

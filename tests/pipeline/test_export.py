@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from cellplan import export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.io.input.files import digest
-from cellplan.pipeline import export
+from cellplan.pipeline.export.dialects import DIALECTS
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -69,23 +70,23 @@ def test_programs_are_not_written_into_a_run_or_over_other_things(copy: Path, pl
 def test_an_unknown_format_is_refused_with_the_list(copy: Path) -> None:
     run = open_gate(copy / "run", cell=copy / "cell" / "small.yaml")
 
-    with pytest.raises(InputError, match="--format: expected one of csv, wide, got 'krl'"):
-        export_program(run, copy / "programs", form="krl")
+    with pytest.raises(InputError, match=r"--format: expected one of csv, .*wide, got 'apt'"):
+        export_program(run, copy / "programs", form="apt")
 
 
 def test_a_program_that_fails_after_rounding_is_not_written(copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A format with too few decimals: half a degree of rounding takes the tool off its path."""
     run = open_gate(copy / "run", cell=copy / "cell" / "small.yaml")
-    sound = export.EXPORTERS["csv"]
+    sound = DIALECTS["csv"]
 
-    def coarse(run, files):
-        (read,) = sound.read(run, files)
-        for table in read.values():
-            table.q[:] = np.deg2rad(np.round(np.rad2deg(table.q)))
-        return (read,)
+    def coarse(frame, files):
+        read = sound.read(frame, files)
+        for rows in read[0].robots.values():
+            rows.q[:] = np.deg2rad(np.round(np.rad2deg(rows.q)))
+        return read
 
-    monkeypatch.setitem(export.EXPORTERS, "csv", export.Exporter(render=sound.render, read=coarse, decimals=9))
-    with pytest.raises(NotVerifiedError, match="rounded to 9 decimals: position error of task 'path'"):
+    monkeypatch.setitem(DIALECTS, "csv", replace(sound, read=coarse, decimals=0))
+    with pytest.raises(NotVerifiedError, match="position error of task 'path'"):
         export_program(run, copy / "programs")
 
     assert not (copy / "programs").exists()

@@ -18,6 +18,7 @@ LONG_TO_CHECK = {
     "gripper",
     "load_sharing",
     "mesh_part_csv",
+    "multimove",
     "own_urdf",
     "pedestal",
     "three_tasks_each",
@@ -25,8 +26,18 @@ LONG_TO_CHECK = {
     "two_robots",
 }
 MEANT_TO_FAIL = {"four_robots_initial", "find_a_layout"}  # the starts of layout searches
-# The first is a program of 23 s; the others are templates, of which the quick tests solve the first.
-LONG = {"three_tasks_each", "fixed_part", "own_urdf", "pedestal", "tilted_mount", "two_robots"}
+# The first two are programs of 23 s; `multimove` searches starts of three robots; the others are templates, of which
+# the quick tests solve the first.
+LONG = {
+    "three_tasks_each",
+    "in_turn",
+    "fixed_part",
+    "multimove",
+    "own_urdf",
+    "pedestal",
+    "tilted_mount",
+    "two_robots",
+}
 MEANT_TO_PASS = [
     pytest.param(p, marks=pytest.mark.slow if p.stem in LONG else (), id=p.stem)
     for p in CELLS

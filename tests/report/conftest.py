@@ -10,16 +10,8 @@ import pytest
 
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import (
-    Cell,
-    CheckSettings,
-    Grasp,
-    Mode,
-    MotionSettings,
-    Part,
-    Robot,
-    Tool,
-)
+from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.report import (
     Check,

@@ -23,7 +23,8 @@ from builders.scene_builders import (
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, CheckSettings, Exclusion, Grasp, Part
+from cellplan.model.cell import Cell, Grasp, Part
+from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import FollowerJoint, JointKind, RobotModel
 from cellplan.model.task import Frame

@@ -76,6 +76,32 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
     )
 
 
+def tool_axis_depths(cell: Cell, robot: str, X_PT: Array) -> Array:
+    """The same of the axis of the tool alone."""
+    placed = cell.robot(robot)
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    return line_depths(placed.tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not placed.bodies_at_work)
+
+
+def tool_depth_at(cell: Cell, robot: str, X_PT: Array) -> Array:
+    """Depth in [m] of a robot's tool, axis and bodies, at any poses of it on the part, shape (N, 4, 4), shape (N,)."""
+    placed, found = cell.robot(robot), tool_axis_depths(cell, robot, X_PT)
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    for body in placed.bodies_at_work:
+        columns = body_columns(body.shape, inverse(placed.tool.X_FT) @ body.X_BS, zone)
+        if len(columns.line):
+            found = np.maximum(found, depths(columns, cell.part.shape, X_ST))
+    return found
+
+
+def tool_reach(cell: Cell, robot: str) -> float:
+    """Largest distance in [m] from the tip of what counts of a robot's tool: its axis, and its bodies at work."""
+    tool, bodies, zone = cell.robot(robot).tool, cell.robot(robot).bodies_at_work, cell.checks.contact_zone
+    along = abs(float(tool.X_FT[:3, 3] @ tool.X_FT[:3, 2]))
+    columns = (body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone) for body in bodies)
+    return max([along, zone, *(each.reach for each in columns)])
+
+
 def _task_depth(
     cell: Cell, scheduled: TaskSchedule, times: Array, *, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]
 ) -> ToolDepth:

@@ -57,6 +57,21 @@ def motion_accelerations(
     )
 
 
+def joint_peaks(
+    cell: Cell, robot: Robot, times: Array, q: Array, *, jumps_at: Array = NO_TIMES
+) -> Iterator[JointAcceleration]:
+    """Largest acceleration and jerk of every joint of one robot, on rows of its own.
+
+    Args:
+        cell: The cell.
+        robot: One of its robots.
+        times: Times in [s], shape (N,).
+        q: Positions in [rad] or [m], shape (N, n).
+        jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
+    """
+    return _joints(robot, times, q, judged=_judged(cell, times), jumps_at=jumps_at)
+
+
 def acceleration_limit(robot: Robot, index: int) -> tuple[float | None, LimitSource]:
     """Largest allowed acceleration of one joint in [rad/s^2] or [m/s^2], and where it comes from."""
     joint, rule = robot.model.joints[index], robot.acceleration

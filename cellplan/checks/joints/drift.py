@@ -8,7 +8,8 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
-from cellplan.model.report import Check, JointDrift, Repeatability
+from cellplan.model.repeatability import JointDrift, Repeatability
+from cellplan.model.report import Check
 from cellplan.model.task import TIME_TOLERANCE
 
 REVOLUTE_DRIFT_TOL: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints

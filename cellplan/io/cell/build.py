@@ -8,13 +8,13 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
+from cellplan.io.cell.build_controllers import build_control, build_stop
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.build_program import build_order, written_program
 from cellplan.io.cell.build_tool import build_tool
 from cellplan.io.cell.path_rules import build_path
 from cellplan.io.cell.rules import needs_surface
-from cellplan.io.robots.build_controller import build_controller
 from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import ChecksEntry, CycleEntry, MotionEntry
@@ -31,18 +31,8 @@ from cellplan.io.schema.task import (
 from cellplan.io.schema.tool import OF_ROD
 from cellplan.io.schema.units import Mm, in_si, si_or_none
 from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry
-from cellplan.model.cell import (
-    CheckSettings,
-    Exclusion,
-    Grasp,
-    LockedJoint,
-    Mode,
-    MotionSettings,
-    Obstacle,
-    Part,
-    Robot,
-    Timing,
-)
+from cellplan.model.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing
+from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
 from cellplan.model.task import (
@@ -81,10 +71,9 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
     at_work = {task.robot for task in document.tasks.values()} | {grasp.robot for grasp in document.part.held_by}
     if name not in at_work and entry.home_deg is None and entry.home is None:
         home = start
-    controller = model.controller or build_controller(entry.controller, model.joints)
     return Robot(
         name=name,
-        model=replace(model, controller=controller, bodies=(*rail_bodies(entry, read_mesh), *model.bodies)),
+        model=replace(model, bodies=(*rail_bodies(entry, read_mesh), *model.bodies)),
         X_WB=pose_from_entry(entry.base),
         tool=build_tool(entry.tool, read_mesh),
         start=start,
@@ -97,6 +86,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
         order=build_order(name, document),
+        control=build_control(entry.controller),
     )
 
 
@@ -352,4 +342,5 @@ def build_checks(entry: ChecksEntry) -> CheckSettings:
         standing_depth=entry.standing_depth_mm.si,
         part_acceleration=entry.part_acceleration_m_s2,
         tool_speed=si_or_none(entry.tool_speed_mm_s),
+        stop=build_stop(entry.stop),
     )

@@ -18,6 +18,7 @@ from cellplan.io.cell.build import (
     resolved_document,
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
+from cellplan.io.cell.build_controllers import build_controllers, control_findings
 from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_layout import read_layout
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
@@ -56,6 +57,7 @@ PARTS: Final = (
     "checks",
     "program",
     "layout",
+    "controllers",
 )  # of a cell, from its document
 
 
@@ -143,6 +145,7 @@ def _read(source: CellFile) -> Cell:
     findings += acceleration_findings(valid, models, document)
     findings += _unknown_bodies(valid, models, document)
     findings += accuracy_findings(valid, models, document)
+    findings += control_findings(valid, models, document)
     findings += solver_findings(valid, models, document)
     findings += _part_extent(valid, document)
     _read_meshes(valid, sources)
@@ -272,6 +275,7 @@ def _cell(
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),
         program=build_program(whole.program),
+        controllers=build_controllers(whole),
     )
 
 

@@ -14,7 +14,7 @@ from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.joint_spline import JointSpline
 from cellplan.model.robot import RobotModel
-from cellplan.model.solver import against_accurate
+from cellplan.model.solver import beside_smallest
 
 SAME_START: Final = 1e-8  # [rad] or [m] by which a start posture may differ from the start of the path: rounding
 REMOVE: Final = "remove it, or remove the path"
@@ -80,18 +80,18 @@ def _excluded(name: str, valid: ValidEntries, document: YamlDocument) -> Iterato
                 text = f"expected a joint of another robot beside {path}, got '{name}/{lock.joint}': {REMOVE}"
                 yield document.finding(("motion", "locked_joints", index), text)
     if (solver := valid.solver) is not None:
-        for key in _against_accurate(solver):
+        for key in _beside_smallest(solver):
             text = f"expected the accurate mode (weighted_pseudo_inverse without goals) beside {path}: change it"
             yield document.finding(("solver", *key.split(".")), text)
 
 
-def _against_accurate(solver: SolverEntry) -> tuple[str, ...]:
-    """Keys of the solver that exclude the accurate mode."""
+def _beside_smallest(solver: SolverEntry) -> tuple[str, ...]:
+    """Keys of the solver that exclude a given path, which goes with the smallest weighted velocities alone."""
     if solver.integrator is not None and solver.integrator != "auto":  # an explicit accurate mode has its own rule
         return ("integrator",) if solver.integrator == "euler" else ()
     weighting = solver.weighting
     has_goals = any(goal is not None for _, goal in solver.secondary)
-    return against_accurate(solver.method, has_goals=has_goals, near_limits=weighting.near_limits, load=weighting.load)
+    return beside_smallest(solver.method, has_goals=has_goals, near_limits=weighting.near_limits, load=weighting.load)
 
 
 def _rows(place: KeyPath, path: JointPathEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:

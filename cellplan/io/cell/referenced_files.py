@@ -16,6 +16,7 @@ from cellplan.io.cell.toolpath_csv import read_toolpath_csv
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import digest_of_file
 from cellplan.io.input.findings import Finding, KeyPath, key_text, shown
+from cellplan.io.robots.build_controller import with_zero_of_file
 from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.robots.joint_table import RobotTable, load_robot_table
 from cellplan.io.robots.rules import limits_in_si, tightened
@@ -90,17 +91,18 @@ class Sources:
         return sampled
 
     def robot(self, name: str, entry: RobotEntry) -> RobotModel | None:
-        """Model of a robot within the limits of the cell; None after a finding."""
+        """Model of a robot within the limits of the cell, its controller's zero included; None after a finding."""
         suffix = PurePosixPath(entry.model).suffix.lower()
         if suffix in URDF_SUFFIXES:
-            return self._urdf(name, entry)
-        self.findings += self._only_for_urdf(name, entry)
-        model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
-        if model is None:
-            return None
-        model, findings = tightened(("robots", name), entry, model, self._document)
-        self.findings += findings
-        return None if findings else model
+            model = self._urdf(name, entry)
+        else:
+            self.findings += _only_for_urdf(name, entry, self._document)
+            model = self._table(name, entry, is_file=suffix in TABLE_SUFFIXES)
+            if model is not None:
+                model, findings = tightened(("robots", name), entry, model, self._document)
+                self.findings += findings
+                model = None if findings else model
+        return model if model is None or entry.controller_zero is None else self._with_zero(name, entry, model)
 
     def look_for_model(self, name: str, written: str) -> None:
         """Note a model that does not exist, of a robot that is invalid for other reasons too."""
@@ -128,6 +130,26 @@ class Sources:
             return None
         return srdf
 
+    def _with_zero(self, name: str, entry: RobotEntry, model: RobotModel) -> RobotModel | None:
+        """The robot with the counting that a file beside it states, unless its own file does; None after a finding."""
+        written, path = entry.controller_zero or "", ("robots", name, "controller_zero")
+        if model.controller is not None:
+            text = (
+                f"unexpected key, the file of '{model.name}' states how its controller counts the joints: "
+                "leave it out, it would be applied twice"
+            )
+            self.findings.append(self._document.key_finding(path, text))
+            return None
+        place = self._file(written, path)
+        if place is None:
+            return None
+        try:
+            model, self.inputs[written] = with_zero_of_file(model, place, file=str(place))
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return model
+
     def _read_mesh(self, written: str, unit: str | None, path: KeyPath) -> Mesh | None:
         """Mesh in [m]; None after a finding."""
         place = self._file(written, path)
@@ -149,12 +171,6 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
             return None
-
-    def _only_for_urdf(self, name: str, entry: RobotEntry) -> Iterator[Finding]:
-        """Keys that say something about a URDF."""
-        for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
-            if getattr(entry, key):
-                yield self._document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
     def _table(self, name: str, entry: RobotEntry, *, is_file: bool) -> RobotModel | None:
         """Model from a joint-axis table, bundled or in a file."""
@@ -233,6 +249,13 @@ class Sources:
                 path = ("robots", name, "package_dirs", index)
                 self.findings.append(self._document.finding(path, str(error)))
         return tuple(found) if len(found) == len(entry.package_dirs) else None
+
+
+def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
+    """Keys that say something about a URDF."""
+    for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
+        if getattr(entry, key):
+            yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
 
 def _read_urdf(known: "dict[Hashable, UrdfRobot]", written: str, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":

@@ -31,7 +31,7 @@ def rule_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[Findi
 
 def _clashing_names(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Names of files and folders that some systems do not distinguish, and names that mean two bodies."""
-    for section in ("robots", "tasks"):
+    for section in ("robots", "tasks", "controllers"):
         seen: dict[str, str] = {}
         for name in valid.names[section]:
             other = seen.setdefault(name.lower(), name)

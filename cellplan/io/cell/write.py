@@ -13,7 +13,8 @@ from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.schema.units import Deg, Mm, file_number, in_si
 from cellplan.io.yaml.writer import yaml_text
-from cellplan.model.cell import Cell, CheckSettings, Part, Robot
+from cellplan.model.cell import Cell, Part, Robot
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
 from cellplan.model.sequence import sequence_of
 from cellplan.model.solver import Integrator, SolverSettings

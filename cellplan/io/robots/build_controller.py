@@ -1,18 +1,42 @@
-"""How the controller of a robot counts its joints: entries of a robot file or a cell become the model's data."""
+"""How the controller of a robot counts its joints: entries of a robot file become the model's data."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from cellplan.io.input.findings import Finding, KeyPath, unknown_name
-from cellplan.io.schema.controller import ControllerEntry
+from cellplan.errors import InputError
+from cellplan.io.input.findings import Finding, KeyPath, raise_findings, unknown_name
+from cellplan.io.schema.controller import ControllerZeroEntry
+from cellplan.io.schema.messages import validate
 from cellplan.io.schema.units import si_or_none
-from cellplan.io.yaml.reader import YamlDocument
+from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.controller import ControllerZero
-from cellplan.model.robot import Joint
+from cellplan.model.robot import Joint, RobotModel
 
 
-def build_controller(entry: ControllerEntry | None, joints: Sequence[Joint]) -> ControllerZero | None:
+def with_zero_of_file(model: RobotModel, path: Path, *, file: str) -> tuple[RobotModel, str]:
+    """The robot with the counting that a file of its own states, and the SHA-256 of that file.
+
+    Args:
+        model: A robot whose own file does not state it.
+        path: The file: the keys of ``controller`` in a joint-axis table.
+        file: Its name in messages.
+
+    Raises:
+        InputError: All findings about the file at once.
+    """
+    document = read_yaml(path, file=file)
+    entry, findings = validate(ControllerZeroEntry, document)
+    turns = {joint.name: joint.is_revolute for joint in model.joints}
+    raise_findings(file, [*findings, *document.findings, *controller_findings((), entry, turns, document)])
+    if entry is None:
+        raise InputError(f"{file}: the zero of the controller cannot be understood")
+    return replace(model, controller=build_controller(entry, model.joints)), document.digest
+
+
+def build_controller(entry: ControllerZeroEntry | None, joints: Sequence[Joint]) -> ControllerZero | None:
     """The controller's counting in [rad] and [m]; None when it is not stated."""
     if entry is None:
         return None
@@ -31,7 +55,7 @@ def build_controller(entry: ControllerEntry | None, joints: Sequence[Joint]) -> 
 
 
 def controller_findings(
-    path: KeyPath, entry: ControllerEntry | None, turns: Mapping[str, bool], document: YamlDocument
+    path: KeyPath, entry: ControllerZeroEntry | None, turns: Mapping[str, bool], document: YamlDocument
 ) -> Iterator[Finding]:
     """Joints that exist, in their own unit, and couplings to earlier joints of the same kind.
 

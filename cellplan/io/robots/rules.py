@@ -8,7 +8,6 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
-from cellplan.io.robots.build_controller import controller_findings
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
@@ -57,7 +56,6 @@ def robot_findings(name: str, entry: RobotEntry, model: RobotModel, document: Ya
     yield from _unit_findings(("robots", name), entry, model, document)
     turning = tuple(joint.name for joint in model.joints if joint.is_revolute)
     yield from payload_findings(("robots", name, "payload"), entry.payload, turning, document)
-    yield from _controller_findings((*path, "controller"), entry, model, document)
     count = len(model.joints)
     if entry.weights is not None and len(entry.weights) != count:
         text = f"expected {count} weights, one per joint ({listed(model.joint_names)}), got {len(entry.weights)}"
@@ -111,21 +109,6 @@ def _unit_findings(
             kind, unit = ("revolute", "deg") if joints[name].is_revolute else ("prismatic", "mm")
             text = f"expected limits in {unit}, the joint is {kind}, got {limits.unit}"
             yield document.finding((*path, "limits", name), text)
-
-
-def _controller_findings(
-    path: KeyPath, entry: RobotEntry, model: RobotModel, document: YamlDocument
-) -> Iterator[Finding]:
-    """The zero of the controller is stated once, by the robot's own file if it does."""
-    turns = {joint.name: joint.is_revolute for joint in model.joints}
-    if entry.controller is not None and model.controller is not None:
-        text = (
-            f"unexpected key, the file of '{model.name}' states how its controller counts the joints: "
-            "leave it out, it would be applied twice"
-        )
-        yield document.key_finding(path, text)
-    else:
-        yield from controller_findings(path, entry.controller, turns, document)
 
 
 def tightened(

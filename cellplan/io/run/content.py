@@ -10,9 +10,19 @@ from typing import Any, Final
 MARK: Final = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN: Final = 200  # [bytes]
 LIST_LIMIT: Final = 5_000_000  # [bytes] of a file that lists others
-REPORTS: Final = ("report.json", "rehearsal.json", "export.json", "fastest.json", "map.json", "advice.json")
+RECOVERY: Final = "recovery.json"  # what a recovery does, in the folder that holds its tables
+REPORTS: Final = (
+    "report.json",
+    "rehearsal.json",
+    "export.json",
+    "fastest.json",
+    "map.json",
+    "advice.json",
+    RECOVERY,
+)
 REHEARSAL: Final = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
 PROGRAMS: Final = "programs"  # folder of exported programs, inside the run folder that they were made from
+RECOVER: Final = "recover"  # folder of a recovery, inside the run folder that it starts from
 EXPORT: Final = "export.json"  # what was exported, in the folder that holds it
 MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
@@ -80,7 +90,7 @@ def _holds_listed(name: str, listed: frozenset[str] | None) -> bool:
 def _listed(run: Path) -> frozenset[str] | None:
     """The files that a run or an export lists, the lists themselves among them; None when it lists none."""
     found: set[str] = set()
-    for name in (MANIFEST, EXPORT):
+    for name in (MANIFEST, EXPORT, RECOVERY):
         files = _files_of(run / name)
         if files is not None:
             found |= {name, *files}

@@ -18,6 +18,7 @@ from cellplan.io.run.content import (
     EXPORT,
     MANIFEST,
     PROGRAMS,
+    RECOVER,
     REHEARSAL,
     foreign_entry,
     foreign_within,
@@ -26,7 +27,16 @@ from cellplan.io.run.content import (
 from cellplan.io.run.drafts import hidden_folders, put_right
 from cellplan.io.run.exchange import exchange
 
-__all__ = ["EXPORT", "MANIFEST", "PROGRAMS", "REHEARSAL", "RunFolder", "is_run_folder", "refuse_unless_replaceable"]
+__all__ = [
+    "EXPORT",
+    "MANIFEST",
+    "PROGRAMS",
+    "RECOVER",
+    "REHEARSAL",
+    "RunFolder",
+    "is_run_folder",
+    "refuse_unless_replaceable",
+]
 
 STUDY: Final = "study.jsonl"  # journal of a study, which is not replaced
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})  # from file systems that cannot sync folders

@@ -11,13 +11,15 @@ from cellplan.errors import InputError
 from cellplan.io.input.files import digest_of_file
 from cellplan.io.input.findings import shown
 from cellplan.io.input.json_reader import parse_json, required
-from cellplan.io.run.folder import MANIFEST, PROGRAMS, REHEARSAL
+from cellplan.io.run.folder import MANIFEST, PROGRAMS, RECOVER, REHEARSAL
 from cellplan.model.cell import Cell
 
 SCHEMA: Final = "cellplan.manifest/1"
 SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of sixty-four robots need less than half
 BUNDLED: Final = "bundled:"  # begins the name of an input that comes with the program
-MADE_LATER: Final = frozenset({PROGRAMS, REHEARSAL, "view.html"})  # made from a run after it was written; no part of it
+MADE_LATER: Final = frozenset(
+    {PROGRAMS, REHEARSAL, RECOVER, "view.html"}
+)  # made from a run after it was written; no part of it
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system
 KEYS: Final = ("schema", "cell", "status", "cell_file", "changes", "inputs", "versions", "files")
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")

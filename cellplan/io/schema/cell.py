@@ -16,6 +16,7 @@ from cellplan.io.schema.common import (
     require_each_once,
     rule,
 )
+from cellplan.io.schema.controllers import ControllerEntry, StopEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import RobotEntry, SlidingSpeed
@@ -266,6 +267,11 @@ class ChecksEntry(Entry):
         default=None,
         description="Largest allowed speed of any tool tip in the world; it is only reported when absent.",
     )
+    stop: StopEntry | None = Field(
+        default=None,
+        description="Demands on the time after one robot stopped, while robots of other controllers go on; only "
+        "reported when absent.",
+    )
     exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 
 
@@ -286,6 +292,12 @@ class CellDocument(Entry):
     name: Name = Field(description="Name of the cell and of its output folder.")
     robots: dict[Name, RobotEntry] = Field(
         min_length=1, max_length=ROBOT_LIMIT, description="Robots by name; their order is the order of the joints."
+    )
+    controllers: dict[Name, ControllerEntry] | None = Field(
+        default=None,
+        max_length=ROBOT_LIMIT,
+        description="Controllers by name, each with at least one robot that names it under its key controller; absent: "
+        "nothing is known of them.",
     )
     part: PartEntry = Field(description="The workpiece.")
     tasks: dict[Name, TaskEntry] = Field(min_length=1, max_length=TASK_LIMIT, description="Tasks by name.")

@@ -1,4 +1,4 @@
-"""How the controller of a robot counts its joints, as written in a robot file or a cell file."""
+"""How the controller of a robot counts its joints, as a robot file states it, or a file beside a URDF."""
 
 from typing import Annotated, Final, Literal, Self
 
@@ -11,7 +11,7 @@ LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
 Factor = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
 
 
-class ControllerEntry(Entry):
+class ControllerZeroEntry(Entry):
     """Joint positions of the controller: sign * model + zero + sum of factor * controller position of another joint."""
 
     zero_deg: dict[str, Angle] = Field(

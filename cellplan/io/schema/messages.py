@@ -103,7 +103,7 @@ class _Reader:
         """The finding as data; None when another one about the same value says more."""
         if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
             return None
-        if self.is_key:
+        if self.is_key and self.type != "rule":
             return Mismatch(kind=Kind.NAME, path=self.path, got=self.path[-1])
         if self.type == "extra_forbidden":
             allowed = fields_of(annotation_at(self.model, self.location[:-1]))

@@ -15,6 +15,7 @@ from cellplan.io.schema.cell import (
     MotionEntry,
     PartEntry,
 )
+from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.program import ProgramEntry
@@ -34,6 +35,7 @@ class ValidEntries:
         robots: Valid robots by name.
         tasks: Valid tasks by name.
         environment: Valid obstacles by name.
+        controllers: Valid controllers by name.
         part: The part, if valid.
         motion: The motion, if valid.
         solver: The solver's settings, if valid.
@@ -48,6 +50,7 @@ class ValidEntries:
     robots: Mapping[str, RobotEntry]
     tasks: Mapping[str, TaskEntry]
     environment: Mapping[str, ObstacleEntry]
+    controllers: Mapping[str, ControllerEntry]
     part: PartEntry | None
     motion: MotionEntry | None
     solver: SolverEntry | None
@@ -66,7 +69,7 @@ class ValidEntries:
 def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Finding]]:
     """Validate a cell file, and entry by entry where anything of it is invalid; the findings name what is."""
     whole, findings = validate(CellDocument, document)
-    names = {key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment")}
+    names = {key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment", "controllers")}
     if whole is None:
         return _by_entry(document, names), findings
     valid = ValidEntries(
@@ -74,6 +77,7 @@ def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Findi
         robots=whole.robots,
         tasks=whole.tasks,
         environment=whole.environment,
+        controllers=whole.controllers or {},
         part=whole.part,
         motion=whole.motion,
         solver=whole.solver,
@@ -93,6 +97,7 @@ def _by_entry(document: YamlDocument, names: Mapping[str, tuple[str, ...]]) -> V
         robots=_named(RobotEntry, document, "robots"),
         tasks=_named(TaskEntry, document, "tasks"),
         environment=_named(ObstacleEntry, document, "environment"),
+        controllers=_named(ControllerEntry, document, "controllers"),
         part=_single(PartEntry, document, "part"),
         motion=_single(MotionEntry, document, "motion"),
         solver=_single(SolverEntry, document, "solver"),

@@ -19,7 +19,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.controller import ControllerEntry
+from cellplan.io.schema.controllers import RobotControlEntry
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.joint_path import JointPathEntry
 from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
@@ -286,12 +286,18 @@ class RobotEntry(Entry):
         description="Accelerations that its joints are judged against; a stated limit of a joint counts first. "
         "The cell's when absent.",
     )
-    controller: ControllerEntry | None = Field(
+    controller_zero: Text | None = Field(
         default=None,
-        description="How its controller counts the joints; only for a robot whose own file does not state it.",
+        description="Path of a YAML file that states how its controller counts the joints, with the keys that "
+        "controller has in a robot table; for a URDF, and for other robots whose own file does not state it.",
+    )
+    controller: RobotControlEntry | None = Field(
+        default=None, description="Where it is connected, and how programs of its controller name things."
     )
     controller_cycle_ms: CycleTime | None = Field(
-        default=None, description="Cycle of its controller, over which jerk is taken; the motion's when absent."
+        default=None,
+        description="Cycle of its controller, over which jerk is taken; when absent that of the "
+        "key controller, else the motion's.",
     )
     locked: dict[str, LockedPosition] = Field(
         default={},

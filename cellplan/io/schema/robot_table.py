@@ -21,7 +21,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.controller import ControllerEntry
+from cellplan.io.schema.controller import ControllerZeroEntry
 from cellplan.io.schema.robot import (
     AXIS_LIMIT,
     SLIDING_LIMITS,
@@ -200,7 +200,7 @@ class RobotTableDocument(Entry):
         default=None, description="What the robot may carry; the report says so when absent."
     )
     reach: ReachEntry | None = Field(default=None, description="Reach as the maker publishes it, if known.")
-    controller: ControllerEntry | None = Field(
+    controller: ControllerZeroEntry | None = Field(
         default=None,
         description="How its controller counts the joints; when absent the zero of the model is taken as the "
         "controller's, and the report says so. Without keys: known to be the same.",

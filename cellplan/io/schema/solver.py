@@ -149,8 +149,8 @@ class SolverEntry(Entry):
         default="auto",
         description="How joint velocities become positions: accurate finds joint polynomials whose tool error between "
         "all nodes is below accuracy_mm, euler steps along the clock and feeds the pose error back. accurate requires "
-        "weighted_pseudo_inverse without secondary goals, near_limits and load; gain_per_s and damping do not apply to "
-        "it. auto is accurate where that is possible, else euler.",
+        "weighted_pseudo_inverse; gain_per_s and damping do not apply to it. auto is accurate with that method, else "
+        "euler.",
     )
     accuracy_mm: Annotated[Mm, Within(ge=1e-9, le=1.0)] = Field(
         default=Mm(1e-4),

@@ -41,6 +41,13 @@ Put your URDF into `robots/`, with the meshes that it names, and see what it say
 cellplan robots robots/own_arm.urdf
 ```"""
 
+MULTIMOVE: Final = """\
+The cell states its controller, so that its programs can be written in the language of the maker:
+
+```sh
+cellplan export outputs/multimove --format rapid --cell cell.yaml
+```"""
+
 TEMPLATES: Final = (
     Template(
         name="two-robots",
@@ -116,6 +123,13 @@ TEMPLATES: Final = (
         summary="one robot turns a cylinder, three others draw on it all at once (Ribeiro 2010)",
         setting="motion.duration_s=5",
         meaning="a calmer cycle",
+    ),
+    Template(
+        name="multimove",
+        summary="two arms and a positioner on one controller, which programs them in step (RAPID)",
+        setting="motion.duration_s=8",
+        meaning="a calmer cycle",
+        more=MULTIMOVE,
     ),
 )
 FIRST: Final = TEMPLATES[0].name

@@ -14,6 +14,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.progress import silent
+from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.cycles import load_of, time_asked
@@ -85,7 +86,8 @@ def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
         program = TimedProgram.solved(cell, law, scaled, task=None, progress=silent)
         reason, is_apart = rejection_of(program, ready.variables), True
         if not reason and not (is_apart := _is_apart(program)):
-            reason = rejection_of(program.certified(silent), ready.variables) or "distances are not certified"
+            program = program.certified(silent, EarlyClearance())
+            reason = rejection_of(program, ready.variables) or "distances are not certified"
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     figures = {

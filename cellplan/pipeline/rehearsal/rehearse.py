@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.checks.real_cell.execution import Measurement, RealCell
 from cellplan.checks.real_cell.iso9283 import path_figures, pose_figures
 from cellplan.checks.real_cell.true_errors import check_true_errors
-from cellplan.checks.verify import verify
+from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
@@ -84,7 +84,7 @@ def rehearse(
             f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
             "measured errors of transfer moves; rehearse its tasks without this key"
         )
-    solution = solve(cell, progress=progress)
+    solution = solve(cell, is_reported=False, progress=progress)
     trials = errors.trials if errors.is_random else 1
     _refuse_too_many(solution.runs, trials, errors)
     options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
@@ -188,9 +188,9 @@ def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> Cor
     cell, references = job.cell, trial.correction.references
     program = render_program(cell, Motion(times=references.times, q=trial.correction.q))
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
-    report = _without_tool_errors(
-        verify(Scene.from_cell(cell), references, tables, moving=job.moving, progress=progress)
-    )
+    scene = Scene.from_cell(cell)
+    report = verify_motion(scene, references, tables, moving=job.moving, progress=progress)
+    report = _without_tool_errors(with_clearance(report, scene, references, is_reported=False, progress=progress))
     kept = trial.correction.best
     remark = f"corrected for measured errors, round {kept}: right for the measured cell, not for the written one"
     alone = replace(phase, begin=0.0, end=float(references.times[-1]))  # a program of its own

@@ -100,7 +100,7 @@ def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None
     """A changed cell solved in full, and why it is no remedy; empty where it passes with the demanded margins."""
     try:
         changed = cell.with_values(values) if values else cell
-        solved = Solved(solution=solve(changed), margin=demanded_margin(cell))
+        solved = Solved(solution=solve(changed, is_reported=False), margin=demanded_margin(cell))
     except (InputError, NoSolutionError) as error:
         return None, str(error).splitlines()[0]
     failed = solved.failed

@@ -102,6 +102,19 @@ def _not_judged(record: Record) -> Iterator[tuple[str, str]]:
         yield f"{len(record['open_surfaces'])} meshes are not closed", "#open-surfaces"
     if record.get("clearance_proof", {}).get("not_certified"):
         yield "distances of some pairs between the samples", "#assumptions"
+    yield from _clocks(record)
+
+
+def _clocks(record: Record) -> Iterator[tuple[str, str]]:
+    """A stated skew that is more than the allowed one, which fails no check; a stop in which bodies touch, likewise."""
+    for pair in record["skew"]["pairs"] if "skew" in record else ():
+        if pair["stated_ms"] is not None and pair["stated_ms"] > pair["allowed_ms"]:
+            robots, allowed = " and ".join(pair["robots"]), small(pair["allowed_ms"])
+            yield f"stated skew of {robots}, {small(pair['stated_ms'])} ms, of which {allowed} ms are allowed", "#skew"
+    for each in record["stops"]["distances"] if "stops" in record else ():
+        if each["distance_mm"] == 0.0 and not any(check["name"].startswith("stop_") for check in record["checks"]):
+            bodies = " and ".join(each["bodies"] or each["robots"])
+            yield f"when one robot stops, {bodies} touch; nothing is demanded of stops", "#stops"
 
 
 def _reduced_checks(record: Record) -> Iterator[tuple[str, str]]:

@@ -6,7 +6,8 @@ from typing import Annotated, TypedDict
 
 from cellplan.model.acceleration import JointAcceleration
 from cellplan.model.cell import Cell
-from cellplan.model.report import JointUse, Repeatability, Report
+from cellplan.model.repeatability import Repeatability
+from cellplan.model.report import JointUse, Report
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 

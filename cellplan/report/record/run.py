@@ -45,7 +45,9 @@ from cellplan.report.record.joints import (
 from cellplan.report.record.open_surfaces import OpenSurfaceRecord, open_surfaces_record
 from cellplan.report.record.phases import PhaseRecord, phases_record
 from cellplan.report.record.rests_on import RestsOnRecord, rests_on_record
+from cellplan.report.record.skew import SkewKey, skew_record
 from cellplan.report.record.solver import SolverRecord, solver_record
+from cellplan.report.record.stops import StopsKey, stops_record
 from cellplan.report.record.tasks import TaskRecord, tasks_record
 from cellplan.report.record.tool_errors import RunClosureRecord, closures_record
 from cellplan.report.record.world_motion import (
@@ -91,7 +93,7 @@ class HeadRecord(OriginRecord):
     caution: Annotated[str, "limits of an offline result"]
 
 
-class RunRecord(HeadRecord):
+class RunRecord(HeadRecord, SkewKey, StopsKey):
     """The record of a run."""
 
     phase: Annotated[str | None, "name of the phase that it is for; null for the only one of a program"]
@@ -165,4 +167,6 @@ def run_record(
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion, transfers),
         "accelerations": accelerations_record(report.accelerations),
+        **skew_record(report),
+        **stops_record(report),
     }

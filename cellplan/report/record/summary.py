@@ -26,6 +26,7 @@ from cellplan.report.record.payload import worst_loads
 from cellplan.report.record.phases import phases_record
 from cellplan.report.record.rests_on import rests_on_record
 from cellplan.report.record.run import SCHEMA, HeadRecord
+from cellplan.report.record.skew import SkewKey, least_skew_record
 from cellplan.report.record.solver import solver_record
 from cellplan.report.record.tasks import tasks_record
 from cellplan.report.record.tool_errors import ClosureRecord, worst_closures_record
@@ -49,7 +50,7 @@ class RunEntry(_RunEntry, total=False):
     max_orientation_error_between_rows_deg: Annotated[Number, "largest angle between the rows"]
 
 
-class SummaryRecord(HeadRecord):
+class SummaryRecord(HeadRecord, SkewKey):
     """The record of several runs: the worst of tasks, joints, clearance and accelerations."""
 
     runs: Annotated[dict[str, RunEntry], "by task: the runs"]
@@ -88,6 +89,7 @@ def summary_record(
         "clock_from": clock_from(cell),
         "phases": phases_record(runs[0].phases),
         "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
+        **least_skew_record(runs),
         "tasks": {name: record for report in own for name, record in tasks_record(report, cell).items()},
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],

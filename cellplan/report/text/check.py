@@ -19,11 +19,15 @@ def check_lines(record: Record) -> list[str]:
         (f"task {name}", f"{length:.4g} mm", direction_text(record["direction"][name]))
         for name, length in record["path_length_mm"].items()
     ]
+    controllers: list[Row] = [
+        (f"controller {name}", controller["kind"], ", ".join(controller["robots"]))
+        for name, controller in record["controllers"].items()
+    ]
     return [
         f"{record['cell']}: {record['status']}",
         f"  {count_text(record['checks'])}",
         *failure_lines(record["checks"], "check --json"),
-        *aligned([*starts, *paths]),
+        *aligned([*starts, *paths, *controllers]),
         *([f"  {record['start_choice']}"] if record["start_choice"] else []),
         *(f"  note: {remark}" for remark in record["remarks"]),
         *(f"  {each['message']}" for each in record["checks"] if each["passed"]),

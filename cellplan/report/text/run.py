@@ -12,6 +12,8 @@ from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import DEFAULT_METHOD
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
+from cellplan.report.text.skew import skew_row
+from cellplan.report.text.stops import stop_rows
 
 
 def read_record(folder: Path) -> Record:
@@ -82,6 +84,8 @@ def _rows(record: Record) -> Iterator[Row]:
     yield from acceleration_rows(record)
     yield from _task_rows(record["tasks"])
     yield from _closure_rows(record.get("closure", {}))
+    yield from skew_row(record)
+    yield from stop_rows(record)
     yield from _drift_rows(record.get("repeatability", {}))
     yield from _slack_rows(record["solver"]["slack"])
 
@@ -193,7 +197,8 @@ def _fallback_lines(solver: Record) -> Iterator[str]:
     if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
         lost = resolution.get("lost")
         reason = f"; {lost['message']}" if lost else ""
-        yield f"  collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps{reason}"
+        goals = "; smaller gains of the secondary goals may help" if solver.get("secondary") else ""
+        yield f"  collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps{reason}{goals}"
 
 
 def _place_lines(folder: Path) -> Iterator[str]:

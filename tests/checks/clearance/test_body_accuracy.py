@@ -9,7 +9,8 @@ from builders.scene_builders import make_cell, placed, schedule, slide_model, th
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, CheckSettings
+from cellplan.model.cell import Cell
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.robot import BodyAccuracy
 from cellplan.report.record.rests_on import unstated_bodies

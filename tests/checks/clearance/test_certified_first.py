@@ -9,7 +9,8 @@ from cellplan.certify import pair_state as budget
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Capsule
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, CheckSettings
+from cellplan.model.cell import Cell
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.robot import Body, RobotModel
 from cellplan.scene.scene import Scene

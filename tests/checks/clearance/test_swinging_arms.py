@@ -22,7 +22,8 @@ from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Mesh
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, CheckSettings
+from cellplan.model.cell import Cell
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene

@@ -12,7 +12,8 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, CheckSettings, Tool
+from cellplan.model.cell import Cell, Tool
+from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, ToolDepth
 from cellplan.model.task import Frame, SampledPath, Task

@@ -15,7 +15,7 @@ from cellplan.collision.engine import Engine
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Mesh, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import CheckSettings
+from cellplan.model.check_settings import CheckSettings
 from cellplan.scene.scene import Scene
 
 EXACT = 1e-4  # [m] promised accuracy of a smallest distance

@@ -221,8 +221,8 @@ Refuse = Callable[..., list[str]]
         (
             "environment:",
             "enviroment: {}\nenvironment:",
-            "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, part, "
-            "tasks, environment, motion, program, acceleration, solver, checks, layout",
+            "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, controllers, "
+            "part, tasks, environment, motion, program, acceleration, solver, checks, layout",
         ),
     ],
 )

@@ -208,61 +208,6 @@ def test_a_mount_that_cannot_be_is_refused(refuse: Callable[..., list[str]], new
     assert message in findings
 
 
-def test_a_cell_may_state_the_counting_of_a_controller_that_a_file_does_not(load: Callable[..., Cell]) -> None:
-    other = ("model: abb_irb1600", "model: staubli_rx90l\n    controller: {zero_deg: {B4: 90}, sign: {D4: -1}}")
-
-    controller = load(other).robot("worker").model.controller
-
-    assert controller is not None
-    counted = np.rad2deg(controller.from_model(np.deg2rad([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])))
-    np.testing.assert_allclose(counted, [10, 110, 30, -40, 50, 60])
-
-
-@pytest.mark.parametrize(
-    ("model", "controller", "message"),
-    [
-        (
-            "kuka_kr6",
-            "{zero_deg: {B2: -90}}",
-            "c:9: robots.worker.controller: unexpected key, the file of 'kuka_kr6' states how its controller counts "
-            "the joints: leave it out, it would be applied twice",
-        ),
-        (
-            "staubli_rx90l",
-            "{zero_deg: {B2: -90}}",
-            "c:9: robots.worker.controller.zero_deg.B2: expected a revolute joint of the robot (A4, B4, C4, D4, E4, "
-            "F4), got 'B2'",
-        ),
-        (
-            "staubli_rx90l",
-            "{zero_mm: {B4: -90}}",
-            "c:9: robots.worker.controller.zero_mm.B4: expected a prismatic joint of the robot (none), got 'B4'",
-        ),
-        (
-            "staubli_rx90l",
-            "{sign: {B4: 2}}",
-            "c:9: robots.worker.controller.sign.B4: expected 1 or -1, got 2",
-        ),
-        (
-            "staubli_rx90l",
-            "{}",
-            "c:9: robots.worker.controller: expected zero_deg, zero_mm, sign or coupling, or the source that says "
-            "there are none, got none",
-        ),
-        (
-            "staubli_rx90l",
-            "{coupling: {B4: {C4: 1}}}",
-            "c:9: robots.worker.controller.coupling.B4.C4: expected an earlier joint than 'B4' of its kind (A4), "
-            "got 'C4'",
-        ),
-    ],
-)
-def test_a_counting_that_cannot_be_is_refused(
-    refuse: Callable[..., list[str]], model: str, controller: str, message: str
-) -> None:
-    assert refuse(("model: abb_irb1600", f"model: {model}\n    controller: {controller}")) == [message]
-
-
 def test_a_robot_table_states_its_counting_in_degrees_and_millimetres(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     more = "controller: {zero_deg: {B: 90}, sign: {C: -1}, coupling: {C: {B: 1}}, source: sheet}\n"

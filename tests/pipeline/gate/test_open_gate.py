@@ -13,14 +13,16 @@ import pytest
 from builders.run_edits import edit_json
 from builders.stored_cells import write_cell
 
-from cellplan import load_cell, open_gate, solve, write_run
+from cellplan import export_program, load_cell, open_gate, solve, write_run
 from cellplan.cache import store
 from cellplan.errors import InputError, NotVerifiedError
+from cellplan.export.dialect import Dialect
 from cellplan.guard import isolated_call
+from cellplan.model.exported import ExportJob
 from cellplan.model.motion import Resolution
 from cellplan.model.solver import Integrator
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
-from cellplan.pipeline.export import EXPORTERS
+from cellplan.pipeline.export.program import EXPORTERS
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -92,10 +94,12 @@ def test_the_seal_is_held_by_the_gate_alone() -> None:
     assert holders == ["pipeline/gate/open_gate.py"]
 
 
-def test_every_exporter_takes_a_verified_run_and_nothing_else() -> None:
+def test_every_format_takes_a_job_or_a_verified_run_and_nothing_else() -> None:
     for name, exporter in EXPORTERS.items():
         signature = inspect.signature(exporter.render)
-        assert [each.annotation for each in signature.parameters.values()] == [VerifiedRun], name
+        taken = [each.annotation for each in signature.parameters.values()]
+        assert taken == ([ExportJob] if isinstance(exporter, Dialect) else [VerifiedRun]), name
+    assert next(iter(inspect.signature(export_program).parameters.values())).annotation is VerifiedRun
 
 
 def test_other_versions_are_reported_and_do_not_matter(copy: Path) -> None:

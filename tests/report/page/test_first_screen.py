@@ -165,3 +165,22 @@ def test_a_picture_is_shown_even_if_nothing_has_a_time(passed_run: Any) -> None:
     assert (
         "picture" not in report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}).split("<main")[1]
     )
+
+
+def test_a_skew_that_is_more_than_allowed_and_a_touch_at_a_stop_stand_on_the_first_screen(passed_run: Any) -> None:
+    record = record_of(passed_run)
+    pair = {"robots": ["a", "b"], "allowed_ms": 0.5, "stated_ms": 4.0}
+    stop = {"robots": ["a", "b"], "distance_mm": 0.0, "bodies": ["a/tool", "part"]}
+    demand = {"name": "stop_clearance"}
+
+    more = {*not_judged({**record, "skew": {"pairs": [pair]}, "stops": {"distances": [stop]}})} - {*not_judged(record)}
+    kept = {**pair, "stated_ms": 0.5}
+    apart = {**stop, "distance_mm": 1.0}
+    judged = {**record, "checks": [*record["checks"], demand]}
+
+    assert more == {
+        ("stated skew of a and b, 4 ms, of which 0.5 ms are allowed", "#skew"),
+        ("when one robot stops, a/tool and part touch; nothing is demanded of stops", "#stops"),
+    }
+    assert not_judged({**record, "skew": {"pairs": [kept]}, "stops": {"distances": [apart]}}) == not_judged(record)
+    assert not_judged({**judged, "stops": {"distances": [stop]}}) == not_judged(record)

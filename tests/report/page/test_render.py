@@ -10,7 +10,8 @@ import pytest
 
 from cellplan.model.cell import LockedJoint
 from cellplan.model.phase import Phase, Work
-from cellplan.model.report import Check, JointDrift, Repeatability
+from cellplan.model.repeatability import JointDrift, Repeatability
+from cellplan.model.report import Check
 from cellplan.report.page import render
 from cellplan.report.page.render import overview_page, report_page
 from cellplan.report.page.scripts import SCRIPTS

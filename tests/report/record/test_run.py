@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from cellplan.io.run.folder import RunFolder
 from cellplan.model.cell import LockedJoint
-from cellplan.model.report import ClearanceClass, ClosureAccuracy, JointDrift, Repeatability
+from cellplan.model.repeatability import JointDrift, Repeatability
+from cellplan.model.report import ClearanceClass, ClosureAccuracy
 from cellplan.report.record.common import as_json, number
 from cellplan.report.record.merging import merge_joint_uses
 from cellplan.report.record.run import run_record

@@ -119,8 +119,8 @@ def test_the_record_says_what_the_accurate_mode_took() -> None:
     assert solver_record(settings("quadratic_program"))["integrator"] == "euler"
 
 
-def test_settings_that_rule_the_accurate_mode_out_are_never_said_to_be_accurate() -> None:
-    changed = replace(settings(), weighting=WeightingSettings(load=1.0))
+def test_a_method_that_rules_the_accurate_mode_out_is_never_said_to_be_accurate() -> None:
+    changed = replace(settings("damped_least_squares"), weighting=WeightingSettings(load=1.0))
 
     assert changed.integrator is None
     assert solver_record(changed)["integrator"] == "euler"

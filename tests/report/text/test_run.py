@@ -79,6 +79,11 @@ def test_where_the_accurate_mode_gave_up_is_reported(record: dict[str, Any], tmp
         record, tmp_path
     )
 
+    record["solver"]["secondary"] = {"posture": {"gain": 50.0}}
+
+    line = next(line for line in summary_lines(record, tmp_path) if "collocation" in line)
+    assert line.endswith("Euler steps; 'arm' is singular; smaller gains of the secondary goals may help")
+
 
 def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[str, Any], tmp_path: Path) -> None:
     record |= {

@@ -1,6 +1,6 @@
-"""Export: from a verified run to files for controllers, judged once more on the rounded numbers they hold."""
+"""Export: from a verified run to programs for controllers, judged once more as they were read back from their text."""
 
-import json
+from collections import ChainMap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,29 +9,28 @@ from typing import Final
 import numpy as np
 
 from cellplan.cache import nothing_kept
-from cellplan.checks.verify import verify
+from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.csv import DECIMALS as CSV_DECIMALS
-from cellplan.export.csv import read_csv, render_csv
-from cellplan.io.input.files import digest
+from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.io.run.folder import EXPORT, PROGRAMS, RunFolder, refuse_unless_replaceable
 from cellplan.model.motion import JointTable
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import CAUTION
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
+from cellplan.pipeline.export.choice import Choice
+from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.pipeline.export.prepare import prepare
+from cellplan.pipeline.export.record import Record, export_record, record_text, table_record
+from cellplan.pipeline.export.shared import Shared
+from cellplan.pipeline.export.written import write
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.wide_table import read_wide_tables, render_wide_tables
-from cellplan.pipeline.write_run import versions
-from cellplan.report.record.controller import zero_text
-from cellplan.scene.scene import Scene
-
-SCHEMA: Final = "cellplan.export/1"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Exporter:
-    """A format.
+    """A format that is no program of single robots: it is made from all of a run.
 
     Attributes:
         render: Text of every file of a run, by its path in the folder of the export.
@@ -44,10 +43,10 @@ class Exporter:
     decimals: int
 
 
-EXPORTERS: Final[Mapping[str, Exporter]] = {
-    "csv": Exporter(render=render_csv, read=read_csv, decimals=CSV_DECIMALS),
+TABLES: Final[dict[str, Exporter]] = {
     "wide": Exporter(render=render_wide_tables, read=read_wide_tables, decimals=CSV_DECIMALS),
 }
+EXPORTERS: Final[Mapping[str, Dialect | Exporter]] = ChainMap(TABLES, DIALECTS)  # type: ignore[arg-type]
 
 
 def require_format(name: str) -> None:
@@ -59,6 +58,23 @@ def require_format(name: str) -> None:
     if name not in EXPORTERS:
         hint = did_you_mean(name, EXPORTERS)
         raise InputError(f"--format: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
+
+
+def refuse_choice(form: str, choice: Choice) -> None:
+    """Refuse what a format cannot do whatever the run; call it early, before any long work.
+
+    Args:
+        form: Name of the format.
+        choice: What was chosen.
+
+    Raises:
+        InputError: It cannot.
+    """
+    dialect = EXPORTERS[form]
+    if isinstance(dialect, Dialect):
+        choice.refuse_for(dialect)
+    elif choice != Choice():
+        raise InputError(f"--format: expected no choice of robots, rows or targets with {form}, a table of all robots")
 
 
 def default_folder(run: Path, form: str) -> Path:
@@ -82,7 +98,12 @@ def refuse_unless_exportable(folder: Path, run: Path) -> None:
 
 
 def export_program(
-    run: VerifiedRun, folder: Path, *, form: str = "csv", progress: Progress = silent
+    run: VerifiedRun,
+    folder: Path,
+    *,
+    form: str = "csv",
+    choice: Choice | None = None,
+    progress: Progress = silent,
 ) -> tuple[str, ...]:
     """Write the programs of a verified run; the folder appears whole or not at all.
 
@@ -92,43 +113,79 @@ def export_program(
         run: The verified run.
         folder: Where the files go; an older export there is replaced.
         form: Name of the format.
+        choice: Robots, targets, splitting and thinning; None for what is usual.
         progress: Called with the stage and the fraction done.
 
     Returns:
         The paths of the programs in the folder.
 
     Raises:
-        InputError: There is no such format, or the folder cannot be written.
-        NotVerifiedError: A check fails on the rounded numbers.
+        InputError: There is no such format, it cannot hold what was chosen, something that it needs is not stated in
+            the cell, or the folder cannot be written.
+        NotVerifiedError: A check fails on what the files hold, or nothing can be promised of them.
     """
     require_format(form)
     refuse_unless_exportable(folder, run.folder)
-    exporter = EXPORTERS[form]
-    files = exporter.render(run)
     with nothing_kept():  # a proof rests on the files themselves
-        _verify_rounded(run, exporter.read(run, files), decimals=exporter.decimals, progress=progress)
-    with RunFolder(folder) as target:
-        target.write_text(EXPORT, _record(run, files, form=form, decimals=exporter.decimals))
-        for name, text in files.items():
-            target.write_text(name, text)
+        files, record = exported(run, form, choice or Choice(), progress=progress)
+    write_export(folder, files, record)
     return tuple(files)
 
 
-def _verify_rounded(
-    run: VerifiedRun, read: tuple[dict[str, JointTable], ...], *, decimals: int, progress: Progress
+def write_export(folder: Path, files: Mapping[str, str], record: Record) -> None:
+    """Write the files of an export and its record; the folder appears whole or not at all.
+
+    Raises:
+        InputError: The folder cannot be written.
+    """
+    with RunFolder(folder) as target:
+        target.write_text(EXPORT, record_text(record))
+        for name, text in files.items():
+            target.write_text(name, text)
+
+
+def exported(
+    run: VerifiedRun, form: str, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
+) -> tuple[dict[str, str], Record]:
+    """The files of an export and its record, after all checks were made on what is read from them.
+
+    Args:
+        run: The verified run.
+        form: Name of the format.
+        choice: What was chosen.
+        shared: What exports of the run share; None for this one only.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The format cannot hold what was chosen, or something is not stated in the cell.
+        NotVerifiedError: A check fails on what the files hold, or nothing can be promised of them.
+    """
+    dialect, shared = EXPORTERS[form], shared or Shared(run)
+    if isinstance(dialect, Dialect):
+        prepared = prepare(run, dialect, choice, shared=shared, progress=progress)
+        written = write(run, prepared, progress=progress)
+        return written.files, export_record(run, prepared, written)
+    refuse_choice(form, choice)
+    files = dialect.render(run)
+    verify_rounded(shared, dialect.read(run, files), decimals=dialect.decimals, progress=progress)
+    return files, table_record(run, form, dialect.decimals, files)
+
+
+def verify_rounded(
+    shared: Shared, read: tuple[dict[str, JointTable], ...], *, decimals: int, progress: Progress
 ) -> None:
     """Make every check again on what the files hold, on the clock that they hold."""
-    demanded, scenes = None, [Scene.from_cell(run.cell)] * len(run.motions)
-    if run.cell.program is not None:
-        demanded = DemandedProgram.of(run.cell)
-        scenes = demanded.scenes(run.cell)
+    run = shared.run
+    demanded = None if run.cell.program is None else DemandedProgram.of(run.cell)
     findings = []
-    for place, (motion, scene, tables) in enumerate(zip(run.motions, scenes, read, strict=True)):
+    for place, (motion, scene, tables) in enumerate(zip(run.motions, shared.scenes, read, strict=True)):
         _refuse_other_clock(motion, tables, tolerance=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)
         idle = None if demanded is None else demanded.plan.program[place].idle
-        report = verify(scene, schedule, list(tables.values()), moving=motion.moving, idle=idle, progress=progress)
+        rows = list(tables.values())
+        report = verify_motion(scene, schedule, rows, moving=motion.moving, idle=idle, progress=progress)
+        report = with_clearance(report, scene, schedule, is_reported=False, progress=progress)
         findings += [f"rounded to {decimals} decimals: {check.message}" for check in report.checks if not check.passed]
     if findings:
         raise NotVerifiedError(findings)
@@ -137,22 +194,10 @@ def _verify_rounded(
 def _refuse_other_clock(motion: VerifiedMotion, tables: Mapping[str, JointTable], *, tolerance: float) -> None:
     """Make sure that rounding moved no time by more than half a unit of the last decimal."""
     for table in tables.values():
+        if len(table.times) != len(motion.schedule.times):
+            raise InputError(
+                f"program of '{table.robot}': expected {len(motion.schedule.times)} rows, got {len(table.times)}"
+            )
         late = np.abs(table.times - motion.schedule.times)
         if np.any(late > tolerance + np.spacing(motion.schedule.times[-1])) or not np.all(np.diff(table.times) > 0.0):
             raise InputError(f"program of '{table.robot}': its times cannot be written with the decimals of the format")
-
-
-def _record(run: VerifiedRun, files: Mapping[str, str], *, form: str, decimals: int) -> str:
-    """What was exported, from which run."""
-    record = {
-        "schema": SCHEMA,
-        "cell": run.cell.name,
-        "format": form,
-        "decimals": decimals,
-        "run": run.digest,
-        "versions": versions(),
-        "zero": {robot.name: zero_text(robot.model) for robot in run.cell.robots},
-        "files": {name: digest(text.encode()) for name, text in files.items()},
-        "caution": CAUTION,
-    }
-    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

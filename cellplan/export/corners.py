@@ -1,0 +1,93 @@
+"""Corners: the rows that a target may round, of all robots of a program, and within which share of their segments."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.export.joints import Axes
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+
+LARGEST_SHARE: Final = 0.5  # [-] controllers cut zones to half of a segment
+SAME_TIME: Final = 1e-7  # [s] rows nearer than this are at one instant
+AT_REST: Final = 1e-9  # [rad] or [m] a robot that moves no joint by more stands still
+
+
+def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
+    """Rows that targets may round, by robot, shape (N,).
+
+    These are all rows but the first and the last one, marks, rows at which the process of any robot of the program goes
+    on or off, and rows at which a robot rests or its tool has to stop. Robots that move in step round the same rows:
+    those that none of the moving ones must not round.
+
+    Args:
+        program: Rows of the robots that are exported.
+        promise: Whether robots move in step.
+    """
+    switches = _switch_times(program)
+    found = {}
+    for name, rows in program.robots.items():
+        free = np.ones(len(rows), dtype=bool)
+        free[[0, -1, *rows.marks, *rows.stops]] = False
+        if rows.times is None:
+            free &= ~_switches(rows)
+        else:
+            free &= ~_is_near(rows.times, switches)
+        found[name] = free
+    if promise is Promise.SYNCHRONISED:
+        moving = {name: moves(rows) for name, rows in program.robots.items()}
+        kept = [
+            found[name] & (~np.any(moving[name], axis=0) | _runs(rows, moving[name]))
+            for name, rows in program.robots.items()
+        ]
+        shared: Flags = np.logical_and.reduce(kept) & np.logical_or.reduce([np.any(m, axis=0) for m in moving.values()])
+        return dict.fromkeys(found, shared)
+    return {name: found[name] & _runs(rows, moves(rows)) for name, rows in program.robots.items()}
+
+
+def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
+    """Share of the shorter neighbouring segment within which each row of a job may be rounded, by robot, shape (N,).
+
+    What a zone does to a unit without a tool is known too little: it counts as rounded within half of its segments,
+    beyond which no controller goes.
+    """
+    if job.blend <= 0.0:
+        return {name: np.zeros(len(rows)) for name, rows in program.robots.items()}
+    free = may_round(program, job.frame.promise)
+    has_arm = {name: bool(Axes.of(job.frame.robot(name)).arm) for name in free}
+    return {name: np.where(own, job.blend if has_arm[name] else LARGEST_SHARE, 0.0) for name, own in free.items()}
+
+
+def moves(rows: RobotRows) -> Flags:
+    """Whether a robot moves to each row, and from each row on, shape (2, N)."""
+    moved = np.any(np.abs(np.diff(rows.q, axis=0)) > AT_REST, axis=1)
+    return np.stack([np.append([False], moved), np.append(moved, [False])])
+
+
+def _runs(rows: RobotRows, moving: Flags) -> Flags:
+    """Rows that a robot passes without coming to rest, shape (N,)."""
+    runs: Flags = np.all(moving, axis=0)
+    return runs if rows.qd is None else runs & np.any(rows.qd != 0.0, axis=1)
+
+
+def _switches(rows: RobotRows) -> Flags:
+    """Rows at which the process of a robot goes on or off, shape (N,)."""
+    found = np.zeros(len(rows), dtype=bool)
+    if rows.process is not None:
+        found[1:] = rows.process[1:] != rows.process[:-1]
+    return found
+
+
+def _switch_times(program: ProgramRows) -> Array:
+    """Times in [s] at which the process of any robot goes on or off, increasing."""
+    times = [rows.times[_switches(rows)] for rows in program.robots.values() if rows.times is not None]
+    return np.unique(np.concatenate([np.zeros(0), *times]))
+
+
+def _is_near(times: Array, others: Array) -> Flags:
+    """Which times are the same as one of some others, which increase, shape (N,)."""
+    ordered = np.concatenate([[-np.inf], others, [np.inf]])
+    after = np.searchsorted(ordered, times)
+    near: Flags = np.minimum(ordered[after] - times, times - ordered[after - 1]) <= SAME_TIME
+    return near

@@ -1,0 +1,80 @@
+"""Handshakes at marks: signals by which robots wait for one another, without a clock.
+
+The first robot of a cell leads. Each other one raises its output and waits until the leader has raised its own; then it
+lowers its output and waits until the leader has lowered its own. The leader waits until all outputs are raised, raises
+its own, waits until all are lowered, and lowers its own. Whatever the order in which the controllers read their
+inputs, none misses a state of another, and none leaves a mark before all have come to it.
+"""
+
+from typing import NamedTuple
+
+from cellplan.errors import InputError
+from cellplan.model.controllers import Handshake
+from cellplan.model.exported import ExportFrame
+
+
+class Step(NamedTuple):
+    """One instruction of a handshake.
+
+    Attributes:
+        waits: Whether it waits for an input, or else sets the output.
+        signal: The input or output as the controller names it.
+        is_on: The state to wait for, or to set.
+    """
+
+    waits: bool
+    signal: str
+    is_on: bool
+
+
+def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
+    """Instructions of a robot at a mark; none in a cell of one robot.
+
+    Args:
+        frame: The robots that are exported; all robots of the cell take part in the handshake.
+        robot: Name of the robot.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
+    """
+    names = [each.name for each in frame.cell.robots]
+    if len(names) == 1:
+        return ()
+    leader, others = names[0], names[1:]
+    own = _signals(frame, robot)
+    if robot != leader:
+        output, go = own.output, _input(own, robot, leader)
+        return (Step(False, output, True), Step(True, go, True), Step(False, output, False), Step(True, go, False))
+    inputs = [_input(own, robot, other) for other in others]
+    up, down = ([Step(True, signal, is_on) for signal in inputs] for is_on in (True, False))
+    return (*up, Step(False, own.output, True), *down, Step(False, own.output, False))
+
+
+def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
+    """Stated signals of a robot by their keys in the cell file, its output first; none where none is stated."""
+    control = frame.robot(robot).control
+    if control is None or control.handshake is None:
+        return {}
+    key = f"robots.{robot}.controller.handshake"
+    inputs = {f"{key}.inputs.{other}": signal for other, signal in control.handshake.inputs.items()}
+    return {f"{key}.output": control.handshake.output} | inputs
+
+
+def _signals(frame: ExportFrame, robot: str) -> Handshake:
+    """The signals of a robot."""
+    control = frame.robot(robot).control
+    if control is None or control.handshake is None:
+        raise InputError(
+            f"robots.{robot}.controller.handshake: expected its signals, as its program waits for other robots, "
+            f"got none"
+        )
+    return control.handshake
+
+
+def _input(own: Handshake, robot: str, other: str) -> str:
+    """The input at which a robot reads the output of another one."""
+    if other not in own.inputs:
+        raise InputError(
+            f"robots.{robot}.controller.handshake.inputs: expected the input that '{other}' sets, got none"
+        )
+    return own.inputs[other]

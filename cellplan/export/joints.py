@@ -1,0 +1,116 @@
+"""Joint positions as the numbers of a controller: its zero, its units, its decimals, and never beyond a limit."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.rounding import LARGEST
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.controller import ControllerZero
+from cellplan.model.robot import Joint
+from cellplan.model.units import DEG, MM
+
+ARM: Final = 6  # axes that a controller counts as those of the arm; the axes before them are external
+NUDGES: Final = 4  # last decimals by which coupled axes move inwards before a position counts as unwritable
+
+
+class Angle(StrEnum):
+    """Unit of turning joints in a file; sliding ones are in [mm] beside degrees, in [m] beside radians."""
+
+    DEGREES = "deg"
+    RADIANS = "rad"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axes:
+    """Which joints a controller counts as axes of the arm, and which as external axes.
+
+    Attributes:
+        arm: Places of the axes of the arm among the joints of the model; empty for a positioner without an arm.
+        external: Places of all others: a rail before the arm, or the axes of a positioner.
+    """
+
+    arm: tuple[int, ...]
+    external: tuple[int, ...]
+
+    @classmethod
+    def of(cls, robot: Robot) -> "Axes":
+        """The axes of a robot: the last six of six joints or more are its arm."""
+        count = len(robot.model.joints)
+        first = count - ARM if count >= ARM else count
+        return cls(arm=tuple(range(first, count)), external=tuple(range(first)))
+
+
+def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DEGREES) -> Array:
+    """Positions of the controller as numbers of a file, rounded, none beyond a limit when they are read back.
+
+    Args:
+        robot: The robot, whose limits and zero hold.
+        q: Positions of the model in [rad] or [m], shape (N, n).
+        decimals: Of the numbers.
+        angle: Unit of turning joints.
+
+    Returns:
+        The numbers, shape (N, n), exact multiples of the last decimal but for the last bit.
+
+    Raises:
+        InputError: A position cannot be written with the decimals.
+    """
+    joints, quantum = robot.model.joints, 10.0**decimals
+    scale = np.array([_scale(joint, angle) for joint in joints])
+    numbers = _zero(robot).from_model(q) * scale
+    if not np.all(np.abs(numbers) < LARGEST):
+        raise InputError(f"robot '{robot.name}': expected positions below {LARGEST:g}, got one that is too large")
+    quanta = np.rint(numbers * quantum)
+    lower, upper = (np.array([getattr(joint, end) for joint in joints]) for end in ("lower", "upper"))
+    sign = np.sign(_zero(robot).sign)
+    for _ in range(NUDGES):
+        read = from_numbers(robot, quanta / quantum + 0.0, angle=angle)
+        beyond = (read > upper).astype(float) - (read < lower)
+        if not np.any(beyond):
+            return quanta / quantum + 0.0
+        quanta -= beyond * sign
+    at = joints[int(np.argmax(np.any(beyond != 0.0, axis=0)))].name
+    raise InputError(
+        f"robot '{robot.name}': joint {at}: no number with {decimals} decimals near its limit lies within its limits"
+    )
+
+
+def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) -> Array:
+    """Positions of the model in [rad] or [m] for numbers of a file, shape (N, n)."""
+    positions = np.empty_like(numbers, dtype=np.float64)
+    for place, joint in enumerate(robot.model.joints):
+        if angle is Angle.RADIANS:
+            positions[:, place] = numbers[:, place]
+        else:
+            positions[:, place] = np.deg2rad(numbers[:, place]) if joint.is_revolute else numbers[:, place] / MM
+    return _zero(robot).to_model(positions)
+
+
+def rates_to_numbers(robot: Robot, qd: Array, *, angle: Angle = Angle.DEGREES) -> Array:
+    """Speeds of the controller's axes per second in the unit of a file for speeds of the model, shape (N, n)."""
+    zero = _zero(robot)
+    still = ControllerZero(zero=np.zeros_like(zero.zero), sign=zero.sign, coupling=zero.coupling, source=zero.source)
+    return still.from_model(qd) * np.array([_scale(joint, angle) for joint in robot.model.joints])
+
+
+def _scale(joint: Joint, angle: Angle) -> float:
+    """Number in a file per position in [rad] or [m]."""
+    if angle is Angle.RADIANS:
+        return 1.0
+    return DEG if joint.is_revolute else MM
+
+
+def _zero(robot: Robot) -> ControllerZero:
+    """How the controller of a robot counts its joints; as the model does where it is not stated."""
+    count = len(robot.model.joints)
+    stated = robot.model.controller
+    if stated is not None:
+        return stated
+    return ControllerZero(
+        zero=np.zeros(count), sign=np.ones(count), coupling=np.zeros((count, count)), source="not stated"
+    )

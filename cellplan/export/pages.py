@@ -1,0 +1,172 @@
+"""Programs in the language of a maker: whose robots, which names and pages, how fast, and which rows are rounded."""
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.export.corners import row_shares
+from cellplan.export.dialect import Dialect
+from cellplan.export.joints import Axes
+from cellplan.export.text import ascii_text, safe_names
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
+
+ENDING: Final = 4  # characters of the ending _001 of a page
+MOST_PAGES: Final = 999
+SHORTEST: Final = 1e-6  # [s] between two rows that count as apart
+SLOW: Final = 10  # [%] to the first row, and throughout where no times are known
+
+
+def robots_of(frame: ExportFrame, dialect: Dialect) -> tuple[str, ...]:
+    """The exported robots whose controllers play a format, in the order of the cell.
+
+    Raises:
+        InputError: A robot has no controller, or none of the robots has one that plays the format.
+    """
+    kinds = {name: _kind(frame, name, dialect) for name in frame.robots}
+    found = tuple(name for name, kind in kinds.items() if kind in dialect.kinds)
+    if not found:
+        name, kind = next(iter(kinds.items()))
+        allowed = " or ".join(sorted(dialect.kinds))
+        raise InputError(
+            f"robots.{name}.controller: expected a controller that plays {dialect.name} ({allowed}), got '{kind}'"
+        )
+    return found
+
+
+def _kind(frame: ExportFrame, robot: str, dialect: Dialect) -> str:
+    """Kind of the controller of a robot."""
+    control = frame.robot(robot).control
+    if control is None:
+        raise InputError(f"robots.{robot}.controller: expected the controller that plays {dialect.name}, got none")
+    if control.controller not in frame.cell.controllers:
+        raise InputError(
+            f"robots.{robot}.controller: expected one of the controllers of the cell, got '{control.controller}'"
+        )
+    return frame.cell.controllers[control.controller].kind
+
+
+def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:
+    """The axes of an arm of six, with so many others before it as a language has external axes.
+
+    Args:
+        robot: The robot.
+        external: Most external axes.
+        what: The language in messages.
+
+    Raises:
+        InputError: It has no arm, or too many axes before it.
+    """
+    axes, count = Axes.of(robot), len(robot.model.joints)
+    if not axes.arm:
+        raise InputError(
+            f"robots.{robot.name}: expected an arm of six axes, got {count} axes: {what} moves a positioner "
+            f"by the program of an arm only"
+        )
+    if len(axes.external) > external:
+        kind = "a turning axis" if robot.model.joints[0].is_revolute else "a rail"
+        got = f"{kind} before it" if external == 0 else f"{len(axes.external)} axes before it"
+        raise InputError(
+            f"robots.{robot.name}: expected an arm of six axes{f' and at most {external} others' if external else ''}, "
+            f"got {got}: {what} has no place for it"
+        )
+    return axes
+
+
+def page_names(names: Iterable[str], *, longest: int, reserved: Iterable[str], taken: str) -> dict[str, str]:
+    """Names of programs by the names in the cell: with the ending of a page still unique and short enough.
+
+    No name ends like one of a page, so that ``weld_001`` is the first page of ``weld`` and nothing else.
+
+    Args:
+        names: Names in the cell, in their order.
+        longest: Most characters of the name of a page.
+        reserved: Words of the language.
+        taken: Pattern of the names that points and other data have.
+    """
+    used, result = set(reserved), dict[str, str]()
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9]+", "_", ascii_text(name)).strip("_") or "x"
+        plain = re.sub(r"_(?=[0-9]{3})", "", plain)
+        if not plain[0].isalpha() or re.fullmatch(taken, plain, re.IGNORECASE):
+            plain = f"p{plain}"
+        result[name] = safe_names([plain], longest=longest - ENDING, reserved=used)[plain]
+        used.add(result[name])
+    return result
+
+
+def pages_of(count: int, frame: ExportFrame, dialect: Dialect) -> list[range]:
+    """Rows of each page: as many as fit into each but the last one, the same for all robots of equally many rows.
+
+    Raises:
+        InputError: There are too many pages for three digits.
+    """
+    size = frame.split or dialect.split or max(count, 1)
+    found = [range(first, min(first + size, count)) for first in range(0, count, size)]
+    if len(found) > MOST_PAGES:
+        raise InputError(
+            f"--split: expected at most {MOST_PAGES} pages, got {len(found)} of {size} of {count} rows; use larger ones"
+        )
+    return found
+
+
+def program_rows(job: ExportJob, robots: Iterable[str], program: ProgramRows) -> dict[str, RobotRows]:
+    """Rows of the robots in a program, which meet at equally many marks; each may keep other rows.
+
+    Raises:
+        InputError: They do not, or one of them has no row.
+    """
+    found = {name: program.robots[name] for name in robots}
+    if len({len(rows.marks) for rows in found.values()}) > 1 or not all(map(len, found.values())):
+        got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in found.items())
+        raise InputError(f"program '{program.name or job.frame.cell.name}': expected rows, and equal marks, got {got}")
+    return found
+
+
+def is_rounded(
+    job: ExportJob, program: ProgramRows, robot: str, numbers: Array, pages: Iterable[range]
+) -> NDArray[np.bool_]:
+    """Rows that a target rounds, shape (N,): those that it may, but for ends of pages.
+
+    Rows that stand on a neighbour are no corner that could be rounded.
+
+    Args:
+        job: What is written, with the share of the segments.
+        program: Rows of the robots in the program.
+        robot: One of them.
+        numbers: Its positions as they are written, shape (N, n).
+        pages: Rows of each page.
+    """
+    found: NDArray[np.bool_] = row_shares(job, program)[robot] > 0.0
+    found[[page[-1] for page in pages]] = False
+    moves = np.any(np.diff(numbers, axis=0) != 0.0, axis=1)
+    found[1:] &= moves
+    found[:-1] &= moves
+    return found
+
+
+def percentages(robot: Robot, rows: RobotRows) -> list[int]:
+    """Speed with which a robot comes to each row, as a whole share of the top speed of its axes in [%], 1 to 100.
+
+    It is that of the plan: the largest share that an axis needs from one row to the next in the time between them. A
+    stretch in which nothing moves keeps the share before it.
+
+    Args:
+        robot: The robot.
+        rows: Its rows.
+    """
+    if rows.times is None or len(rows) < 2:
+        return [SLOW] * len(rows)
+    top = np.array([joint.top_speed for joint in robot.model.joints])
+    shares = np.max(
+        np.abs(np.diff(rows.q, axis=0)) / (np.maximum(np.diff(rows.times), SHORTEST)[:, None] * top), axis=1
+    )
+    found = [SLOW]
+    for share in np.clip(np.rint(100.0 * shares), 1, 100) * (shares > 0.0):
+        found.append(int(share) or found[-1])
+    return found

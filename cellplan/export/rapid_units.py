@@ -1,0 +1,254 @@
+"""RAPID programs of a cell: which task plays which robot, under which names, and where the part is held."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.joints import Axes
+from cellplan.export.text import safe_names
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.controllers import Controller, ControllerKind
+from cellplan.model.exported import ExportFrame, Promise, Targets
+from cellplan.model.task import Frame
+
+DECIMALS: Final = 4  # of a degree or millimetre
+TIME_DECIMALS: Final = 6  # of a second
+QUATERNION_DECIMALS: Final = 7  # as many as a number of the controller holds
+LONGEST_NAME: Final = 32
+LONGEST_MODULE: Final = 24  # room for `t_` before it and for the number of a page behind it
+EXTERNAL_AXES: Final = 6
+ABSENT: Final = "9E9"  # an axis that a mechanical unit does not have
+TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS = (
+    "cell_tasks",
+    "sync_on",
+    "sync_off",
+    "part",
+    "v_start",
+    "v_rows",
+)
+ZONES: Final = tuple(round(10.0 ** (1.0 + place / 10.0)) for place in range(44))  # [um] or [mdeg], 0.01 to 200
+_WORDS: Final = (
+    "alias and backward bool case connect const default div do dnum else elseif endfor endfunc endif endmodule endproc "
+    "endrecord endtest endtrap endwhile error exit false fine for from func goto if inout jointtarget local main mod "
+    "module nostepin not noview num or pers proc raise readonly record retry return robtarget speeddata step string "
+    "sysmodule task tasks test then to tooldata tool0 trap true trynext undo var viewonly while with wobj0 wobjdata "
+    "xor zonedata syncident load0 setdo waitdi moveabsj moveextj movel movej movec syncmoveon syncmoveoff"
+)
+
+
+def zone_name(size: int) -> str:
+    """Name of a zone of some micrometres or thousandths of a degree."""
+    return f"z_{size}"
+
+
+WORDS: Final = frozenset(_WORDS.split())  # of the language, and of what its controllers declare
+OWN_NAMES: Final = frozenset(  # of declarations and pages here, and of speeds and zones of the language
+    {TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS, *map(zone_name, ZONES)}
+    | {f"page_{number:03d}" for number in range(1, 1000)}
+    | {f"{letter}{number}" for letter in "vz" for number in range(10_000)}
+)
+NAME: Final = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{LONGEST_NAME - 1}}}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RapidUnit:
+    """A robot as RAPID programs it.
+
+    Attributes:
+        robot: The robot.
+        task: Name of its task on the controller; None where no other task runs with it.
+        module: Name of its module, and of its files.
+        tool: Name of its tool data; those of all robots differ, as persistent data are shared between tasks.
+        axes: Which joints belong to the arm, and which are external axes.
+        decimals: Of a degree or millimetre.
+    """
+
+    robot: Robot
+    task: str | None
+    module: str
+    tool: str
+    axes: Axes
+    decimals: int
+
+    @property
+    def has_tool(self) -> bool:
+        """Whether it has a tool centre point; a positioner has external axes only."""
+        return bool(self.axes.arm)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PartFrame:
+    """The work object of a part that a robot carries.
+
+    Attributes:
+        unit: The mechanical unit that moves it.
+        X_FP: The part in the flange frame of that unit, shape (4, 4).
+    """
+
+    unit: str
+    X_FP: Array
+
+
+def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
+    """Robots of an export in the order of the cell.
+
+    Raises:
+        InputError: A robot has no controller of the kind, or what is promised needs another arrangement of tasks.
+    """
+    modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | OWN_NAMES)
+    is_synchronised = frame.promise is Promise.SYNCHRONISED
+    if is_synchronised:
+        _require_one_controller(frame)
+    units = tuple(
+        _unit(frame, name, task=_task(frame, name) if is_synchronised else None, module=modules[name])
+        for name in frame.robots
+    )
+    tasks = [(unit.task or "").lower() for unit in units]
+    for place, unit in enumerate(units):
+        if is_synchronised and tasks[place] in tasks[:place]:
+            first = units[tasks.index(tasks[place])].robot.name
+            raise InputError(
+                f"robots.{unit.robot.name}.controller.task: expected a task of its own, got {unit.task}, the task of "
+                f"'{first}'"
+            )
+    return units
+
+
+def works_on_part(frame: ExportFrame, robot: str) -> bool:
+    """Whether a robot may be programmed with targets on the part: it has an arm and a task there, and does not hold it.
+
+    Args:
+        frame: The export.
+        robot: Name of the robot.
+    """
+    cell = frame.cell
+    tasks = [task for task in cell.tasks if task.robot == robot and task.relative_to is Frame.PART]
+    return (
+        frame.targets is Targets.PART
+        and bool(tasks)
+        and robot not in cell.positioners
+        and bool(Axes.of(frame.robot(robot)).arm)
+    )
+
+
+def part_frame(frame: ExportFrame) -> PartFrame | None:
+    """The work object of targets on the part; None in an export of joint targets.
+
+    The holder's flange carries the part without moving in it, so its work object states no user frame, and the part in
+    the flange as object frame: ``X_FP = X_FT X_TP`` of the holder.
+
+    Raises:
+        InputError: No robot of the export carries the part, or the robots are not synchronised.
+    """
+    if frame.targets is not Targets.PART:
+        return None
+    if frame.promise is not Promise.SYNCHRONISED:
+        raise InputError(
+            f"--targets part: expected robots that one controller moves together, got programs that are {frame.promise}"
+        )
+    if not frame.cell.part.held_by:
+        raise InputError("--targets part: expected a part that a robot holds, got one that is fixed in the world")
+    holder = frame.cell.part.held_by[0].robot
+    if holder not in frame.robots:
+        raise InputError(f"--targets part: expected '{holder}', which holds the part, among the exported robots")
+    task, placed = _task(frame, holder), frame.robot(holder)
+    unit = _controller(frame, holder).tasks[task]
+    return PartFrame(unit=unit, X_FP=placed.tool.X_FT @ frame.cell.part.X_CP)
+
+
+def absent(count: int) -> list[str]:
+    """So many axes that a mechanical unit does not have."""
+    return [ABSENT] * count
+
+
+def quaternions(R: Array) -> Array:
+    """Unit quaternions w, x, y, z of rotations, shape (N, 3, 3) to (N, 4), each on the side of the one before it.
+
+    The largest component is found first, from the diagonal; the others follow from sums and differences of pairs.
+    """
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    x, y, z = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
+    xy, xz, yz = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
+    outer = np.array(  # 4 q q^T, shape (4, 4, N)
+        [
+            [1 + xx + yy + zz, x, y, z],
+            [x, 1 + xx - yy - zz, xy, xz],
+            [y, xy, 1 - xx + yy - zz, yz],
+            [z, xz, yz, 1 - xx - yy + zz],
+        ]
+    )
+    largest = np.argmax(np.diagonal(outer), axis=1)
+    found = np.moveaxis(outer, -1, 0)[np.arange(len(R)), largest]
+    found /= np.linalg.norm(found, axis=1, keepdims=True)
+    if len(found):
+        found[0] *= np.where(found[0, 0] < 0.0, -1.0, 1.0)
+        turns = np.sum(found[1:] * found[:-1], axis=1) < 0.0
+        found[1:] *= np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)[:, None]
+    return found
+
+
+def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> RapidUnit:
+    """One robot."""
+    _controller(frame, name)
+    robot = frame.robot(name)
+    axes = Axes.of(robot)
+    if len(axes.external) > EXTERNAL_AXES:
+        raise InputError(
+            f"robots.{name}: expected at most {EXTERNAL_AXES} axes beside an arm, got {len(axes.external)}"
+        )
+    decimals = None if robot.control is None else robot.control.decimals
+    return RapidUnit(
+        robot=robot,
+        task=task,
+        module=module,
+        tool=f"t_{module}",
+        axes=axes,
+        decimals=DECIMALS if decimals is None else decimals,
+    )
+
+
+def _controller(frame: ExportFrame, name: str) -> Controller:
+    """The controller of a robot, which must be one that plays these programs."""
+    control = frame.robot(name).control
+    controllers: Mapping[str, Controller] = frame.cell.controllers
+    if control is None or control.controller not in controllers:
+        raise InputError(f"robots.{name}.controller: expected the controller that plays rapid, got none")
+    found = controllers[control.controller]
+    if found.kind is not ControllerKind.ABB:
+        raise InputError(f"robots.{name}.controller: expected a controller of kind abb for rapid, got {found.kind}")
+    return found
+
+
+def _task(frame: ExportFrame, name: str) -> str:
+    """Name of the task that moves a robot."""
+    controller, control = _controller(frame, name), frame.robot(name).control
+    task = None if control is None else control.task
+    known = ", ".join(controller.tasks) or "none"
+    if task is None or task not in controller.tasks:
+        got = "none" if task is None else task
+        raise InputError(
+            f"robots.{name}.controller.task: expected one of the tasks of controller '{controller.name}' ({known}), "
+            f"got {got}"
+        )
+    for key, value in ((f"robots.{name}.controller.task", task), (_key(controller, task), controller.tasks[task])):
+        if not NAME.fullmatch(value):
+            raise InputError(f"{key}: expected a name of at most {LONGEST_NAME} letters, digits and _, got {value!r}")
+    return task
+
+
+def _key(controller: Controller, task: str) -> str:
+    """Key of the mechanical unit of a task in the cell file."""
+    return f"controllers.{controller.name}.tasks.{task}"
+
+
+def _require_one_controller(frame: ExportFrame) -> None:
+    """Refuse synchronised programs of robots that no single controller moves."""
+    names = dict.fromkeys(_controller(frame, name).name for name in frame.robots)
+    if len(names) > 1 or len(frame.robots) < 2:
+        got = f"controllers {', '.join(names)}" if len(names) > 1 else f"{len(frame.robots)}"
+        raise InputError(f"rapid: expected at least two robots on one controller for synchronised programs, got {got}")

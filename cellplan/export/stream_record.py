@@ -1,0 +1,162 @@
+"""What stands beside a stream: its controller, axes and cycle, and what the written numbers demand of the robot."""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.export.joints import Axes
+from cellplan.export.json_tree import Raw, Written
+from cellplan.export.text import fixed
+from cellplan.export.timed_rows import cycle_of
+from cellplan.model.cell import Robot
+from cellplan.model.controllers import Controller, ControllerKind
+from cellplan.model.exported import ExportFrame
+from cellplan.model.robot import Joint
+
+SCHEMA: Final = "cellplan.stream/1"
+DECIMALS: Final = 6  # of a degree or millimetre
+MICRO: Final = 1_000_000  # [us/s] times and cycles are whole microseconds
+LAGGING: Final = frozenset({ControllerKind.ABB, ControllerKind.UR})  # EGM and servoj follow a stream with a filter
+FREE: Final = ("notes",)
+FIGURES: Final = 6  # decimals of the figures
+
+
+class StreamAxis(NamedTuple):
+    """One column of positions.
+
+    Attributes:
+        name: Name of the axis on the controller: ``A1`` to ``A6`` of an arm, ``E1`` and so on of all others.
+        place: Place of its joint in the model.
+        joint: The joint.
+    """
+
+    name: str
+    place: int
+    joint: Joint
+
+    @property
+    def column(self) -> str:
+        """Name of the column."""
+        return f"{self.name}_{self.joint.display_unit.name}"
+
+
+def stream_axes(robot: Robot) -> tuple[StreamAxis, ...]:
+    """Axes of a robot in the order of the columns: those of the arm, then the external ones."""
+    axes, joints = Axes.of(robot), robot.model.joints
+    arm = (StreamAxis(f"A{number}", place, joints[place]) for number, place in enumerate(axes.arm, start=1))
+    external = (StreamAxis(f"E{number}", place, joints[place]) for number, place in enumerate(axes.external, start=1))
+    return (*arm, *external)
+
+
+def whole_cycle(robot: Robot) -> int:
+    """Cycle of a robot's controller in whole microseconds.
+
+    Raises:
+        InputError: It is no whole number of them.
+    """
+    cycle = cycle_of(robot) * MICRO
+    if cycle < 0.5 or abs(cycle - round(cycle)) > 1e-6 * cycle:
+        raise InputError(
+            f"robots.{robot.name}.controller.cycle_ms: expected whole microseconds, so that every row is at k times "
+            f"the cycle, got {cycle / 1000.0:.9g}"
+        )
+    return round(cycle)
+
+
+def stream_record(
+    frame: ExportFrame,
+    program: str | None,
+    robot: str,
+    *,
+    quanta: NDArray[np.int64],
+    digest: str,
+    notes: Sequence[str] = (),
+) -> dict[str, Written]:
+    """The record beside a stream.
+
+    Args:
+        frame: What is exported.
+        program: Name of the program.
+        robot: Name of the robot.
+        quanta: Written positions as whole numbers of the last decimal, in the order of the columns, shape (N, n).
+        digest: SHA-256 of the stream.
+        notes: What is promised of it.
+
+    Raises:
+        InputError: The controller follows a stream with a latency that is not stated, or counts an axis in a way that
+            is not stated.
+    """
+    placed = frame.robot(robot)
+    cycle, zero = whole_cycle(placed), placed.model.controller
+    controller = _controller(frame, placed)
+    latency = None if controller is None else controller.latency
+    return {
+        "schema": SCHEMA,
+        "cell": frame.cell.name,
+        "program": program,
+        "robot": robot,
+        "model": placed.model.name,
+        "controller": None if controller is None else controller.name,
+        "kind": None if controller is None else str(controller.kind),
+        "latency_ms": None if latency is None else Raw(fixed(1000.0 * latency, 3)),
+        "promise": str(frame.promise),
+        "notes": list(notes),
+        "file": f"{robot}.csv",
+        "sha256": digest,
+        "cycle_ms": Raw(fixed(cycle / 1000.0, 3)),
+        "rows": Raw(len(quanta)),
+        "end_s": Raw(fixed((len(quanta) - 1) * cycle / MICRO, 6)),
+        "zero": "that of the model; the controller's is not stated" if zero is None else "that of the controller",
+        "source_of_zero": None if zero is None else zero.source,
+        "axes": [
+            _axis_record(axis, quanta[:, column], decimals=DECIMALS, cycle=cycle)
+            for column, axis in enumerate(stream_axes(placed))
+        ],
+    }
+
+
+def _controller(frame: ExportFrame, robot: Robot) -> Controller | None:
+    """The controller of a robot; None when none is stated.
+
+    Raises:
+        InputError: It needs something that is not stated.
+    """
+    if robot.control is None:
+        return None
+    controller = frame.cell.controllers[robot.control.controller]
+    if controller.kind in LAGGING and controller.latency is None:
+        raise InputError(
+            f"controllers.{controller.name}.latency_ms: expected the time by which its robots follow a stream, as "
+            f"controllers of kind {controller.kind} filter it, got none"
+        )
+    if controller.kind == ControllerKind.FANUC and robot.model.controller is None and Axes.of(robot).arm:
+        raise InputError(
+            f"robots.{robot.name}.controller_zero: expected how the controller counts axis 3, which is counted "
+            f"against the horizontal there, got none"
+        )
+    return controller
+
+
+def _axis_record(axis: StreamAxis, quanta: NDArray[np.int64], *, decimals: int, cycle: int) -> dict[str, Written]:
+    """Start, range and peaks of one column, all of them of the written numbers."""
+    tick, seconds, start = 10.0**-decimals, cycle / MICRO, int(quanta[0])
+    peaks = [_peak(np.diff(quanta, n=order)) * tick / seconds**order for order in (1, 2, 3)]
+    return {
+        "axis": axis.name,
+        "joint": axis.joint.name,
+        "unit": axis.joint.display_unit.name,
+        "start": Raw(fixed(start * tick, decimals)),
+        "lowest_from_start": Raw(fixed((int(quanta.min()) - start) * tick, decimals)),
+        "highest_from_start": Raw(fixed((int(quanta.max()) - start) * tick, decimals)),
+        "peak_per_s": Raw(fixed(peaks[0], FIGURES)),
+        "peak_per_s2": Raw(fixed(peaks[1], FIGURES)),
+        "peak_per_s3": Raw(fixed(peaks[2], FIGURES)),
+    }
+
+
+def _peak(changes: NDArray[np.int64]) -> int:
+    """Largest change without its sign."""
+    return int(np.abs(changes).max(initial=0))

@@ -1,0 +1,139 @@
+"""Rows with times as formats of joint tables share them: one clock, paths of files, decimals of a robot."""
+
+from collections.abc import Collection, Mapping
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.rounding import LARGEST
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.exported import ProgramRows, RobotRows
+
+NANO: Final = 1_000_000_000  # [ns/s]
+
+
+def file_path(program: str | None, file: str) -> str:
+    """Path of a file of a program in the folder of the export, as the plain format has it."""
+    return file if program is None else f"{program}/{file}"
+
+
+def decimals_of(robot: Robot, usual: int) -> int:
+    """Decimals of a robot's positions in its controller's own language: its own, or else those of the format."""
+    stated = None if robot.control is None else robot.control.decimals
+    return usual if stated is None else stated
+
+
+def cycle_of(robot: Robot) -> float:
+    """Cycle in [s] at which the controller of a robot takes positions."""
+    stated = None if robot.control is None else robot.control.cycle
+    return robot.controller_cycle if stated is None else stated
+
+
+def times_of(rows: RobotRows) -> Array:
+    """Times of rows in [s], shape (N,), from 0 and rising.
+
+    Raises:
+        InputError: They have none, or others.
+    """
+    times = rows.times
+    if times is None:
+        raise InputError(f"robot '{rows.robot}': expected rows with times, got none")
+    if len(times) != len(rows) or len(times) < 2 or times[0] != 0.0 or not np.all(np.diff(times) > 0.0):
+        raise InputError(f"robot '{rows.robot}': expected two rows or more, with times that rise from 0")
+    if not times[-1] < LARGEST:
+        raise InputError(f"robot '{rows.robot}': expected times below {LARGEST:g} s, got {times[-1]:g}")
+    return times
+
+
+def nanoseconds(times: Array, *, robot: str) -> list[int]:
+    """Times in [s], shape (N,), as whole nanoseconds that rise.
+
+    Raises:
+        InputError: Two times are the same nanosecond.
+    """
+    whole = [round(time * NANO) for time in times.tolist()]
+    if any(late <= early for early, late in pairwise(whole)):
+        raise InputError(f"robot '{robot}': expected rows that are a nanosecond apart or more")
+    return whole
+
+
+def shared_clock(program: ProgramRows, robots: Collection[str]) -> Array:
+    """The one clock of some robots in a program in [s], shape (N,).
+
+    Raises:
+        InputError: They have different ones.
+    """
+    first, *others = robots
+    clock = times_of(program.robots[first])
+    for name in others:
+        if not np.array_equal(times_of(program.robots[name]), clock):
+            raise InputError(f"robot '{name}': expected rows at the same times as those of '{first}'")
+    return clock
+
+
+def require_paths(files: Mapping[str, str], expected: Collection[str]) -> None:
+    """Make sure that an export holds exactly some files.
+
+    Raises:
+        InputError: One is missing, or there is another one.
+    """
+    missing = sorted(set(expected) - set(files))
+    if missing:
+        raise InputError(f"{missing[0]}:1: expected a file of the export, got none")
+    other = sorted(set(files) - set(expected))
+    if other:
+        raise InputError(f"{other[0]}:1: expected no such file in the export, got one")
+
+
+def line_error(file: str, line: int, expected: str, got: str) -> InputError:
+    """The error that a line of a file holds something else.
+
+    Args:
+        file: Its name in messages.
+        line: The line, from 1.
+        expected: What should stand there.
+        got: What stands there, of which the first characters are shown.
+    """
+    return found_error(file, line, expected, repr(got[:60]))
+
+
+def found_error(file: str, line: int, expected: str, found: str) -> InputError:
+    """The error that something else was found at a line of a file.
+
+    Args:
+        file: Its name in messages.
+        line: The line, from 1.
+        expected: What should be there.
+        found: What is there, in words.
+    """
+    return InputError(f"{file}:{line}: expected {expected}, got {found}")
+
+
+def truncated_error(file: str, line: int, expected: str) -> InputError:
+    """The error that a file ends too early.
+
+    Args:
+        file: Its name in messages.
+        line: Its last line.
+        expected: What should follow.
+    """
+    return found_error(file, line, expected, "the end of the file; it is truncated")
+
+
+def lines_of(text: str, file: str) -> list[str]:
+    """Lines of a text of printable ASCII characters whose last line is ended, with one kind of line end.
+
+    Raises:
+        InputError: With file and line, when it is no such text.
+    """
+    if not text.endswith("\n"):
+        raise truncated_error(file, 1 + text.count("\n"), "an ended last line")
+    end = "\r\n" if text.endswith("\r\n") else "\n"
+    lines = text.split(end)[:-1]
+    for number, line in enumerate(lines, start=1):
+        if not (line.isascii() and line.replace("\t", " ").isprintable()):
+            raise line_error(file, number, "printable ASCII characters and one kind of line end", line)
+    return lines

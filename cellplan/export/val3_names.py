@@ -1,0 +1,101 @@
+"""Names in VAL3 projects: folders, programs, data and links of signals."""
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.export.dialect import Dialect
+from cellplan.export.handshake import Step, signals_by_key
+from cellplan.export.pages import page_names, robots_of
+from cellplan.export.text import safe_names
+from cellplan.model.exported import ExportFrame
+
+NAME: Final = 15  # most characters of a name, that of a tool excepted
+TOOL_NAME: Final = 13
+JOINTS, TOOL, MOVE, WORLD, OUTPUT, INPUT = "jRow", "tTool", "mMove", "fWorld", "doMark", "diMark"  # names of data
+DATA: Final = rf"{JOINTS}|{TOOL}|{MOVE}|{WORLD}|{OUTPUT}|{INPUT}[0-9]*"
+_SIGNAL: Final = rf"[A-Za-z][A-Za-z0-9_]{{0,{NAME - 1}}}"
+START, STOP = "start", "stop"  # programs that every project has
+FLANGE: Final = "flange[0]"
+BASE: Final = "world[0]"
+BOARD: Final = "BasicIO-1"  # the board that a signal is on which is stated as a number
+_WORDS: Final = """
+abs accept acos aio align and appro array asc asin atan atan2 autoConnectMove begin bnot bool bor break call case chr
+close clearBuffer config configRx cos default del delay dio dioGet dioLink dioSet disablePower distance do else elseIf
+enablePower end endFor endIf endSwitch endWhile exp false flange for frame get getId hereJ herej if insert interpolate
+isCalibrated isEmpty isPowered isSettled joint jointRx jointRs len link ln log max mdesc mid min movec movej movel not
+num or point pointRx pointRs popUpMsg position power private public putln reset resetMotion restartMove return
+round roundDown roundUp sel set setFrame setPayload setMutex sin sio size speedScale sqrt start step stop stopMove
+string switch taskCreate taskKill taskResume taskStatus taskSuspend tan title to tool toNum toString trsf true until
+userPage void wait waitEndMove watch while workingMode world xor
+"""
+WORDS: Final = frozenset(_WORDS.split())
+
+
+def project_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None, str], str]:
+    """Folder of each project by program and robot: ``alpha``, or ``alpha/weld`` of several programs.
+
+    Its last part is the name of the project. It may become longer by the ending of a page.
+
+    Raises:
+        InputError: A robot has no controller, or none that plays the format.
+    """
+    robots = robots_of(frame, dialect)
+    if len(frame.programs) == 1:
+        names = page_names(robots, longest=NAME, reserved=WORDS, taken=DATA)
+        return {(frame.programs[0], robot): names[robot] for robot in robots}
+    folders = safe_names(robots, longest=NAME)
+    programs = page_names([name or "" for name in frame.programs], longest=NAME, reserved=WORDS, taken=DATA)
+    return {
+        (program, robot): f"{folders[robot]}/{programs[program or '']}"
+        for program in frame.programs
+        for robot in robots
+    }
+
+
+def signal_names(steps: Iterable[Step]) -> dict[tuple[bool, str], str]:
+    """Names of the data of signals: the signal itself where it can be one, else a name of this format.
+
+    Args:
+        steps: Instructions of a handshake.
+
+    Returns:
+        The names by whether it is an input, and by the signal, in the order of their first use.
+    """
+    used = {word.lower() for word in WORDS}
+    found: dict[tuple[bool, str], str] = {}
+    for step in steps:
+        if (step.waits, step.signal) in found:
+            continue
+        inputs = sum(is_input for is_input, _ in found)
+        name = f"{INPUT}{inputs + 1}" if step.waits else OUTPUT
+        is_taken = step.signal.lower() in used or re.fullmatch(rf"{DATA}|.*_[0-9]{{3}}", step.signal, re.IGNORECASE)
+        if re.fullmatch(_SIGNAL, step.signal) and not is_taken:
+            name = step.signal
+        used.add(name.lower())
+        found[step.waits, step.signal] = name
+    return found
+
+
+def input_link(signal: str) -> str:
+    """Physical link of an input: as the cell states it, or that of a number on the first board."""
+    return rf"{BOARD}\%I{signal}" if signal.isdecimal() else signal
+
+
+def output_link(signal: str) -> str:
+    """Physical link of an output, likewise."""
+    return rf"{BOARD}\%Q{signal}" if signal.isdecimal() else signal
+
+
+def require_links(frame: ExportFrame, robot: str) -> None:
+    """Refuse handshake signals that are no links.
+
+    Raises:
+        InputError: With the key path.
+    """
+    for path, signal in signals_by_key(frame, robot).items():
+        if not re.fullmatch(r"[A-Za-z0-9_%.:/\\-]+", signal):
+            raise InputError(
+                rf"{path}: expected a number, or the link of a signal such as 'BasicIO-1\%Q0', got '{signal}'"
+            )

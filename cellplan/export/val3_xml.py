@@ -1,0 +1,120 @@
+"""XML of VAL3 files: elements with their lines, refused where a file is no such project, data or program."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from typing import Final
+from xml.parsers import expat
+
+from cellplan.errors import InputError
+from cellplan.export.lines import split_lines
+from cellplan.geometry.mesh.strict_xml import parse_strictly
+
+PROJECT_SPACE: Final = "http://www.staubli.com/robotics/VAL3/Project/3"
+DATA_SPACE: Final = "http://www.staubli.com/robotics/VAL3/Data/2"
+PROGRAM_SPACE: Final = "http://www.staubli.com/robotics/VAL3/Program/2"
+PARAMETER_SPACE: Final = "http://www.staubli.com/robotics/VAL3/Param/1"
+TYPE_SPACE: Final = "http://www.w3.org/2001/XMLSchema-instance"
+TYPE: Final = f"{TYPE_SPACE} type"
+
+
+@dataclass(slots=True, kw_only=True, eq=False)
+class Element:
+    """An element of a file.
+
+    Attributes:
+        file: The file.
+        line: Line of its tag.
+        name: Name with its namespace before it.
+        attributes: Its attributes; those of a namespace have it before the name.
+        children: Its elements.
+        text: Its text.
+        text_line: Line on which the text begins.
+    """
+
+    file: str
+    line: int
+    name: str
+    attributes: dict[str, str]
+    children: list["Element"] = field(default_factory=list)
+    text: str = ""
+    text_line: int = 0
+
+    def error(self, expected: str, got: str) -> InputError:
+        """An error at its tag."""
+        return InputError(f"{self.file}:{self.line}: expected {expected}, got {got[:60]!r}")
+
+    def require(self, *, needed: Collection[str] = (), allowed: Collection[str] = ()) -> None:
+        """Make sure that it has the attributes that it needs, and no unknown one.
+
+        Raises:
+            InputError: With file and line.
+        """
+        for name in needed:
+            if name not in self.attributes:
+                raise self.error(f"the attribute {name.rpartition(' ')[2]}", "none")
+        for name in self.attributes:
+            if name not in needed and name not in allowed:
+                raise self.error("no other attributes", name.rpartition(" ")[2])
+
+    def only(self, *names: str, space: str) -> list["Element"]:
+        """Its elements, which all have one of some names and of a namespace; it has no text.
+
+        Raises:
+            InputError: With file and line.
+        """
+        for child in self.children:
+            if child.name not in {f"{space} {name}" for name in names}:
+                raise child.error(" or ".join(names) or "no element", child.name.rpartition(" ")[2])
+        if self.text.strip():
+            raise self.error("no text", self.text.strip())
+        return self.children
+
+    def one(self, name: str, *, space: str) -> "Element":
+        """The only element of a name.
+
+        Raises:
+            InputError: With file and line: there is none, or another one.
+        """
+        found = [child for child in self.children if child.name == f"{space} {name}"]
+        if len(found) != 1:
+            raise self.error(f"{name} once", f"{len(found)} of them")
+        return found[0]
+
+
+def parse(text: str, file: str, root: str, space: str) -> Element:
+    """Read a file.
+
+    Args:
+        text: Its text; a mark of the byte order before it is left out.
+        file: Its name in messages.
+        root: Name of the element that holds all others.
+        space: Its namespace.
+
+    Raises:
+        InputError: With file and line, where it is no well-formed XML or something else.
+    """
+    split_lines(text, file)  # refuses two kinds of line ends
+    parser = expat.ParserCreate(namespace_separator=" ")
+    top = Element(file=file, line=1, name="", attributes={})
+    open_elements = [top]
+
+    def begin(name: str, attributes: dict[str, str]) -> None:
+        element = Element(file=file, line=parser.CurrentLineNumber, name=name, attributes=attributes)
+        open_elements[-1].children.append(element)
+        open_elements.append(element)
+
+    def finish(_name: str) -> None:
+        open_elements.pop()
+
+    def say(said: str) -> None:
+        element = open_elements[-1]
+        if not element.text:
+            element.text_line = parser.CurrentLineNumber
+        element.text += said
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = begin, finish, say
+    parse_strictly(parser, text.removeprefix("\ufeff").encode(errors="surrogatepass"), file)
+    element = top.children[0]
+    if element.name != f"{space} {root}":
+        raise element.error(f"{root} of the namespace {space}", element.name)
+    return element

@@ -1,0 +1,109 @@
+"""Zones: how near to a row a target leaves the straight motion, in lengths of tool path or in turns of axes.
+
+A share of a segment is known from the joints. Languages that state a zone by its size need the way of the tool instead:
+the distance of its tip from the row when the share is left to go.
+"""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.export.corners import LARGEST_SHARE
+from cellplan.export.urscript_rows import tool_tips
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+
+HALVINGS: Final = 24  # of the search for a share, to 3e-8
+STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not count
+
+
+def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
+    """How far the tool is from each row in [m] when a share of the segment before or after it is left, shape (N,).
+
+    It is the smaller one of both; zero at both ends.
+
+    Args:
+        robot: The robot.
+        q: Its rows in [rad] or [m], shape (N, n).
+        shares: Of the segments, 0 to 0.5, shape (N,).
+    """
+    found = np.zeros(len(q))
+    if len(q) > 2:
+        inner, share = q[1:-1], shares[1:-1, None]
+        found[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
+    return found
+
+
+def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
+    """Largest share of the segments of a row within which the tool is nearer to it than a zone, 0 to 0.5, shape (N,).
+
+    Args:
+        robot: The robot.
+        q: Its rows in [rad] or [m], shape (N, n).
+        zones: Sizes in [m], 0 for a stop, shape (N,).
+    """
+    found = np.zeros(len(q))
+    rows = np.flatnonzero(zones > 0.0)
+    rows = rows[(rows > 0) & (rows < len(q) - 1)]
+    for other in (rows - 1, rows + 1):
+        low, high = np.zeros(len(rows)), np.full(len(rows), LARGEST_SHARE)
+        inside = _away(robot, q[rows], q[other], high[:, None]) <= zones[rows]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            near = _away(robot, q[rows], q[other], middle[:, None]) <= zones[rows]
+            low, high = np.where(near, middle, low), np.where(near, high, middle)
+        found[rows] = np.maximum(found[rows], np.where(inside, LARGEST_SHARE, high))
+    return found
+
+
+def axis_zones(robot: Robot, q: Array, share: float) -> Array:
+    """Share of the way of the axis that moves most in the shorter segment of a row, in [deg] or [mm], shape (N,).
+
+    Args:
+        robot: The robot.
+        q: Its rows in [rad] or [m], shape (N, n).
+        share: Of the segments, 0 to 0.5.
+    """
+    ways = _axis_ways(robot, q)
+    zones: Array = share * np.min(np.max(np.where(np.isfinite(ways), ways, 0.0), axis=2), axis=0)
+    return zones
+
+
+def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
+    """Largest share of its segments in which an axis is nearer to a row than a zone, 0 to 0.5, shape (N,).
+
+    Args:
+        robot: The robot.
+        q: Its rows in [rad] or [m], shape (N, n).
+        turns: Zones of turning axes in [deg], shape (N,).
+        slides: Zones of sliding axes in [mm], shape (N,).
+    """
+    zones = np.stack([turns if joint.is_revolute else slides for joint in robot.model.joints], axis=1)
+    with np.errstate(over="ignore"):
+        shares = np.max(zones / _axis_ways(robot, q), axis=(0, 2))
+    shares[[0, -1]] = 0.0
+    return np.minimum(shares, LARGEST_SHARE)
+
+
+def part_shares(p: Array, zones: Array) -> Array:
+    """As ``tool_shares`` for straight lines between points, NaN where a point is not known, shape (N, 3)."""
+    ways = np.full((2, len(p)), np.nan)
+    ways[0, 1:] = ways[1, :-1] = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(zones > 0.0, zones / np.min(ways, axis=0), 0.0)
+    return np.where(np.isnan(shares), LARGEST_SHARE, np.minimum(shares, LARGEST_SHARE))
+
+
+def _away(robot: Robot, q: Array, other: Array, share: Array) -> Array:
+    """Distance of the tool from where it is in some rows, a share on the way to others, in [m], shape (N,)."""
+    away: Array = np.linalg.norm(tool_tips(robot, q + share * (other - q)) - tool_tips(robot, q), axis=1)
+    return away
+
+
+def _axis_ways(robot: Robot, q: Array) -> Array:
+    """Way of each axis to and from each row in [deg] or [mm], infinite where it stands, shape (2, N, n)."""
+    units = np.array([joint.display_unit.scale for joint in robot.model.joints])
+    moved = np.abs(np.diff(q, axis=0))
+    ways = np.full((2, *q.shape), np.inf)
+    ways[0, 1:] = ways[1, :-1] = np.where(moved > STANDS, moved * units, np.inf)
+    return ways

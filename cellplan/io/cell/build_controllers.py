@@ -1,0 +1,187 @@
+"""Controllers of a cell file: what becomes of their entries, and what contradicts robots or other controllers."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from cellplan.io.input.findings import Finding, KeyPath, key_text, listed, unknown_name
+from cellplan.io.schema.cell import CellDocument
+from cellplan.io.schema.controllers import ControllerEntry, RobotControlEntry, StopEntry
+from cellplan.io.schema.partial import ValidEntries
+from cellplan.io.schema.robot import RobotEntry
+from cellplan.io.schema.units import si_or_none
+from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl, StopDemand
+from cellplan.model.robot import RobotModel
+
+ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
+EXTERNAL: Final = 6  # external axes that a row of these programs holds
+OF_SIX_AXES: Final = frozenset({ControllerKind.ABB, ControllerKind.KUKA, ControllerKind.STAUBLI})
+WITH_GROUPS: Final = (ControllerKind.FANUC, ControllerKind.YASKAWA)
+Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
+
+
+def build_controllers(document: CellDocument) -> dict[str, Controller]:
+    """Controllers by name, times in [s]."""
+    return {
+        name: Controller(
+            name=name,
+            kind=ControllerKind(entry.kind),
+            tasks=dict(entry.tasks),
+            latency=si_or_none(entry.latency_ms),
+            skew=si_or_none(entry.skew_ms),
+            reaction=si_or_none(entry.reaction_ms),
+            brake=entry.brake_s,
+        )
+        for name, entry in (document.controllers or {}).items()
+    }
+
+
+def build_control(entry: RobotControlEntry | None) -> RobotControl | None:
+    """Where a robot is connected; None where nothing is stated. Signals are texts, also those given by number."""
+    if entry is None:
+        return None
+    signals = entry.handshake
+    return RobotControl(
+        controller=entry.id,
+        task=entry.task,
+        group=entry.group,
+        decimals=entry.decimals,
+        cycle=si_or_none(entry.cycle_ms),
+        tool_number=entry.tool_number,
+        base_number=entry.base_number,
+        handshake=None
+        if signals is None
+        else Handshake(
+            output=str(signals.output), inputs={robot: str(signal) for robot, signal in signals.inputs.items()}
+        ),
+    )
+
+
+def build_stop(entry: StopEntry | None) -> StopDemand | None:
+    """Demands on the time after a stop in [m]; None without any."""
+    if entry is None:
+        return None
+    return StopDemand(depth=si_or_none(entry.depth_mm), clearance=si_or_none(entry.clearance_mm))
+
+
+def control_findings(
+    valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
+) -> Iterator[Finding]:
+    """Everything about controllers that contradicts a robot, or that two robots claim."""
+    uses: Uses = {}
+    for name, robot in valid.robots.items():
+        path: KeyPath = ("robots", name, "controller")
+        yield from _cycle(path, robot, document)
+        control = robot.controller
+        if control is None:
+            continue
+        yield from _handshake((*path, "handshake"), name, control, valid, document)
+        yield from _used_twice(path, control, uses, document)
+        if control.id not in valid.names["controllers"]:
+            yield document.finding(
+                (*path, "id"), unknown_name("a controller of this cell", control.id, valid.names["controllers"])
+            )
+        elif control.id in valid.controllers:
+            entry = valid.controllers[control.id]
+            yield from _of_kind(path, control, entry, document)
+            if name in models:
+                yield from _joints((*path, "id"), entry, models[name], document)
+    yield from _without_robots(valid, document)
+    yield from _stop(valid, document)
+
+
+def _cycle(path: KeyPath, robot: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
+    """The cycle of a controller is stated once, or twice alike."""
+    stated, own = robot.controller_cycle_ms, robot.controller.cycle_ms if robot.controller is not None else None
+    if stated is not None and own is not None and stated.si != own.si:
+        text = f"expected {stated:g}, as controller_cycle_ms says, got {own:g}; remove one of them"
+        yield document.finding((*path, "cycle_ms"), text)
+
+
+def _of_kind(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Keys that the kind of the controller has, and a task that it has."""
+    if control.task is not None and entry.kind != "abb":
+        text = f"unexpected key, it applies to kind abb only, and '{control.id}' is of kind {entry.kind}"
+        yield document.key_finding((*path, "task"), text)
+    elif control.task is not None and control.task not in entry.tasks:
+        text = unknown_name(f"a task of controllers.{control.id}.tasks", control.task, entry.tasks)
+        yield document.finding((*path, "task"), text)
+    if control.group is not None and entry.kind not in WITH_GROUPS:
+        text = (
+            f"unexpected key, it applies to the kinds {' and '.join(WITH_GROUPS)} only, and '{control.id}' is of kind "
+            f"{entry.kind}"
+        )
+        yield document.key_finding((*path, "group"), text)
+
+
+def _joints(path: KeyPath, entry: ControllerEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
+    """Joints that a controller of this kind can move: an arm of six axes after some external ones."""
+    count, turning = len(model.joints), sum(joint.is_revolute for joint in model.joints)
+    if entry.kind == "ur" and not count == turning == ARM:
+        text = f"expected a controller for {count} joints, {turning} of them revolute, got one of kind ur, which moves "
+        yield document.finding(path, f"{text}exactly {ARM} revolute joints")
+    if entry.kind in OF_SIX_AXES and count > ARM + EXTERNAL:
+        text = f"expected a controller for {count} joints, got one of kind {entry.kind}, which moves at most "
+        yield document.finding(path, f"{text}{ARM} axes of an arm and {EXTERNAL} external axes")
+
+
+def _handshake(
+    path: KeyPath, name: str, control: RobotControlEntry, valid: ValidEntries, document: YamlDocument
+) -> Iterator[Finding]:
+    """Inputs are set by other robots of the cell."""
+    others = [robot for robot in valid.names["robots"] if robot != name]
+    for robot in control.handshake.inputs if control.handshake is not None else ():
+        if robot not in others:
+            text = unknown_name("another robot of this cell", robot, others)
+            yield document.key_finding((*path, "inputs", robot), text)
+
+
+def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
+    """A task, a group, an output or an input of one controller belongs to one robot; an input to one sender."""
+    claims: list[tuple[str, KeyPath, str]] = []
+    if control.task is not None:
+        claims.append(("task", ("task",), control.task))
+    if control.group is not None:
+        claims.append(("group", ("group",), str(control.group)))
+    if control.handshake is not None:
+        claims.append(("output", ("handshake", "output"), str(control.handshake.output)))
+        for robot, signal in control.handshake.inputs.items():
+            claims.append(("input", ("handshake", "inputs", robot), str(signal)))
+    for what, below, word in claims:
+        place = key_text((*path, *below))
+        first = uses.setdefault((control.id, what, word.lower()), place)
+        if first != place:
+            text = f"expected {_article(what)} that nothing else on '{control.id}' uses, got '{word}', as {first} does"
+            yield document.finding((*path, *below), text)
+
+
+def _article(noun: str) -> str:
+    """A noun with its article."""
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def _without_robots(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A controller moves at least one robot; known only where all robots name one that exists."""
+    used = {robot.controller.id for robot in valid.robots.values() if robot.controller is not None}
+    if set(valid.robots) != set(valid.names["robots"]) or not used <= set(valid.names["controllers"]):
+        return
+    for name in valid.names["controllers"]:
+        if name not in used:
+            text = f"expected a robot with controller: {{id: {name}}} ({listed(valid.names['robots'])}), got none"
+            yield document.key_finding(("controllers", name), text)
+
+
+def _stop(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """What is demanded of stops depends on how other robots go on; known only where all entries are valid."""
+    is_whole = set(valid.robots) == set(valid.names["robots"]) and set(valid.controllers) == set(
+        valid.names["controllers"]
+    )
+    if valid.checks is None or valid.checks.stop is None or not is_whole:
+        return
+    used = {robot.controller.id for robot in valid.robots.values() if robot.controller is not None}
+    entries = [valid.controllers[name] for name in used if name in valid.controllers]
+    if not any(si_or_none(each.reaction_ms) or each.brake_s for each in entries):
+        text = "expected controllers of robots that state reaction_ms or brake_s above 0, of which it is worked out, "
+        yield document.key_finding(("checks", "stop"), f"{text}got none")

@@ -1,0 +1,153 @@
+"""Controllers of a cell, where each robot is connected, and what is demanded when one robot stops."""
+
+import re
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
+
+from cellplan.io.schema.acceleration import CycleTime
+from cellplan.io.schema.common import Entry, Name, by_kind, rule
+from cellplan.io.schema.controller import ControllerZeroEntry
+from cellplan.io.schema.units import Mm, Ms, Within
+
+IDENTIFIER: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+IDENTIFIER_WORDS: Final = "a name of 1 to 32 ASCII letters, digits or '_' that begins with a letter"
+SIGNAL_WORDS: Final = "a name or a whole number from 0"
+SLOWEST_MS: Final = 10_000.0  # ten seconds: longer latencies and reactions are a wrong unit
+LONGEST_BRAKE_S: Final = 60.0  # no arm brakes for a minute
+LAST_SIGNAL: Final = 65_535
+LAST_GROUP: Final = 8
+LAST_FRAME: Final = 999
+MOST_DECIMALS: Final = 9
+TASK_LIMIT: Final = 64
+SIGNAL_LIMIT: Final = 64
+
+
+def _identifier(text: str) -> str:
+    """Refuse what no controller takes as a name."""
+    if not IDENTIFIER.fullmatch(text):
+        raise rule(f"expected {IDENTIFIER_WORDS}, got {text[:40]!r}")
+    return text
+
+
+Identifier = Annotated[
+    str, AfterValidator(_identifier), WithJsonSchema({"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"})
+]
+Signal = Annotated[
+    Annotated[Identifier, Tag(f"<{SIGNAL_WORDS}>")] | Annotated[int, Field(ge=0, le=LAST_SIGNAL), Tag("<number>")],
+    by_kind(SIGNAL_WORDS, number=int),
+]
+Delay = Annotated[Ms, Within(ge=0.0, le=SLOWEST_MS)]
+FrameNumber = Annotated[int, Field(ge=0, le=LAST_FRAME)]
+KindName = Literal["abb", "fanuc", "kuka", "reis", "ros", "staubli", "ur", "yaskawa", "other"]
+
+
+class ControllerEntry(Entry):
+    """A controller of the cell; robots on different controllers share no clock."""
+
+    kind: KindName = Field(description="Maker of the controller, or what drives the robot.")
+    tasks: dict[Identifier, Identifier] = Field(
+        default={},
+        max_length=TASK_LIMIT,
+        description="By name of a task of an ABB controller, its mechanical unit: {T_ROB1: ROB_1}; only for kind abb.",
+    )
+    latency_ms: Delay | None = Field(
+        default=None, description="Time by which a robot follows what is sent to it; absent: not stated."
+    )
+    skew_ms: Delay | None = Field(
+        default=None,
+        description="Largest difference between its clock and those of the other controllers; absent: not stated.",
+    )
+    reaction_ms: Delay | None = Field(
+        default=None,
+        description="Time for which its robots go on after a robot of another controller stopped; absent: not stated.",
+    )
+    brake_s: Annotated[float, Field(ge=0.0, le=LONGEST_BRAKE_S)] | None = Field(
+        default=None, description="Time in which its robots then brake on their path; absent: not stated."
+    )
+
+    @model_validator(mode="after")
+    def _has_tasks_of_abb_only(self) -> Self:
+        """Tasks belong to ABB; names that differ by case only are one name there."""
+        if self.tasks and self.kind != "abb":
+            raise rule(f"unexpected key, it applies to kind abb only, got {self.kind}", "tasks")
+        for what, names in (("task", list(self.tasks)), ("mechanical unit", list(self.tasks.values()))):
+            lower = [name.lower() for name in names]
+            for index, task in enumerate(self.tasks):
+                if lower[index] in lower[:index]:
+                    raise rule(f"expected each {what} once, got '{names[index]}' twice", f"tasks.{task}")
+        return self
+
+
+class HandshakeEntry(Entry):
+    """Signals with which a robot waits for others, as its own controller names them."""
+
+    output: Signal = Field(description="Output that it sets: a name, or its number.")
+    inputs: dict[Name, Signal] = Field(
+        min_length=1,
+        max_length=SIGNAL_LIMIT,
+        description="By robot of the cell, the input that is wired to the output of that robot.",
+    )
+
+
+class RobotControlEntry(Entry):
+    """Where a robot is connected, and how programs of its controller name things."""
+
+    id: Name = Field(description="Name of its controller under controllers.")
+    task: Identifier | None = Field(
+        default=None, description="Name of its task among the tasks of the controller; only for kind abb."
+    )
+    group: Annotated[int, Field(ge=1, le=LAST_GROUP)] | None = Field(
+        default=None, description="Number of its motion group; only for the kinds fanuc and yaskawa."
+    )
+    decimals: Annotated[int, Field(ge=0, le=MOST_DECIMALS)] | None = Field(
+        default=None,
+        description="Decimals of a degree or millimetre (of a radian in URScript) in programs of its controller's own "
+        "language: krl, rapid, urscript and val3; those of the format when absent, and in all other formats.",
+    )
+    cycle_ms: CycleTime | None = Field(
+        default=None,
+        description="Cycle at which its controller takes positions; the same as controller_cycle_ms, of which one is "
+        "enough.",
+    )
+    tool_number: FrameNumber | None = Field(
+        default=None, description="Number of its tool on the controller; absent: tool 0, or the tool of the cell."
+    )
+    base_number: FrameNumber | None = Field(
+        default=None, description="Number of its base frame on the controller; absent: the base of the robot."
+    )
+    handshake: HandshakeEntry | None = Field(
+        default=None, description="Signals with which it waits for other robots; none when absent."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _states_no_zero(cls, given: Any) -> Any:
+        """Refuse the zero of a controller, which the robot's own file states."""
+        found = [key for key in ControllerZeroEntry.model_fields if isinstance(given, dict) and key in given]
+        if found:
+            text = (
+                f"unexpected key, the zero of a controller is no part of a cell: move {', '.join(found)} to the key "
+                "controller of the robot's own file, or, for a URDF, to a file that controller_zero names"
+            )
+            raise rule(text, found[0])
+        return given
+
+
+class StopEntry(Entry):
+    """What is demanded when one robot stops and the robots of other controllers go on until they have braked."""
+
+    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] | None = Field(
+        default=None, description="Largest depth of a tool in the part; it is only reported when absent."
+    )
+    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] | None = Field(
+        default=None,
+        description="Smallest distance of all that must not touch; it is only reported when absent.",
+    )
+
+    @model_validator(mode="after")
+    def _demands_something(self) -> Self:
+        """At least one of the two."""
+        if self.depth_mm is None and self.clearance_mm is None:
+            raise rule("expected depth_mm, clearance_mm or both, got neither")
+        return self

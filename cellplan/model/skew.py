@@ -1,0 +1,132 @@
+"""Allowed skew: how far the clocks of controllers may be apart before a demand of the cell is no longer proved."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+MOST_SKEW: Final = 0.2  # [s] up to which an allowed skew is searched
+
+
+class SkewLimit(StrEnum):
+    """What limits an allowed skew."""
+
+    TOOL = "tool tolerance"
+    DEPTH = "tool depth"
+    CLEARANCE = "clearance"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AllowedSkew:
+    """Largest skew of two clocks that is proved to keep one demand.
+
+    Attributes:
+        limit: The demand.
+        skew: In [s], either clock ahead of the other; ``MOST_SKEW`` where it is that or more.
+        subject: Task, grasp or bodies that limit it; empty where nothing does.
+        at_s: Time of the part's clock, or else of the first robot's, in [s] at which it does; None likewise.
+    """
+
+    limit: SkewLimit
+    skew: float
+    subject: str = ""
+    at_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PairSkew:
+    """Two robots whose clocks are not the same.
+
+    Attributes:
+        first: The one robot.
+        second: The other one.
+        limits: What each demand allows; a demand that does not depend on the two is left out.
+        stated: Largest difference in [s] that is stated of their clocks; None for nothing stated.
+    """
+
+    first: str
+    second: str
+    limits: tuple[AllowedSkew, ...]
+    stated: float | None = None
+
+    @property
+    def least(self) -> AllowedSkew | None:
+        """The demand that allows least, the first of these; None without any."""
+        return min(self.limits, key=lambda each: each.skew, default=None)
+
+    @property
+    def allowed(self) -> float:
+        """Skew in [s] that keeps every demand; ``MOST_SKEW`` where it is that or more."""
+        return MOST_SKEW if self.least is None else self.least.skew
+
+    @property
+    def is_kept(self) -> bool | None:
+        """Whether what is stated is no more than what is allowed; None without a statement."""
+        return None if self.stated is None else self.stated <= self.allowed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ToolSkew:
+    """Error of a tool on the part that another controller carries, by the skew of the two clocks.
+
+    Attributes:
+        name: Name of the task, or of the grasp of a further holder.
+        robot: The robot of the tool.
+        carrier: The first holder of the part.
+        speed: Largest speed of the tool in the components that are constrained in [m/s]: what a skew costs.
+        by_position: Skew in [s] that keeps the tolerance in position; ``MOST_SKEW`` where it is that or more.
+        by_orientation: Likewise the tolerance in orientation.
+        at_s: Time in [s] at which the smaller one is least; None where nothing limits it.
+        position: Upper bound of the position error in [m] at the skew that is stated; None for nothing stated.
+        orientation: Likewise of the orientation error in [rad].
+        shortest_cycle: Time in [s] that the program has to take, all of it slower by one factor, to keep the tolerance
+            at that skew; None for nothing stated, 0 where any time does, and inf where none does.
+    """
+
+    name: str
+    robot: str
+    carrier: str
+    speed: float
+    by_position: float
+    by_orientation: float
+    at_s: float | None
+    position: float | None = None
+    orientation: float | None = None
+    shortest_cycle: float | None = None
+
+    @property
+    def allowed(self) -> float:
+        """Skew in [s] that keeps both; ``MOST_SKEW`` where it is that or more."""
+        return min(self.by_position, self.by_orientation)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkewReport:
+    """Allowed skew of a run.
+
+    Attributes:
+        pairs: All pairs of robots whose clocks are not the same, in the order of the cell.
+        tools: All tools on a part that another controller carries.
+        groups: Robots that share a clock.
+    """
+
+    pairs: tuple[PairSkew, ...]
+    tools: tuple[ToolSkew, ...]
+    groups: tuple[tuple[str, ...], ...]
+
+    @property
+    def least(self) -> PairSkew | None:
+        """The pair that allows least, the first of these; None without any."""
+        return min(self.pairs, key=lambda pair: pair.allowed, default=None)
+
+    @property
+    def allowed(self) -> float:
+        """Skew in [s] between any two clocks that keeps every demand; ``MOST_SKEW`` where it is that or more."""
+        return MOST_SKEW if self.least is None else self.least.allowed
+
+    @property
+    def each(self) -> float:
+        """Shift in [s] of each clock by itself, forward or back, that keeps every demand.
+
+        Two clocks are then apart by twice as much; half of ``MOST_SKEW`` where it is that or more.
+        """
+        return 0.5 * self.allowed

@@ -1,0 +1,1 @@
+"""Export: from a verified run to programs for controllers, judged once more as they are written."""

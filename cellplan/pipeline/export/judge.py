@@ -1,0 +1,320 @@
+"""Judgement of a written program: every demand of the cell once more, on what a reader found in the files."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.cache import nothing_kept
+from cellplan.certify.lever_arms import LeverArms
+from cellplan.checks.verify import stacked
+from cellplan.export.corners import row_shares
+from cellplan.export.dialect import Dialect
+from cellplan.geometry.arrays import Array
+from cellplan.model.exported import ExportJob, ProgramRows, Promise
+from cellplan.model.units import DEGREES, MILLIMETRES
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.compare_rows import other_rows
+from cellplan.pipeline.export.judge_path import PathRows, keeps_demands, path_findings
+from cellplan.pipeline.export.judge_speeds import joint_findings, motion_findings, position_findings
+from cellplan.pipeline.export.margins import off_chords, tool_margins
+from cellplan.pipeline.export.part_errors import ToolsOnPart
+from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.rows import full_rows
+from cellplan.pipeline.export.shared import Shared, played_digest
+from cellplan.scene.scene import Scene
+
+BLENDS: Final = (0.5, 0.25, 0.1)  # [-] shares that are tried, the largest first
+SAME: Final = 1e-12  # [rad] or [m] cycles that are played alike are judged once
+HELD_TOL: Final = (
+    1e-3  # [rad] or [m] a robot that holds may be off by rounding, and by a cycle that begins beside a phase
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """The largest distance of the written rows, as they are played, from those of the run.
+
+    Attributes:
+        subject: A joint as ``robot/joint``, or what is said of a tool or further holder.
+        largest: In the unit.
+        unit: ``deg`` or ``mm``.
+        at_s: Its instant in the run in [s].
+    """
+
+    subject: str
+    largest: float
+    unit: str
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """What was found.
+
+    Attributes:
+        findings: Demands that are not kept; a program with any is not written.
+        deviations: Of every joint, then of every tool and further holder on the part.
+        not_judged: What does not hold on the files alone, with the reason.
+        corners: No tool is farther off by rounded rows than this; of every task, none where no row is rounded.
+        rounded: Rows of all robots that are rounded, and all rows of them.
+    """
+
+    findings: tuple[str, ...]
+    deviations: tuple[Deviation, ...] = ()
+    not_judged: tuple[str, ...] = ()
+    corners: tuple[Deviation, ...] = ()
+    rounded: tuple[int, int] = (0, 0)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every demand is kept."""
+        return not self.findings
+
+
+def judge(
+    run: VerifiedRun,
+    dialect: Dialect,
+    job: ExportJob,
+    read: tuple[ProgramRows, ...],
+    *,
+    lead: float = 0.0,
+    shared: Shared | None = None,
+) -> Judgement:
+    """Judge what a reader found in the files of an export.
+
+    The rows must be those that were written, to rounding. Then come, on the rows that were read: joint limits; errors
+    of the tools on the part at the rows and between them, depth and further holders; the certified clearance; and,
+    where a format states times, speeds, accelerations, jerk, feeds and loads as far as controllers play the rows as
+    they are. Robots that are not exported move as in the run. Without times in the files positions are judged at the
+    times of the rows that were written: no tool is then farther from its desired path than from the desired pose.
+
+    Args:
+        run: The verified run.
+        dialect: The format.
+        job: What was written.
+        read: What the reader found, program by program.
+        lead: Time in [s] by which the rows are later than those of the run, see ``resample.lead_time``.
+        shared: What exports of the run share: rows that are played alike, to the last bit, are judged once.
+    """
+    findings = list(other_rows(dialect, job, read))
+    if findings:
+        return Judgement(findings=tuple(findings))
+    with nothing_kept():
+        shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
+        programs = list(_played(run, dialect, job, read, lead=lead))
+        for played in programs:
+            own_findings, own_deviations, own_corners = _judged_once(played, shared, dialect, job)
+            findings += own_findings
+            deviations += own_deviations
+            corners += own_corners
+    return Judgement(
+        findings=tuple(dict.fromkeys(findings)),
+        deviations=tuple(_largest(deviations)),
+        not_judged=tuple(_not_judged(dialect, job, read)),
+        corners=tuple(_largest(corners)),
+        rounded=_rounded(programs),
+    )
+
+
+def largest_blend(
+    run: VerifiedRun, dialect: Dialect, job: ExportJob, *, lead: float = 0.0, shared: Shared | None = None
+) -> float:
+    """The largest share of the shorter neighbouring segment within which rows may be rounded: 0.5, 0.25, 0.1 or 0.
+
+    Args:
+        run: The verified run.
+        dialect: The format.
+        job: What is to be written; its own share does not count.
+        lead: As in ``judge``.
+        shared: As in ``judge``.
+    """
+    with nothing_kept():
+        scenes = (shared or Shared(run)).scenes
+        for blend in BLENDS:
+            tried = replace(job, blend=blend)
+            programs = _played(run, dialect, tried, job.programs, lead=lead)
+            if all(keeps_demands(rows) for played in programs for _, rows in _path_rows(played, scenes)):
+                return blend
+    return 0.0
+
+
+def _played(
+    run: VerifiedRun, dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows], *, lead: float
+) -> Iterator[Played]:
+    """The programs as targets play them."""
+    by_name = {program.name: program for program in full_rows(run)}
+    for written, found in zip(job.programs, read, strict=True):
+        yield Played.of(
+            run,
+            by_name[written.name],
+            (found, written),
+            shares=row_shares(job, written),
+            interpolation=dialect.interpolation,
+            lead=lead,
+        )
+
+
+def _judged_once(
+    played: Played, shared: Shared, dialect: Dialect, job: ExportJob
+) -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
+    """Findings, deviations and corners of one program, kept for programs that are played and judged alike."""
+
+    def found() -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
+        findings = tuple(_program_findings(played, shared.scenes, dialect, job))
+        return findings, tuple(_deviations(played, shared.scenes)), tuple(_corners(played, shared.scenes))
+
+    promise = job.frame.promise
+    return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), found)
+
+
+def _program_findings(played: Played, scenes: Sequence[Scene], dialect: Dialect, job: ExportJob) -> Iterator[str]:
+    """Everything that is judged of one program."""
+    yield from position_findings(played)
+    promise = job.frame.promise
+    if promise is not Promise.SEQUENCE_ONLY:
+        is_played = _is_played(dialect, promise)
+        yield from joint_findings(played, accelerations=is_played)
+        if is_played:
+            for stretch, scene in _judged(played, scenes):
+                yield from motion_findings(played, stretch, scene)
+    for stretch, _ in _judged(played, scenes):
+        yield from _held_findings(played, stretch)
+    yield from _path_findings(played, scenes)
+
+
+def _is_played(dialect: Dialect, promise: Promise) -> bool:
+    """Whether controllers play the rows as they are: at their times, each on the cycle or none left out."""
+    return promise is Promise.TIMED and (dialect.at_cycle or not dialect.is_thinned)
+
+
+def _held_findings(played: Played, stretch: Stretch) -> Iterator[str]:
+    """Robots that must stand still in a phase and are not where they stand in the run."""
+    times = played.grid(stretch.begin, stretch.end)
+    q = played.at(times)
+    for name, table in stretch.motion.tables.items():
+        off = np.abs(q[name] - table.q[0]).max(axis=0)
+        if name not in stretch.motion.moving and np.any(off > HELD_TOL):
+            joint = played.run.cell.robot(name).model.joints[int(np.argmax(off))]
+            unit, scale = joint.display_unit
+            yield (
+                f"robot '{name}' holds from {stretch.begin:.3f} to {stretch.end:.3f} s: joint {joint.name} is "
+                f"{scale * float(off.max()):.4g} {unit} from where it stands in the run"
+            )
+
+
+def _path_findings(played: Played, scenes: Sequence[Scene]) -> Iterator[str]:
+    """What the cell demands of the path in all phases, and the rows do not keep."""
+    for where, rows in _path_rows(played, scenes):
+        yield from (where + finding for finding in path_findings(rows))
+
+
+def _path_rows(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[str, PathRows]]:
+    """The path in every phase, with what its findings begin with."""
+    for stretch, scene in _judged(played, scenes):
+        times = played.grid(stretch.begin, stretch.end)
+        rows = PathRows(
+            scene=scene,
+            schedule=stretch.motion.schedule,
+            times=times - stretch.begin,
+            q=played.at(times),
+            is_row=played.is_row(times),
+            is_break=played.is_break(times),
+            off=off_chords(played, times),
+        )
+        yield f"{stretch.motion.name}: " if stretch.motion.name else "", rows
+
+
+def _judged(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[Stretch, Scene]]:
+    """Phases with their scenes; a phase that is played as in a cycle before is left out."""
+    known: dict[int, list[Mapping[str, Array]]] = {}
+    for stretch in played.stretches():
+        times = played.grid(stretch.begin, stretch.end)
+        q = {"": (times - stretch.begin)[:, None], **played.at(times)}
+        before = known.setdefault(stretch.place, [])
+        if not any(_is_same(q, other) for other in before):
+            before.append(q)
+            yield stretch, scenes[stretch.place]
+
+
+def _is_same(one: Mapping[str, Array], other: Mapping[str, Array]) -> bool:
+    """Whether rows of all robots are the same but for rounding."""
+    return all(one[name].shape == other[name].shape and np.all(np.abs(one[name] - other[name]) <= SAME) for name in one)
+
+
+def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+    """How far a program is from the rows of the run, between which joints move evenly."""
+    run = played.run
+    times = played.grid(0.0, played.end)
+    own, tables = played.at(times), list(run.programs.values())[played.place]
+    of_run = {
+        name: np.stack([np.interp(times, played.run_times, column) for column in table.q.T], axis=1)
+        for name, table in tables.items()
+    }
+    for name in played.exported:
+        off = np.abs(own[name] - of_run[name])
+        for index, joint in enumerate(run.cell.robot(name).model.joints):
+            row, (unit, scale) = int(np.argmax(off[:, index])), joint.display_unit
+            at_s = max(0.0, float(times[row]) - played.lead)
+            yield Deviation(
+                subject=f"{name}/{joint.name}", largest=scale * float(off[row, index]), unit=unit, at_s=at_s
+            )
+    for stretch in played.stretches():
+        scene = scenes[stretch.place]
+        working = [scheduled.task.name for scheduled in stretch.motion.schedule.tasks]
+        tools = ToolsOnPart.of(scene.cell, scene.chains, tasks=working, robots=played.exported)
+        if not tools.relations:
+            continue
+        inside = (times >= stretch.begin) & (times <= stretch.end)
+        tips = [tools.tips({name: q[inside] for name, q in each.items()}) for each in (of_run, own)]
+        for name, errors in zip(tools.names, tools.errors(*map(tools.poses, tips)), strict=True):
+            for kind, (unit, scale) in enumerate((MILLIMETRES, DEGREES)):
+                row = int(np.argmax(errors[:, kind]))
+                at_s = float(times[inside][row]) - played.lead
+                yield Deviation(subject=name, largest=scale * float(errors[row, kind]), unit=unit, at_s=at_s)
+
+
+def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+    """By how much rounded rows may put the tools off, beside what they are off already."""
+    if not any(np.any(shares > 0.0) for shares in played.shares.values()):
+        return
+    for stretch, scene in _judged(played, scenes):
+        times = played.grid(stretch.begin, stretch.end)
+        arms, off = LeverArms(scene, stacked(scene.cell, played.at(times))), off_chords(played, times)
+        for scheduled in stretch.motion.schedule.tasks:
+            margins = tool_margins(arms, scene, scheduled.task, off)
+            for kind, (unit, scale) in enumerate((MILLIMETRES, DEGREES)):
+                step = int(np.argmax(margins[:, kind]))
+                yield Deviation(
+                    subject=f"the tool of task '{scheduled.task.name}'",
+                    largest=scale * float(margins[step, kind]),
+                    unit=unit,
+                    at_s=max(0.0, float(times[step]) - played.lead),
+                )
+
+
+def _rounded(programs: Sequence[Played]) -> tuple[int, int]:
+    """Rows that are rounded, and all rows, of the robots that are exported."""
+    shares = [played.shares[name] for played in programs for name in played.exported]
+    return sum(int(np.count_nonzero(each)) for each in shares), sum(map(len, shares))
+
+
+def _largest(found: Sequence[Deviation]) -> list[Deviation]:
+    """The largest of each subject and unit, in the order in which they were found."""
+    largest: dict[tuple[str, str], Deviation] = {}
+    for each in found:
+        key = each.subject, each.unit
+        if key not in largest or each.largest > largest[key].largest:
+            largest[key] = each
+    return list(largest.values())
+
+
+def _not_judged(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:
+    """What holds of the run but not of the files alone."""
+    if job.frame.promise is Promise.SEQUENCE_ONLY:
+        yield "speeds, accelerations, feeds and loads: the controllers choose their own times"
+    elif not _is_played(dialect, job.frame.promise):
+        yield "accelerations, jerk, feeds and loads: the controllers plan their own profile from row to row"
+    if any(rows.times is None for program in read for rows in program.robots.values()):
+        yield "times: the files state none"

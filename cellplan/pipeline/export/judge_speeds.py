@@ -1,0 +1,110 @@
+"""Speeds and accelerations of played rows: of joints on the rows of each robot, of tools and part at even times."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.joints.acceleration_limits import check_accelerations, joint_peaks, part_acceleration
+from cellplan.checks.joints.demanded_feeds import check_feeds
+from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.joints.payload import check_payload, load_uses
+from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
+from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
+from cellplan.checks.tools.tracking import part_poses
+from cellplan.geometry.arrays import Array
+from cellplan.model.acceleration import MotionAccelerations
+from cellplan.model.cell import Robot
+from cellplan.model.exported import Interpolation
+from cellplan.model.report import Check
+from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.rows import times_of
+from cellplan.pipeline.export.schedule_at import schedule_at
+from cellplan.scene.scene import Scene
+
+POSITION: Final = "joint_position"
+JERK: Final = "joint_jerk"
+EVEN: Final = 1e-6  # [-] of a step by which times of even rows may differ
+
+
+def position_findings(played: Played) -> Iterator[str]:
+    """Rows beyond the limits of a joint, or cubics that pass one between rows."""
+    for name in played.exported:
+        robot, rows = played.run.cell.robot(name), played.rows[name]
+        times, q = times_of(rows), rows.q
+        if played.interpolation is Interpolation.CUBIC:
+            low, high = played.curve(name).extremes()
+            times, q = np.repeat(times[:-1], 2) + 0.0, np.stack([low, high], axis=1).reshape(-1, q.shape[1])
+            times = times + np.tile([0.0, 1e-6], len(low))
+        uses = joint_uses(robot, times, q)
+        yield from _failed(check for check in check_joints(uses, times, q) if check.name == POSITION)
+
+
+def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
+    """Speeds beyond the limits of a joint, and accelerations where they are what a controller plays.
+
+    Args:
+        played: The program.
+        accelerations: Whether accelerations and jerk count too: not where a controller rounds its rows or plans its
+            own profile between them.
+    """
+    jumps = _jumps(played)
+    for name in played.exported:
+        robot = played.run.cell.robot(name)
+        times, q = _as_played(played, robot)
+        uses = joint_uses(robot, times, q)
+        yield from _failed(check for check in check_joints(uses, times, q) if check.name != POSITION)
+        if accelerations:
+            found = MotionAccelerations(joints=tuple(joint_peaks(played.run.cell, robot, times, q, jumps_at=jumps)))
+            checks = check_accelerations(played.run.cell, found)
+            yield from _failed(check for check in checks if check.name != JERK or _is_even(times))
+
+
+def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[str]:
+    """Feeds of tools, their speeds in the world, loads and the acceleration of the part in one phase.
+
+    They are taken at even times, as far apart as the rows of the run, or as the rows of the slowest cycle where these
+    are farther apart.
+    """
+    own = scene.cell
+    steps = [np.diff(played.run_times).max(), *(np.diff(times_of(played.rows[name])).max() for name in played.exported)]
+    count = max(2, round((stretch.end - stretch.begin) / max(steps)))
+    times = np.linspace(0.0, stretch.end - stretch.begin, count + 1)
+    q: Mapping[str, Array] = played.at(stretch.begin + times)
+    X_WP, schedule = part_poses(own, scene.chains, q), schedule_at(stretch.motion.schedule, times)
+    speeds = {robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in own.robots}
+    checks = [*check_feeds(scene, schedule, q, X_WP), *check_tool_speeds(own, speeds)]
+    checks += check_payload(load_uses(own, scene.chains, times, q))
+    if own.checks.part_acceleration is not None and own.positioners:
+        window = own.robot(own.positioners[0]).controller_cycle
+        part = part_acceleration(own, times, X_WP, window=window)
+        checks += check_accelerations(own, MotionAccelerations(part=part))
+    yield from _failed(checks)
+
+
+def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
+    """Times and positions at which the speeds of a robot count: its rows, or a cubic on its controller's cycle."""
+    rows = played.rows[robot.name]
+    times = times_of(rows)
+    cycle = robot.controller_cycle if robot.control is None or robot.control.cycle is None else robot.control.cycle
+    if played.interpolation is not Interpolation.CUBIC or cycle >= float(np.diff(times).min()):
+        return times, rows.q
+    fine = np.linspace(times[0], times[-1], int(np.ceil((times[-1] - times[0]) / cycle)) + 1)
+    return fine, played.curve(robot.name).at(fine)
+
+
+def _jumps(played: Played) -> Array:
+    """Times in [s] of the played program at which the desired speed of a tool jumps."""
+    schedules = ((each.begin, each.motion.schedule) for each in played.stretches())
+    found = [begin + desired_jumps(schedule) for begin, schedule in schedules if schedule.is_continuous]
+    return np.concatenate([NO_TIMES, *found])
+
+
+def _is_even(times: Array) -> bool:
+    """Whether all steps are the same, as a window over which jerk is taken expects."""
+    steps = np.diff(times)
+    return bool(np.ptp(steps) <= EVEN * steps[0])
+
+
+def _failed(checks: Iterable[Check]) -> Iterator[str]:
+    return (check.message for check in checks if not check.passed)

@@ -1,0 +1,83 @@
+"""Notes for the head of exported files: what is promised, and what was found in them."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.judge import Deviation, Judgement
+from cellplan.pipeline.export.prepare import Prepared
+from cellplan.pipeline.export.skew import skew_text
+
+READ_BACK: Final = "read back by cellplan's own reader, not by the maker's controller"
+NOISE: Final = 1e-6  # [deg] or [mm] deviations below it differ from processor to processor
+
+
+def export_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> tuple[str, ...]:
+    """Notes for the head of every file, of any characters.
+
+    Args:
+        run: The run.
+        prepared: What is written.
+        judgement: What was found in what was read back.
+    """
+    return tuple(_notes(run, prepared, judgement))
+
+
+def _notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Iterator[str]:
+    promised = prepared.promised
+    yield f"cell {run.cell.name}, format {prepared.dialect.name}"
+    yield f"promise: {promised.promise}"
+    yield from promised.reasons
+    yield from promised.remarks
+    yield from skew_lines(prepared)
+    if prepared.orders:
+        yield f"all robots of the cell wait at {sum(len(own.marks) for own in prepared.orders)} marks"
+    if prepared.thinning is not None:
+        yield f"rows left out within {prepared.thinning[0]:g} mm and {prepared.thinning[1]:g} deg"
+    yield deviation_line(judgement)
+    if prepared.dialect.is_rounded:
+        yield rounding_line(prepared.job.blend, judgement)
+    yield f"run {run.digest}"
+    yield READ_BACK
+
+
+def skew_lines(prepared: Prepared) -> Iterator[str]:
+    """What the start skew may be."""
+    if prepared.skew is not None:
+        least = prepared.skew.least
+        yield f"allowed skew {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}"
+
+
+def deviation_line(judgement: Judgement) -> str:
+    """The largest deviations of what is written from the run: of any joint in each unit, and of any tool."""
+    largest: dict[tuple[bool, str], Deviation] = {}
+    for each in judgement.deviations:
+        kind = ("/" in each.subject, each.unit)
+        if kind not in largest or each.largest > largest[kind].largest:
+            largest[kind] = each
+    return "largest deviation from the run: " + (", ".join(map(_deviation, largest.values())) or "none")
+
+
+def rounding_line(blend: float, judgement: Judgement) -> str:
+    """Which share of rows is rounded, and by how much the tools may be off for it."""
+    if blend <= 0.0 or not judgement.rounded[0]:
+        return "every row is a stop"
+    most = {each.unit: max(o.largest for o in judgement.corners if o.unit == each.unit) for each in judgement.corners}
+    off = " and ".join(f"{largest:.2g} {unit}" for unit, largest in most.items()) or "nothing"
+    rounded, count = judgement.rounded
+    return f"{rounded} of {count} rows rounded within {blend:g} of the shorter segment: tools off by at most {off} more"
+
+
+def _deviation(deviation: Deviation) -> str:
+    """A deviation with what deviates, unless it is nothing but rounding."""
+    if deviation.largest < NOISE:
+        return f"{'joints' if '/' in deviation.subject else 'tools'} below {NOISE:g} {deviation.unit}"
+    return f"{deviation.subject} {deviation.largest:.2g} {deviation.unit} at {deviation.at_s:.3f} s"
+
+
+def deviation_records(judgement: Judgement, *, of_corners: bool = False) -> list[dict[str, object]]:
+    """All deviations as records; or by how much more tools may be off at rounded rows."""
+    return [
+        {"of": each.subject, "largest": each.largest, "unit": each.unit, "at_s": each.at_s}
+        for each in (judgement.corners if of_corners else judgement.deviations)
+    ]

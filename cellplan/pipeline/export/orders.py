@@ -1,0 +1,244 @@
+"""Marks and orders: where robots without a common clock wait for one another, and that no order between is unsafe.
+
+Between two marks every robot passes its rows at a time of its own. Any place of the one may meet any place of another:
+for each pair of robots the rectangle of both stretches of rows is certified. Marks lie at the ends of all phases; where
+a rectangle is not clear further ones are set inside it, as few as the rows allow, so that the rectangles shrink towards
+the motion that the run proves. No tool waits for others while it is in process.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.free_clocks import ClockRegion, RegionBound, certify_regions
+from cellplan.errors import NotVerifiedError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Cell
+from cellplan.model.exported import ProgramRows
+from cellplan.model.progress import Progress, silent
+from cellplan.model.units import MM
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.run_programs import RunPhase, RunProgram, run_programs, scenes_of
+from cellplan.pipeline.plan.program import STILL_TOL
+from cellplan.scene.scene import Scene
+
+STAGE: Final = "certifying every order between marks"
+MOST_MARKS: Final = 200  # of one program; a longer row of waits is no program that anybody would run
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stretch:
+    """Rows between two neighbouring marks, within which every order of the robots is certified.
+
+    Attributes:
+        phase: Name of the phase.
+        place: Number of the motion of the run that the phase repeats.
+        first: Row of the first mark.
+        last: Row of the second one.
+        pairs: Robots that both move between them, of which all combinations of places are certified.
+        proved: Distance in [m] that the bodies of these keep in every order; inf without such bodies.
+    """
+
+    phase: str
+    place: int
+    first: int
+    last: int
+    pairs: tuple[Pair, ...] = ()
+    proved: float = np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Orders:
+    """The marks of a program.
+
+    Attributes:
+        program: Name of the program; None for the only one.
+        stretches: What lies between them, in order.
+        times: Times of the marks in [s] in the run.
+    """
+
+    program: str | None
+    stretches: tuple[Stretch, ...]
+    times: tuple[float, ...]
+
+    @property
+    def marks(self) -> tuple[int, ...]:
+        """Rows of the marks."""
+        return (self.stretches[0].first, *(stretch.last for stretch in self.stretches))
+
+
+def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[Orders, ...]:
+    """Marks of every program of a run, between which every order of the robots is certified.
+
+    Args:
+        run: The run.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        NotVerifiedError: With the robots, the phase and the distance where marks do not suffice.
+    """
+    scenes, found = scenes_of(run), []
+    for program in run_programs(run):
+        known: dict[int, list[Stretch]] = {}
+        stretches: list[Stretch] = []
+        for count, phase in enumerate(program.phases):
+            progress(STAGE, count / len(program.phases))
+            if phase.last == phase.first:
+                continue
+            if phase.place not in known:
+                known[phase.place] = list(PhaseSearch(run.cell, scenes[phase.place], program, phase).stretches())
+            by = phase.first - known[phase.place][0].first
+            stretches += [replace(each, first=each.first + by, last=each.last + by) for each in known[phase.place]]
+        if len(stretches) > MOST_MARKS:
+            raise NotVerifiedError([f"sequence only: {len(stretches)} waits would be needed, at most {MOST_MARKS} are"])
+        marks = [stretches[0].first, *(each.last for each in stretches)]
+        times = tuple(float(program.times[row]) for row in marks)
+        found.append(Orders(program=program.name, stretches=tuple(stretches), times=times))
+    progress(STAGE, 1.0)
+    return tuple(found)
+
+
+def certify_written(
+    run: VerifiedRun, orders: Sequence[Orders], read: Sequence[ProgramRows], *, progress: Progress = silent
+) -> Iterator[str]:
+    """Certify every order once more on rows that were read: findings, one for each pair that is not clear.
+
+    Args:
+        run: The run, whose rows are those of robots that are not exported.
+        orders: Marks of its programs.
+        read: What a reader found in the programs, marks included.
+        progress: Called with the stage and the fraction done.
+    """
+    scenes = scenes_of(run)
+    for program, own, rows in zip(run_programs(run), orders, read, strict=True):
+        for name, each in rows.robots.items():
+            if len(each.marks) != len(own.marks):
+                yield f"program of '{name}': expected {len(own.marks)} marks, got {len(each.marks)}"
+                return
+        known: set[tuple[bytes, ...]] = set()
+        for count, stretch in enumerate(own.stretches):
+            progress(STAGE, count / len(own.stretches))
+            if not stretch.pairs:
+                continue
+            q = _positions(run.cell, program, rows, count, stretch)
+            key = (str(stretch.place).encode(), *(each.tobytes() for each in q.values()))
+            if key in known:  # a further cycle
+                continue
+            known.add(key)
+            regions = [_region(q, pair) for pair in stretch.pairs]
+            for bound in certify_regions(scenes[stretch.place], q, regions):
+                if not bound.is_kept:
+                    yield _not_clear(stretch.phase, bound, program.times[[stretch.first, stretch.last]])
+
+
+class PhaseSearch:
+    """The search for the marks of one phase."""
+
+    def __init__(self, cell: Cell, scene: Scene, program: RunProgram, phase: RunPhase) -> None:
+        """Take the rows of a phase.
+
+        Args:
+            cell: The cell.
+            scene: Its scene while the tasks of the phase are worked on.
+            program: The program of all robots.
+            phase: The phase.
+        """
+        self._scene, self._phase = scene, phase
+        self._times = program.times[phase.first : phase.last + 1]
+        rows = program.q[phase.first : phase.last + 1]
+        self._q = {robot.name: rows[:, cell.columns(robot.name)] for robot in cell.robots}
+        self._last = phase.last - phase.first
+        busy = program.busy()[phase.first : phase.last + 1]
+        self._free = [row for row in range(1, self._last) if not busy[row]]
+        self._moves = {
+            name: np.append(0, np.cumsum(np.any(np.abs(np.diff(q, axis=0)) > STILL_TOL, axis=1)))
+            for name, q in self._q.items()
+        }
+
+    def stretches(self) -> Iterator[Stretch]:
+        """The stretches of the phase: the longest from its first row on that is clear, and so on."""
+        pairs = tuple(combinations(self._q, 2))
+        first = 0
+        while first < self._last:
+            bounds = self._bounds(first, self._last, pairs)
+            blocked = tuple((bound.first, bound.second) for bound in bounds if not bound.is_kept)
+            last = self._last
+            if blocked:
+                last = self._farthest(first, blocked)
+                bounds = self._bounds(first, last, pairs)
+            yield Stretch(
+                phase=self._phase.name,
+                place=self._phase.place,
+                first=self._phase.first + first,
+                last=self._phase.first + last,
+                pairs=tuple((bound.first, bound.second) for bound in bounds),
+                proved=min((bound.proved for bound in bounds), default=np.inf),
+            )
+            first = last
+
+    def _farthest(self, first: int, pairs: Sequence[Pair]) -> int:
+        """The last row at which robots may wait so that every order from a row on is clear.
+
+        A rectangle within one that is clear is clear: the row is found by bisection.
+
+        Raises:
+            NotVerifiedError: There is none.
+        """
+        rows = [row for row in self._free if row > first]
+        low, high = 0, len(rows)  # all before low are clear, none from high on is known to be
+        while low < high:
+            middle = (low + high) // 2
+            if all(bound.is_kept for bound in self._bounds(first, rows[middle], pairs)):
+                low = middle + 1
+            else:
+                high = middle
+        if low == 0:
+            nearest = rows[0] if rows else self._last
+            bounds = [each for each in self._bounds(first, nearest, pairs) if not each.is_kept]
+            worst = min(bounds, key=lambda each: each.distance)
+            raise NotVerifiedError([_not_clear(self._phase.name, worst, self._times[[first, nearest]])])
+        return rows[low - 1]
+
+    def _bounds(self, first: int, last: int, pairs: Sequence[Pair]) -> tuple[RegionBound, ...]:
+        """What is proved of the robots that both move between two rows."""
+        q = {name: rows[first : last + 1] for name, rows in self._q.items()}
+        moving = {name for name, moved in self._moves.items() if moved[last] > moved[first]}
+        regions = [_region(q, pair) for pair in pairs if moving.issuperset(pair)]
+        return certify_regions(self._scene, q, regions) if regions else ()
+
+
+def _region(q: dict[str, Array], pair: Pair) -> ClockRegion:
+    """All places of one robot with all of another."""
+    last = [len(q[name]) - 1 for name in pair]
+    return ClockRegion(first=pair[0], second=pair[1], rectangles=np.array([[0.0, last[0], 0.0, last[1]]]))
+
+
+def _positions(cell: Cell, program: RunProgram, rows: ProgramRows, count: int, stretch: Stretch) -> dict[str, Array]:
+    """Rows of every robot between two marks: as they were read, or those of the run where it is not exported."""
+    found = {}
+    for robot in cell.robots:
+        own = rows.robots.get(robot.name)
+        if own is None:
+            found[robot.name] = program.q[stretch.first : stretch.last + 1, cell.columns(robot.name)]
+        else:
+            found[robot.name] = own.q[own.marks[count] : own.marks[count + 1] + 1]
+        if len(found[robot.name]) < 2:
+            found[robot.name] = np.repeat(found[robot.name], 2, axis=0)
+    return found
+
+
+def _not_clear(phase: str, bound: RegionBound, times: Array) -> str:
+    """What is not clear, as one line."""
+    bodies = "" if bound.bodies is None else f" ({' and '.join(bound.bodies)})"
+    if np.isfinite(bound.distance):
+        what = f"come within {MM * bound.distance:.3g} mm{bodies}"
+    else:
+        what = "cannot be proved to keep their distance"
+    return (
+        f"sequence only: phase '{phase}', {times[0]:g} to {times[1]:g} s: '{bound.first}' and '{bound.second}' {what} "
+        f"in another order than that of the plan, and no robot can wait between"
+    )

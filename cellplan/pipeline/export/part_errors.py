@@ -1,0 +1,113 @@
+"""Tools and further holders on the part: where they are for given joint positions, and how far two motions differ."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.tools.tracking import errors_on_part
+from cellplan.geometry.transforms import Array, inverse
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Relation
+from cellplan.model.task import Frame, Task
+
+LEFT_OVER: Final = 0.8  # [-] of what a cell allows between rows; the rest is for the run itself and for rounding
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolsOnPart:
+    """Tasks that are worked on and closures of a cell, as far as a set of robots takes part in them.
+
+    Attributes:
+        cell: The cell, as it is in a phase.
+        chains: Kinematics by robot.
+        relations: The tasks, and the grasps of further holders.
+        names: What each is called in messages.
+        movers: Names of the robots that move each.
+        allowed: Largest errors that the cell allows between rows, in [m] and [rad].
+    """
+
+    cell: Cell
+    chains: Mapping[str, ScrewChain]
+    relations: tuple[Relation, ...]
+    names: tuple[str, ...]
+    movers: tuple[frozenset[str], ...]
+    allowed: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(
+        cls, cell: Cell, chains: Mapping[str, ScrewChain], *, tasks: Collection[str], robots: Collection[str]
+    ) -> "ToolsOnPart":
+        """The relations that at least one of some robots moves.
+
+        Args:
+            cell: The cell, as it is in a phase.
+            chains: Kinematics by robot.
+            tasks: Names of the tasks that are worked on in the phase.
+            robots: Names of the robots.
+        """
+        holder = {grasp.robot for grasp in cell.part.held_by[:1]}
+        limits = cell.checks.closure_position, cell.checks.closure_orientation
+        found: list[tuple[Relation, str, frozenset[str], tuple[float, float]]] = []
+        for task in cell.tasks:
+            own = {task.robot} if task.relative_to is Frame.WORLD else {task.robot, *holder}
+            if task.name in tasks:
+                found.append((task, f"the tool of task '{task.name}'", frozenset(own), task.tolerance.between))
+        found += [
+            (grasp, f"'{grasp.robot}' on the part", frozenset({grasp.robot, *holder}), limits)
+            for grasp in cell.closures
+        ]
+        found = [each for each in found if each[2] & set(robots)]
+        relations, names, movers, allowed = zip(*found, strict=True) if found else ((), (), (), ())
+        return cls(cell=cell, chains=chains, relations=relations, names=names, movers=movers, allowed=allowed)
+
+    def tips(self, q: Mapping[str, Array]) -> dict[str, Array]:
+        """Tool tips in the world of some robots that take part, shape (N, 4, 4), by robot; of others none.
+
+        Args:
+            q: Joint positions in [rad] or [m], shape (N, n), by robot.
+        """
+        taking_part = frozenset[str]().union(*self.movers)
+        return {name: self.chains[name].tool_poses(own) for name, own in q.items() if name in taking_part}
+
+    def poses(self, X_WT: Mapping[str, Array]) -> list[Array]:
+        """Pose of each tool in the frame of its task, or on the part, shape (N, 4, 4) each.
+
+        Args:
+            X_WT: Tool tips in the world of all robots that take part, shape (N, 4, 4), by robot.
+        """
+        part = self.cell.part
+        X_PW = inverse(X_WT[part.held_by[0].robot] @ part.X_CP if self._is_carried else part.X_CP[None])
+        return [
+            X_WT[each.robot] if isinstance(each, Task) and each.relative_to is Frame.WORLD else X_PW @ X_WT[each.robot]
+            for each in self.relations
+        ]
+
+    @property
+    def _is_carried(self) -> bool:
+        """Whether one of the tools is seen from a part that a robot carries."""
+        holders = self.cell.part.held_by
+        return bool(holders) and any(holders[0].robot in movers for movers in self.movers)
+
+    def errors(self, desired: Sequence[Array], poses: Sequence[Array]) -> list[Array]:
+        """Position errors in [m] and orientation errors in [rad] of each, shape (N, 2); open components are zero."""
+        found = []
+        for relation, one, other in zip(self.relations, desired, poses, strict=True):
+            error = errors_on_part(other, one, relation)
+            lengths = [np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)]
+            found.append(np.stack(lengths, axis=1))
+        return found
+
+    def shares(self, desired: Sequence[Array], poses: Sequence[Array], *, most: float) -> list[Array]:
+        """Errors as shares of what is allowed, the larger one of each row, shape (N,).
+
+        Args:
+            desired: Poses as in the run, shape (N, 4, 4) each.
+            poses: Poses of the thinned rows, likewise.
+            most: Largest position error in [m], also where the cell allows more.
+        """
+        return [
+            np.maximum(errors[:, 0] / min(most, LEFT_OVER * position), errors[:, 1] / (LEFT_OVER * orientation))
+            for errors, (position, orientation) in zip(self.errors(desired, poses), self.allowed, strict=True)
+        ]

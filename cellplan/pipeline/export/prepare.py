@@ -1,0 +1,196 @@
+"""Prepared: all that a format is to write of a run, promised and shaped, before any text."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.export.dialect import Dialect
+from cellplan.export.handshake import handshake_steps
+from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, Targets
+from cellplan.model.progress import Progress, silent
+from cellplan.model.units import DEG, MM
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
+from cellplan.pipeline.export.judge import largest_blend
+from cellplan.pipeline.export.orders import Orders
+from cellplan.pipeline.export.part_targets import with_part_poses
+from cellplan.pipeline.export.promises import Promised, choose_promise, controllers_of
+from cellplan.pipeline.export.resample import lead_time, resampled
+from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.shared import Shared
+from cellplan.pipeline.export.skew import RunSkew, run_skew
+from cellplan.pipeline.export.thin import ThinningLimits, thinned
+
+FINER: Final = 0.3  # [-] of the usual thinning, where no rounding keeps the demands with that: it adds rows, not stops
+BOTH: tuple[Promise, ...] = (Promise.TIMED, Promise.SYNCHRONISED)  # promises that keep the rows of robots together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Prepared:
+    """What a format is to write.
+
+    Attributes:
+        dialect: The format.
+        job: Frame and rows, without notes.
+        promised: What is promised.
+        skew: What the start skew may be; None where there is one controller only, or the promise does not depend on it.
+        orders: Marks and what was certified between them, of each program; empty unless robots wait at marks.
+        thinning: How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out.
+        lead: Time in [s] by which the rows are later than those of the run.
+        shared: What exports of the run share.
+    """
+
+    dialect: Dialect
+    job: ExportJob
+    promised: Promised
+    skew: RunSkew | None
+    orders: tuple[Orders, ...]
+    thinning: tuple[float, float] | None
+    lead: float
+    shared: Shared
+
+
+def prepare(
+    run: VerifiedRun, dialect: Dialect, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
+) -> Prepared:
+    """Choose promise, marks and rows of an export.
+
+    Args:
+        run: The verified run.
+        dialect: The format.
+        choice: What the caller chose.
+        shared: What exports of the run share; None for this one only.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The format cannot write this, or something is not stated in the cell.
+        NotVerifiedError: No promise of the format can be kept with this motion.
+    """
+    choice.refuse_for(dialect)
+    shared = shared or Shared(run)
+    robots = exported_robots(run.cell, dialect, choice.robots)
+    skew = run_skew(run, progress=progress) if Promise.TIMED in dialect.promises else None
+    promised = choose_promise(run, dialect, robots, skew=skew)
+    frame = frame_of(run, robots, promised.promise, choice)
+    if is_at_cycle(dialect, frame.promise) and choice.is_thinned:
+        raise InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
+    require_handshakes(frame)
+    has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
+    orders = shared.orders(progress) if has_waits else ()
+    job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
+    if dialect.is_rounded and job.blend == 0.0 and not choice.is_thinned and not is_at_cycle(dialect, frame.promise):
+        finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
+        other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
+        job, choice = (other, finer) if other.blend > 0.0 else (job, choice)
+    return Prepared(
+        dialect=dialect,
+        job=job,
+        promised=promised,
+        skew=skew if promised.promise is Promise.TIMED else None,
+        orders=orders,
+        thinning=thinning_of(dialect, promised.promise, choice),
+        lead=lead,
+        shared=shared,
+    )
+
+
+def _job(
+    shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
+) -> tuple[ExportJob, float]:
+    """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
+    programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
+    if frame.targets is Targets.PART:
+        programs = with_part_poses(frame, programs)
+    job = ExportJob(frame=frame, programs=programs)
+    if dialect.is_rounded and not is_at_cycle(dialect, frame.promise):
+        job = replace(job, blend=largest_blend(shared.run, dialect, job, lead=lead, shared=shared))
+    return job, lead
+
+
+def frame_of(run: VerifiedRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
+    """What a reader may know of an export of a run."""
+    return ExportFrame(
+        cell=run.cell,
+        robots=tuple(robots),
+        programs=tuple(run.programs),
+        promise=promise,
+        targets=choice.targets,
+        split=choice.split,
+    )
+
+
+def require_handshakes(frame: ExportFrame) -> None:
+    """Require the signals of all robots of the cell where robots wait for one another.
+
+    Raises:
+        InputError: A signal is not stated.
+    """
+    if frame.promise is Promise.SEQUENCE_ONLY:
+        for robot in frame.cell.robots:
+            handshake_steps(frame, robot.name)
+
+
+def _shaped(
+    shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
+) -> tuple[tuple[ProgramRows, ...], float]:
+    """Rows of the robots that are exported, with marks, as the format holds them; and by how much they are later."""
+    run, programs = shared.run, full_rows(shared.run)
+    if orders:
+        programs = tuple(_with_marks(program, own) for program, own in zip(programs, orders, strict=True))
+    thinning = thinning_of(dialect, frame.promise, choice)
+    if is_at_cycle(dialect, frame.promise):
+        cycles = {robot.name: cycle_of(frame, robot.name) for robot in run.cell.robots}  # all start and end together
+        programs = tuple(_only(program, frame.robots) for program in programs)
+        return tuple(resampled(run.cell, program, cycles) for program in programs), lead_time(cycles)
+    if thinning is not None:
+        limits = ThinningLimits(
+            turn=thinning[1] / DEG, slide=thinning[0] / MM, tool=thinning[0] / MM, shortest_time=dialect.shortest_time
+        )
+        scene, groups = shared.scene, row_groups(frame)
+        kept = kept_rows(run)
+        programs = tuple(
+            thinned(scene, program, groups=groups, limits=limits, kept=rows)
+            for program, rows in zip(programs, kept, strict=True)
+        )
+    return tuple(_only(program, frame.robots) for program in programs), 0.0
+
+
+def is_at_cycle(dialect: Dialect, promise: Promise) -> bool:
+    """Whether the rows of an export lie on the cycle of the controller."""
+    return dialect.at_cycle and promise is Promise.TIMED
+
+
+def thinning_of(dialect: Dialect, promise: Promise, choice: Choice) -> tuple[float, float] | None:
+    """How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out."""
+    return None if is_at_cycle(dialect, promise) else choice.thinning(dialect)
+
+
+def cycle_of(frame: ExportFrame, robot: str) -> float:
+    """Cycle in [s] at which the controller of a robot takes positions."""
+    placed = frame.robot(robot)
+    stated = None if placed.control is None else placed.control.cycle
+    return placed.controller_cycle if stated is None else stated
+
+
+def row_groups(frame: ExportFrame) -> list[list[str]]:
+    """Robots that keep the same rows: all of a controller where they are to stay together, or else each its own."""
+    if frame.promise not in BOTH:
+        return [[name] for name in frame.robots]
+    groups: dict[str, list[str]] = {}
+    for name, controller in controllers_of(frame.cell, frame.robots).items():
+        groups.setdefault(controller, []).append(name)
+    return list(groups.values())
+
+
+def _with_marks(program: ProgramRows, orders: Orders) -> ProgramRows:
+    """A program whose robots wait for one another."""
+    return replace(program, robots={n: replace(rows, marks=orders.marks) for n, rows in program.robots.items()})
+
+
+def _only(program: ProgramRows, robots: Sequence[str]) -> ProgramRows:
+    """A program of some robots."""
+    missing = [name for name in robots if name not in program.robots]
+    if missing:
+        raise InputError(f"program of '{missing[0]}': expected rows, got none")
+    return replace(program, robots={name: program.robots[name] for name in robots})

@@ -1,0 +1,190 @@
+"""Promises: what holds when controllers play the programs of a run, and why not more."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
+from cellplan.export.dialect import Dialect
+from cellplan.io.input.findings import listed
+from cellplan.model.cell import Cell
+from cellplan.model.controllers import Controller, ControllerKind
+from cellplan.model.exported import Promise
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.run_programs import moving_robots, run_programs, spoilt_by_another_order
+from cellplan.pipeline.export.skew import PER_SECOND, ClockPair, RunSkew, skew_text
+
+BEST_FIRST: Final = (Promise.TIMED, Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY)
+LAGGING: Final = {
+    "stream": frozenset({ControllerKind.UR, ControllerKind.ABB})
+}  # servoj and EGM follow 0.03 to 0.2 s late
+ONE_CLOCK: Final = "timed for one controller; several controllers agree only to their start skew"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Promised:
+    """What is promised.
+
+    Attributes:
+        promise: The promise.
+        reasons: Why it is not a better one, one for each better one.
+        remarks: Under which conditions it holds.
+    """
+
+    promise: Promise
+    reasons: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+class _Against(NamedTuple):
+    """Why a promise cannot be made, and whether that is for want of something that the cell may state."""
+
+    text: str
+    is_input: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Export:
+    """What is exported, and what is known of it."""
+
+    run: VerifiedRun
+    dialect: Dialect
+    robots: tuple[str, ...]
+    skew: RunSkew | None
+
+    @property
+    def controllers(self) -> list[Controller]:
+        """The stated controllers of the robots that are exported, each once."""
+        names = dict.fromkeys(controllers_of(self.run.cell, self.robots).values())
+        return [self.run.cell.controllers[name] for name in names if name in self.run.cell.controllers]
+
+
+def choose_promise(
+    run: VerifiedRun, dialect: Dialect, robots: Sequence[str], *, skew: RunSkew | None = None
+) -> Promised:
+    """The best promise that a format can keep for some robots of a run.
+
+    Args:
+        run: The run.
+        dialect: The format.
+        robots: Names of the robots that are exported.
+        skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
+
+    Raises:
+        InputError: None can be kept, as something is not stated in the cell.
+        NotVerifiedError: None can be kept with this motion.
+    """
+    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew)
+    found: dict[Promise, _Against] = {}
+    for promise in BEST_FIRST:
+        against = _against(export, promise)
+        if against is None:
+            reasons = tuple(f"not {better}: {each.text}" for better, each in found.items())
+            return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
+        found[promise] = against
+    unstated = [found[promise].text for promise in dialect.promises if found[promise].is_input]
+    if unstated:
+        raise InvalidFileError([InputError(text) for text in unstated])
+    raise NotVerifiedError([f"{dialect.name}: not {promise}: {each.text}" for promise, each in found.items()])
+
+
+def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:
+    """Name of the controller of each robot; one without a stated controller counts as having one of its own."""
+    found = {}
+    for name in robots:
+        control = cell.robot(name).control
+        found[name] = f"that of {name}" if control is None else control.controller
+    return found
+
+
+def _against(export: _Export, promise: Promise) -> _Against | None:
+    """Why a promise cannot be made; None where it can."""
+    if promise not in export.dialect.promises:
+        return _Against(f"{export.dialect.name} programs cannot state it")
+    match promise:
+        case Promise.TIMED:
+            return _against_timed(export)
+        case Promise.SYNCHRONISED:
+            return _against_synchronised(export)
+        case Promise.SEQUENCE_ONLY:
+            return _against_sequence(export)
+
+
+def _against_timed(export: _Export) -> _Against | None:
+    """Why the rows are not passed at their times."""
+    kinds = LAGGING.get(export.dialect.name, frozenset())
+    for controller in export.controllers:
+        if (export.dialect.lags or controller.kind in kinds) and controller.latency is None:
+            text = (
+                f"controllers.{controller.name}.latency_ms: expected the time by which its robots follow what "
+                f"{export.dialect.name} sends to them, got none"
+            )
+            return _Against(text, is_input=True)
+    for pair in () if export.skew is None else export.skew.broken(export.robots):
+        return _Against(_broken_skew(export.skew, pair))
+    return None
+
+
+def _broken_skew(skew: RunSkew | None, pair: ClockPair) -> str:
+    """What is stated of two clocks and what is allowed."""
+    cycle = "" if skew is None else f"; {skew.shortest_cycle(pair)}"
+    return (
+        f"'{pair.first}' and '{pair.second}': the stated skew of {_ms(pair.stated or 0.0)} is more than the allowed "
+        f"{skew_text(pair.allowed)} ({pair.reason}){cycle}"
+    )
+
+
+def _against_synchronised(export: _Export) -> _Against | None:
+    """Why the robots do not pass the same rows at the same time."""
+    cell, robots = export.run.cell, export.robots
+    if len(robots) < 2:
+        return _Against(f"it takes two robots on one controller, and only '{robots[0]}' is exported")
+    names = list(dict.fromkeys(controllers_of(cell, robots).values()))
+    if len(names) > 1:
+        return _Against(f"the robots are on {len(names)} controllers ({listed(names)})")
+    others = {name for played in run_programs(export.run) for name in moving_robots(cell, played)} - set(robots)
+    if others:
+        return _Against(f"{listed(sorted(others))} moves too and is not in the program of controller {names[0]}")
+    return None
+
+
+def _against_sequence(export: _Export) -> _Against | None:
+    """Why robots that only wait for one another at marks spoil something."""
+    cell = export.run.cell
+    if len(cell.robots) == 1:
+        return None
+    for played in run_programs(export.run):
+        for reason in spoilt_by_another_order(cell, played):
+            return _Against(reason)
+    return None
+
+
+def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
+    """Under which conditions a promise holds."""
+    cell = export.run.cell
+    every = [robot.name for robot in cell.robots]
+    match promise:
+        case Promise.TIMED:
+            if len(set(controllers_of(cell, every).values())) > 1:
+                yield ONE_CLOCK
+            yield from _skew_remarks(export)
+        case Promise.SYNCHRONISED:
+            yield "same row at the same time within the blend zones; the controller may take longer than planned"
+        case Promise.SEQUENCE_ONLY:
+            yield "the controller makes the speed between rows: times and feeds of the plan are not kept"
+
+
+def _skew_remarks(export: _Export) -> Iterator[str]:
+    """What robots on other controllers, and interfaces that lag, ask for."""
+    cell = export.run.cell
+    for controller in export.controllers:
+        if controller.latency is not None:
+            yield f"controller {controller.name} follows {_ms(controller.latency)} late: start it that much earlier"
+    every = [robot.name for robot in cell.robots]
+    for pair in () if export.skew is None else export.skew.broken(every):
+        yield f"not to be played together with the robots of other controllers: {_broken_skew(export.skew, pair)}"
+
+
+def _ms(seconds: float) -> str:
+    """A time in milliseconds."""
+    return f"{PER_SECOND * seconds:.4g} ms"

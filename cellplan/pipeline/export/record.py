@@ -1,0 +1,135 @@
+"""Record: what was exported from which run, what is promised of it and what was found in it."""
+
+import json
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.io.input.files import digest
+from cellplan.model.report import CAUTION
+from cellplan.model.units import MM
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.notes import deviation_line, deviation_records, skew_lines
+from cellplan.pipeline.export.orders import Orders, Stretch
+from cellplan.pipeline.export.prepare import Prepared
+from cellplan.pipeline.export.skew import PER_SECOND
+from cellplan.pipeline.export.written import Written
+from cellplan.pipeline.write_run import versions
+from cellplan.report.record.controller import zero_text
+
+SCHEMA: Final = "cellplan.export/2"
+Record = dict[str, Any]
+
+
+def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Record:
+    """What ``export.json`` says of an export by a dialect.
+
+    Args:
+        run: The run.
+        prepared: What was to be written.
+        written: What was written.
+    """
+    frame = written.job.frame
+    about = {
+        "promise": str(frame.promise),
+        "reasons": list(prepared.promised.reasons),
+        "remarks": list(prepared.promised.remarks),
+        "robots": list(frame.robots),
+        "targets": str(frame.targets),
+        "split": frame.split,
+        "decimals": prepared.dialect.decimals,
+        "allowed_skew": _skew(prepared),
+        "deviation": deviation_line(written.judgement),
+        "deviations": deviation_records(written.judgement),
+        "not_judged": list(written.judgement.not_judged),
+        "marks": [_marks(own, place, written) for place, own in enumerate(prepared.orders)],
+        "thinning": None if prepared.thinning is None else _thinning(prepared.thinning),
+        "blend": written.job.blend,
+        "rounded": _rounded(written),
+    }
+    return _record(run, prepared.dialect.name, about, written.files)
+
+
+def table_record(run: VerifiedRun, name: str, decimals: int, files: Mapping[str, str]) -> Record:
+    """What ``export.json`` says of tables of all robots that no controller plays.
+
+    Args:
+        run: The run.
+        name: Name of the format.
+        decimals: Of its numbers.
+        files: Text by path.
+    """
+    about = {"robots": [robot.name for robot in run.cell.robots], "decimals": decimals}
+    return _record(run, name, about, files)
+
+
+def record_text(record: Record) -> str:
+    """The record as text, the same for the same record."""
+    return json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _rounded(written: Written) -> Record | None:
+    """How many rows are rounded, and by how much more the tools may be off there."""
+    found = written.judgement
+    if not found.rounded[0]:
+        return None
+    return {"rows": found.rounded[0], "of": found.rounded[1], "corners": deviation_records(found, of_corners=True)}
+
+
+def _record(run: VerifiedRun, name: str, about: Record, files: Mapping[str, str]) -> Record:
+    """What all formats state."""
+    return {
+        "schema": SCHEMA,
+        "cell": run.cell.name,
+        "format": name,
+        **about,
+        "run": run.digest,
+        "versions": versions(),
+        "zero": {robot.name: zero_text(robot.model) for robot in run.cell.robots},
+        "files": {path: digest(text.encode()) for path, text in files.items()},
+        "caution": CAUTION,
+    }
+
+
+def _skew(prepared: Prepared) -> Record | None:
+    """What the start skew may be; None where no other controller shares the run, or no time is promised."""
+    if prepared.skew is None:
+        return None
+    pairs = [
+        {
+            "robots": [pair.first, pair.second],
+            "allowed_ms": PER_SECOND * pair.allowed,
+            "stated_ms": None if pair.stated is None else PER_SECOND * pair.stated,
+            "limit": pair.reason,
+        }
+        for pair in prepared.skew.pairs
+    ]
+    return {"line": next(skew_lines(prepared)), "pairs": pairs}
+
+
+def _thinning(thinning: tuple[float, float]) -> Record:
+    """How far what was left out may be off."""
+    return {"mm": thinning[0], "deg": thinning[1]}
+
+
+def _marks(orders: Orders, place: int, written: Written) -> Record:
+    """Marks of one program: rows of the run, rows of each robot in its file, and what was certified between."""
+    own = written.job.programs[place].robots
+    return {
+        "program": orders.program,
+        "times_s": list(orders.times),
+        "run_rows": list(orders.marks),
+        "rows": {name: list(rows.marks) for name, rows in own.items()},
+        "certified": [_stretch(each) for each in orders.stretches],
+    }
+
+
+def _stretch(stretch: Stretch) -> Record:
+    """What was certified between two marks."""
+    return {
+        "phase": stretch.phase,
+        "run_rows": [stretch.first, stretch.last],
+        "pairs": [list(pair) for pair in stretch.pairs],
+        "keeps_mm": round(MM * stretch.proved, 3) if np.isfinite(stretch.proved) else None,
+    }

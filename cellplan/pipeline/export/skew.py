@@ -1,0 +1,109 @@
+"""Allowed skew of a run: how far the starts of controllers may be apart, over all of its phases."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from cellplan.checks.clearance.skew import allowed_skew, has_clocks
+from cellplan.model.progress import Progress, silent
+from cellplan.model.skew import MOST_SKEW, PairSkew
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.run_programs import scenes_of
+from cellplan.report.text.skew import skew_text as report_text
+
+PER_SECOND: Final = 1e3  # [ms/s]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClockPair:
+    """Two robots on different controllers.
+
+    Attributes:
+        first: The one robot.
+        second: The other one.
+        allowed: Largest skew in [s] of their clocks that keeps all that is demanded; ``MOST_SKEW`` for that or more.
+        stated: Largest difference in [s] that the cell states of them; None for nothing stated.
+        reason: What more would break.
+    """
+
+    first: str
+    second: str
+    allowed: float
+    stated: float | None
+    reason: str
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether what is stated is allowed, as far as anything is stated."""
+        return self.stated is None or self.stated <= self.allowed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunSkew:
+    """Allowed skew of a run.
+
+    Attributes:
+        pairs: All pairs of robots on different controllers.
+        cycle: Duration of the run in [s].
+    """
+
+    pairs: tuple[ClockPair, ...]
+    cycle: float
+
+    @property
+    def least(self) -> ClockPair:
+        """The pair that allows least, the first of these."""
+        return min(self.pairs, key=lambda pair: pair.allowed)
+
+    def broken(self, robots: Collection[str]) -> Iterator[ClockPair]:
+        """Pairs of some robots of which more is stated than is allowed, the worst first."""
+        among = [pair for pair in self.pairs if {pair.first, pair.second} <= set(robots) and not pair.is_kept]
+        yield from sorted(among, key=lambda pair: pair.allowed)
+
+    def shortest_cycle(self, pair: ClockPair) -> str:
+        """In words, the cycle at which what is stated is allowed.
+
+        A motion that takes k times as long allows k times the skew.
+        """
+        if pair.allowed <= 0.0 or pair.stated is None:
+            return "no cycle keeps the tolerance"
+        return f"a cycle of {self.cycle * pair.stated / pair.allowed:.4g} s or more would keep it"
+
+
+def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None:
+    """How far the starts of the controllers of a run may be apart; None where its cell states no two controllers.
+
+    Args:
+        run: The run.
+        progress: Called with the stage and the fraction done.
+    """
+    if not has_clocks(run.cell):
+        return None
+    found: dict[tuple[str, str], ClockPair] = {}
+    for scene, motion in zip(scenes_of(run), run.motions, strict=True):
+        q = {name: motion.tables[name].q for name in (robot.name for robot in run.cell.robots)}
+        report = motion.report.skew  # found by the same function when the run was verified
+        if report is None:
+            report = allowed_skew(scene, motion.schedule, q, motion.report.depths, progress=progress)
+        for pair in report.pairs:
+            key = (pair.first, pair.second)
+            own = _clock_pair(pair, motion.name)
+            if key not in found or own.allowed < found[key].allowed:
+                found[key] = own
+    return RunSkew(pairs=tuple(found.values()), cycle=float(run.motion.times[-1]))
+
+
+def skew_text(seconds: float) -> str:
+    """A skew in milliseconds, never rounded up."""
+    return report_text(PER_SECOND * seconds, or_more=seconds >= MOST_SKEW)
+
+
+def _clock_pair(pair: PairSkew, phase: str | None) -> ClockPair:
+    """A pair with what limits it."""
+    least = pair.least
+    if least is None or least.skew >= MOST_SKEW or least.at_s is None:
+        reason = "nothing limits it"
+    else:
+        where = "" if phase is None else f"{phase}, "
+        reason = f"{least.limit} of {least.subject}, {where}{least.at_s:.3f} s"
+    return ClockPair(first=pair.first, second=pair.second, allowed=pair.allowed, stated=pair.stated, reason=reason)

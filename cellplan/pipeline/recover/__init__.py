@@ -1,0 +1,1 @@
+"""Recovery: retract-and-home joint tables from where a cell has stopped."""

@@ -1,0 +1,279 @@
+"""Judge a recovery: its tables are parsed, then checked by a kinematics that the planner does not use."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.cache import nothing_kept
+from cellplan.certify.bound import Bound
+from cellplan.certify.certify import certify
+from cellplan.certify.growth import ComingApart, certify_growth
+from cellplan.checks.clearance.contacts import time_of
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.verify import verify_motion
+from cellplan.geometry.transforms import Array
+from cellplan.io.run.joint_tables import parse_table
+from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.report import Check
+from cellplan.model.units import MM
+from cellplan.pipeline.recover.phases import RecoveryKind, RecoveryPhase, scene_of
+from cellplan.pipeline.recover.state import RunPlaces, StoppedState
+
+STATE_TOL: Final = 1e-9  # [rad] or [m] by which the first row may differ from the stopped state: rounding of the tables
+
+
+Apart = tuple[ComingApart, float | None]  # a pair, and the time in [s] from which on it keeps its demand
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Nearest:
+    """Where two bodies that keep what is demanded of them come nearest.
+
+    Attributes:
+        distance: Proved distance in [m].
+        demand: What is demanded in [m].
+        pair: Names of the bodies.
+        at_s: When, in [s] of the recovery.
+    """
+
+    distance: float
+    demand: float
+    pair: tuple[str, str]
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimedPhase:
+    """A phase of a recovery on its clock, as it was judged.
+
+    Attributes:
+        kind: What is done.
+        robots: Names of the robots that move.
+        words: The same for people.
+        begin: Time in [s] at which it begins.
+        end: Time in [s] at which it ends.
+        place: Place of the phase of the program that is played backwards; None for what is not.
+        nearest: Smallest distance in it of the pairs that keep their demand; None without such pairs.
+    """
+
+    kind: str
+    robots: tuple[str, ...]
+    words: str
+    begin: float
+    end: float
+    place: int | None
+    nearest: Nearest | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Judgement:
+    """What was found on the written tables of a recovery.
+
+    Attributes:
+        checks: All checks.
+        phases: The phases on their clock.
+        apart: Pairs that begin nearer than is demanded, with the time in [s] from which on each keeps its demand.
+    """
+
+    checks: tuple[Check, ...]
+    phases: tuple[TimedPhase, ...]
+    apart: tuple[Apart, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every check passed."""
+        return all(check.passed for check in self.checks)
+
+    @property
+    def nearest(self) -> Nearest | None:
+        """The smallest distance of all phases."""
+        found = [phase.nearest for phase in self.phases if phase.nearest is not None]
+        return min(found, key=lambda each: each.distance, default=None)
+
+
+def judged(
+    texts: Mapping[str, str], phases: Sequence[RecoveryPhase], *, places: RunPlaces, state: StoppedState
+) -> Judgement:
+    """Check the tables of a recovery.
+
+    Args:
+        texts: The table of each robot, by its name.
+        phases: What they were written from: of these only kinds, scenes and numbers of rows are used.
+        places: The phases of the run.
+        state: The stopped state.
+
+    Raises:
+        InputError: A table is not whole.
+    """
+    tables = [parse_table(text, f"tables/{name}.csv") for name, text in texts.items()]
+    with nothing_kept():  # a proof rests on the tables themselves
+        return _judged(tables, phases, places, state)
+
+
+def _judged(
+    tables: Sequence[JointTable], phases: Sequence[RecoveryPhase], places: RunPlaces, state: StoppedState
+) -> Judgement:
+    times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
+    stopped = places.scene_while_stopped(state.lying)
+    schedule = Schedule(times=times, tasks=())
+    moving = [name for name in state.times if name not in state.kept]
+    checks = list(verify_motion(stopped, schedule, tables, moving=moving, idle=()).checks)
+    checks += check_mounting(stopped, q, times)
+    checks.append(_begins(q, state))
+    checks += _stand_still(q, phases, places)
+    timed: list[TimedPhase] = []
+    apart: list[Apart] = []
+    first = 0
+    for group in _runs_of_retracts(phases):
+        last = first + sum(len(phase.q) - 1 for phase in group)
+        rows, own = q[first : last + 1], times[first : last + 1]
+        bound, found = _proved(group[0], rows, own, places=places, state=state)
+        checks += [_coming_apart(pair, fault, at) for (pair, at), fault in found.items()]
+        apart += found
+        checks.append(_clearance(bound, own, f"{group[0].kind} from {own[0]:g} s"))
+        timed += _timed(group, times, first, _nearest(bound, own))
+        first = last
+    return Judgement(checks=tuple(checks), phases=tuple(timed), apart=tuple(apart))
+
+
+def _proved(
+    phase: RecoveryPhase, rows: Array, times: Array, *, places: RunPlaces, state: StoppedState
+) -> tuple[Bound, dict[Apart, str]]:
+    """What is proved of the pairs that keep their demand, and the pairs that come apart with what is wrong of each."""
+    if phase.kind is not RecoveryKind.RETRACT:
+        return certify(scene_of(phase, places, state), rows, with_curves=False), {}
+    growth = certify_growth(places.scene_while_stopped(state.lying), rows, with_minimum=True)
+    faults = dict(growth.faults)
+    timed = [(pair, None if pair.row is None else float(times[pair.row])) for pair in growth.apart]
+    return growth.kept, {each: faults.get(each[0].names, "") for each in timed}
+
+
+def _timed(group: Sequence[RecoveryPhase], times: Array, first: int, nearest: Nearest | None) -> list[TimedPhase]:
+    """Phases that are judged together, on their clock."""
+    found = []
+    for phase in group:
+        end = first + len(phase.q) - 1
+        found.append(
+            TimedPhase(
+                kind=str(phase.kind),
+                robots=phase.robots,
+                words=phase.words,
+                begin=float(times[first]),
+                end=float(times[end]),
+                place=phase.place,
+                nearest=nearest,
+            )
+        )
+        first = end
+    return found
+
+
+def _runs_of_retracts(phases: Sequence[RecoveryPhase]) -> list[list[RecoveryPhase]]:
+    """The phases, retracts that follow one another together: pairs come apart over all of them."""
+    found: list[list[RecoveryPhase]] = []
+    for phase in phases:
+        if found and phase.kind is RecoveryKind.RETRACT is found[-1][-1].kind:
+            found[-1].append(phase)
+        else:
+            found.append([phase])
+    return found
+
+
+def _begins(q: Array, state: StoppedState) -> Check:
+    """Whether the tables begin where the cell has stopped."""
+    off = float(np.abs(q[0] - state.q).max())
+    return Check(
+        name="begin",
+        subject="cell",
+        passed=off <= STATE_TOL,
+        value=off,
+        limit=STATE_TOL,
+        unit="rad or m",
+        at_s=0.0,
+        message=f"begin: the first row is {off:.1e} rad or m from the stopped state, allowed {STATE_TOL:g}",
+    )
+
+
+def _stand_still(q: Array, phases: Sequence[RecoveryPhase], places: RunPlaces) -> list[Check]:
+    """Whether robots that have no part in a phase stand still in it: one check for all, those that move by name."""
+    cell, first = places.cell, 0
+    checks = []
+    for phase in phases:
+        rows = q[first : first + len(phase.q)]
+        first += len(phase.q) - 1
+        for robot in cell.robots:
+            own = rows[:, cell.columns(robot.name)]
+            moved = float(np.abs(own - own[0]).max())
+            if robot.name not in phase.robots and moved > STATE_TOL:
+                message = f"standing: {robot.name} moves by {moved:.1e} rad or m in '{phase.words}', where it stands"
+                checks.append(
+                    Check(
+                        name="standing",
+                        subject=robot.name,
+                        passed=False,
+                        value=moved,
+                        limit=STATE_TOL,
+                        unit="rad or m",
+                        at_s=None,
+                        message=message,
+                    )
+                )
+    return checks
+
+
+def _coming_apart(pair: ComingApart, fault: str, at: float | None) -> Check:
+    """Whether a pair that begins too near only comes apart, and keeps its demand in the end."""
+    first, second = pair.names
+    begin = f"{MM * pair.begin:.2f} mm" if pair.begin > 0.0 else f"{-MM * pair.begin:.2f} mm deep"
+    what = fault or (
+        f"only comes apart, and keeps {MM * pair.demand:g} mm from {at:.3f} s on"
+        if at is not None
+        else f"does not come {MM * pair.demand:g} mm apart"
+    )
+    return Check(
+        name="coming_apart",
+        subject=f"{first} - {second}",
+        passed=not fault and at is not None,
+        value=MM * pair.end,
+        limit=MM * pair.demand,
+        unit="mm",
+        at_s=at,
+        message=f"coming apart: {first} to {second} begins {begin} apart and {what}".replace("deep apart", "deep"),
+    )
+
+
+def _nearest(bound: Bound, times: Array) -> Nearest | None:
+    """The smallest distance of the pairs that keep the clearance."""
+    kept = [pair for pair in bound.pairs if pair.keeps_clearance and np.isfinite(pair.proved)]
+    if not kept:
+        return None
+    worst = min(kept, key=lambda pair: pair.proved)
+    return Nearest(distance=worst.proved, demand=worst.demand, pair=bound.names(worst), at_s=time_of(times, worst.at))
+
+
+def _clearance(bound: Bound, times: Array, phase: str) -> Check:
+    """Whether every pair keeps what is demanded of it in one phase."""
+    failed = [pair for pair in bound.pairs if not pair.is_kept]
+    nearest = _nearest(bound, times)
+    if failed:
+        worst = min(failed, key=lambda pair: pair.proved - pair.demand)
+        first, second = bound.names(worst)
+        nearest = Nearest(
+            distance=worst.proved, demand=worst.demand, pair=(first, second), at_s=time_of(times, worst.at)
+        )
+    if nearest is None:
+        nearest = Nearest(distance=0.0, demand=0.0, pair=("", ""), at_s=float(times[0]))
+    shown = np.floor(10.0 * MM * nearest.distance) / 10.0
+    between = f"{nearest.pair[0]} to {nearest.pair[1]} {shown:.1f} mm at {nearest.at_s:.3f} s"
+    return Check(
+        name="clearance",
+        subject=phase,
+        passed=not failed,
+        value=MM * nearest.distance,
+        limit=MM * nearest.demand,
+        unit="mm",
+        at_s=nearest.at_s,
+        message=f"clearance of the {phase}: {between}, required {MM * nearest.demand:.1f} mm",
+    )

@@ -1,0 +1,212 @@
+"""Stopped state: where every robot of a verified run stands, where the part is, and what scene that is judged in."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.growth import scene_at_stop
+from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
+from cellplan.errors import InputError
+from cellplan.geometry.shapes import Sphere
+from cellplan.geometry.transforms import Array
+from cellplan.io.input.findings import listed
+from cellplan.model.cell import Cell, Robot
+from cellplan.model.motion import Motion
+from cellplan.model.phase import Phase
+from cellplan.model.program import PartPlace
+from cellplan.model.robot import BASE, Body
+from cellplan.model.task import Frame
+from cellplan.model.verified_run import VerifiedRun
+from cellplan.planning.sequence.scenes import StageScenes
+from cellplan.planning.sequence.stages import Stage, program_stages
+from cellplan.scene.bodies import Kind
+from cellplan.scene.scene import Scene
+
+TIP: Final = "tool tip"  # no body of a file has a name with a space
+TIP_RADIUS: Final = 1e-5  # [m]
+END: Final = 1e-9  # [s] by which a time may lie beyond the end: the rounding of a decimal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunPlaces:
+    """The phases of a run and their scenes.
+
+    Attributes:
+        cell: The cell, in which no cycle is to be closed any more.
+        motion: All rows of the program.
+        phases: Its phases with rows, those of all cycles.
+        stages: The stages of one cycle of a program from home to home; empty for any other.
+        scenes: What the scenes are made by.
+        tipped: The same with a small ball at the tip of every tool that works on the part: not every tool has a body
+            as far as there.
+    """
+
+    cell: Cell
+    motion: Motion
+    phases: tuple[Phase, ...]
+    stages: tuple[Stage, ...]
+    scenes: StageScenes
+    tipped: StageScenes
+
+    @classmethod
+    def of(cls, run: VerifiedRun) -> "RunPlaces":
+        """Those of a verified run."""
+        cell = replace(run.cell, motion=replace(run.cell.motion, cyclic=False))
+        stages = program_stages(run.cell) if run.cell.program is not None else ()
+        phases = run.motion.plan.program
+        if not stages:
+            phases = phases[: len(run.motions)]
+        return cls(
+            cell=cell,
+            motion=run.motion,
+            phases=phases,
+            stages=stages,
+            scenes=StageScenes.of(cell),
+            tipped=StageScenes.of(with_tips(cell)),
+        )
+
+    def rows(self, place: int) -> slice:
+        """The rows of a phase."""
+        return self.motion.rows(self.phases[place])
+
+    def at(self, time: float) -> int:
+        """Place of the phase that a time of the program belongs to; at a boundary the later one."""
+        begins = [float(self.motion.times[self.rows(place).start]) for place in range(len(self.phases))]
+        return max(0, int(np.searchsorted(begins, time + END, side="right")) - 1)
+
+    def lying_at(self, place: int) -> PartPlace | None:
+        """Where the part lies in a phase; None while it is held, or fixed anyway."""
+        return self.stages[place % len(self.stages)].place if self.stages else None
+
+    def scene_while_stopped(self, lying: PartPlace | None) -> Scene:
+        """The scene of a recovery: the full distance is demanded of all pairs."""
+        scene = self.tipped.held if lying is None else self.tipped.with_part_at(lying)
+        cell = replace(scene.cell, motion=self.cell.motion)
+        return _tips_and_part(scene_at_stop(replace(scene, cell=cell)))
+
+    def scene_of_phase(self, place: int) -> Scene:
+        """The scene that the rows of a phase were verified in; their rules are those of its tasks."""
+        if not self.stages:
+            return scene_of_run(self.scenes.held, self.phases[place].tasks)
+        stage = self.stages[place % len(self.stages)]
+        scene = scene_of_run(self.scenes.of_stage(stage), self.phases[place].tasks)
+        return replace(scene, cell=replace(scene.cell, motion=replace(scene.cell.motion, cyclic=False)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StoppedState:
+    """Where a cell has stopped.
+
+    Attributes:
+        at: Time of the program in [s].
+        times: Time of the program at which each robot stands, by its name.
+        kept: Names of the robots that are to stand still.
+        q: Stacked joint positions in [rad] or [m], shape (nq,).
+        place: Place of the phase of ``at``.
+        lying: Where the part lies; None while it is held, or fixed anyway.
+    """
+
+    at: float
+    times: Mapping[str, float]
+    kept: tuple[str, ...]
+    q: Array
+    place: int
+    lying: PartPlace | None
+
+    @property
+    def is_on_program(self) -> bool:
+        """Whether all robots are where the program has them at one time."""
+        return all(time == self.at for time in self.times.values())
+
+
+def with_tips(cell: Cell) -> Cell:
+    """The cell with a small ball at the tip of every tool that works on the part."""
+    at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
+    return replace(cell, robots=tuple(_with_tip(robot) if robot.name in at_work else robot for robot in cell.robots))
+
+
+def _with_tip(robot: Robot) -> Robot:
+    """A robot with a ball at the tip of its tool."""
+    ball = Body(name=TIP, link=BASE, shape=Sphere(TIP_RADIUS), X_BS=robot.tool.X_FT, accuracy=0.0)
+    return replace(robot, tool=replace(robot.tool, bodies=(*robot.tool.bodies, ball)))
+
+
+def _tips_and_part(scene: Scene) -> Scene:
+    """The scene in which a tip is watched beside the part only: to other things it is no body."""
+    ball, bodies = f"/{TIP}", list(scene.bodies)
+    kinds = [body.kind for body in bodies]
+    for robot in scene.cell.robots:
+        number = len(robot.tool.bodies)
+        if number and robot.tool.bodies[-1].name == TIP:
+            name = f"{robot.name}/tool" if number == 1 else f"{robot.name}/tool_{number}"
+            place = next(index for index, body in enumerate(bodies) if body.name == name)
+            bodies[place] = replace(bodies[place], name=f"{robot.name}{ball}")
+    tips = {index for index, body in enumerate(bodies) if body.name.endswith(ball)}
+    ends = [(pair.first, pair.second) for pair in scene.pairs]
+    kept = [
+        row for row, both in enumerate(ends) if not tips & set(both) or Kind.PART in {kinds[index] for index in both}
+    ]
+    return replace(scene_of_rows(scene, kept), bodies=tuple(bodies))
+
+
+def stopped_state(
+    places: RunPlaces, *, at: float, frozen: Mapping[str, float], keep: Collection[str] = ()
+) -> StoppedState:
+    """The state of a run at a time, some robots at another one.
+
+    Args:
+        places: The phases of the run.
+        at: Time of the program in [s].
+        frozen: Time of the program at which a robot stands instead, by its name.
+        keep: Names of the robots that are to stand still.
+
+    Raises:
+        InputError: A time is outside of the program or where it has no rows, there is no such robot, a joint fails in
+            the run, or robots that hold the part together stand at different times.
+    """
+    cell, motion = places.cell, places.motion
+    names = [robot.name for robot in cell.robots]
+    _require_time(motion, at, "--at")
+    for option, given in (("--frozen", frozen), ("--keep", keep)):
+        for name in given:
+            if name not in names:
+                raise InputError(f"{option}: expected the name of a robot ({listed(names)}), got '{name}'")
+    for name, time in frozen.items():
+        _require_time(motion, time, f"--frozen {name}")
+    if cell.motion.locked:
+        raise InputError("--at: expected a run in which no joint fails, got one with motion.locked_joints")
+    times = {name: float(frozen.get(name, at)) for name in names}
+    holders = {name: times[name] for name in cell.positioners}
+    if len(set(holders.values())) > 1:
+        stated = listed(f"{name}@{time:g}" for name, time in holders.items())
+        raise InputError(f"--frozen: expected one time for all robots that hold the part together, got {stated}")
+    q = np.concatenate([_at(motion, times[name])[cell.columns(name)] for name in names])
+    held_at = next(iter(holders.values()), at)
+    return StoppedState(
+        at=float(at),
+        times=times,
+        kept=tuple(name for name in names if name in set(keep)),
+        q=q,
+        place=places.at(at),
+        lying=places.lying_at(places.at(held_at)),
+    )
+
+
+def _require_time(motion: Motion, time: float, option: str) -> None:
+    """Refuse a time at which the program has no rows."""
+    end = float(motion.times[-1])
+    if not -END <= time <= end + END:
+        raise InputError(f"{option}: expected a time of the program, 0 to {end:g} s, got {time:g}")
+    for row, name in motion.gaps.items():
+        if motion.times[row - 1] < time < motion.times[row]:
+            raise InputError(
+                f"{option}: expected a time at which the program has rows, got {time:g}, in the motion '{name}' that "
+                "is not part of it"
+            )
+
+
+def _at(motion: Motion, time: float) -> Array:
+    """Stacked joint positions at a time, linear between rows, shape (nq,)."""
+    return np.array([np.interp(time, motion.times, column) for column in motion.q.T])

@@ -1,0 +1,140 @@
+"""Ways back: the program played backwards from a stopped state, which its certificate says is free."""
+
+from collections.abc import Collection, Iterator
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.errors import TransferNotFoundError
+from cellplan.geometry.transforms import Array
+from cellplan.pipeline.plan.retiming import transfer_retimer
+from cellplan.pipeline.recover.phases import SAME, RecoveryKind, RecoveryPhase, joints_of, moving
+from cellplan.pipeline.recover.state import RunPlaces, StoppedState
+from cellplan.planning.recovery.rows_path import RowsPath, timed_rows
+from cellplan.scene.scene import Scene
+
+
+class WaysBack:
+    """The program backwards.
+
+    Attributes:
+        refused: Receives why it is not played backwards, or not farther.
+    """
+
+    def __init__(self, places: RunPlaces, state: StoppedState, fixed: Collection[str], refused: list[str]) -> None:
+        """Prepare; nothing is planned yet.
+
+        Args:
+            places: The phases of the run.
+            state: The stopped state.
+            fixed: Names of the robots that are to stand still.
+            refused: See above.
+        """
+        self._places, self._state, self._fixed, self.refused = places, state, set(fixed), refused
+
+    def ways(self) -> Iterator[tuple[RecoveryPhase, ...]]:
+        """What is done before robots leave the part: nothing, or the program backwards, less or more of it."""
+        yield ()
+        if not self._state.is_on_program:
+            self.refused.append("the way back along the program is not open, as robots stand at different times of it")
+            return
+        made: list[RecoveryPhase] = []
+        tried = 0
+        for place in self._backwards():
+            phase = self._back(place)
+            if isinstance(phase, str):
+                self.refused.append(phase)
+                break
+            if phase is None:
+                continue
+            made.append(phase)
+            if not tried:
+                yield tuple(made)
+            tried += 1
+        if tried > 1:
+            yield tuple(made)
+
+    def _backwards(self) -> Iterator[int]:
+        """Places of the phases back from the stopped state, while the part stays where it is and nothing is between."""
+        place = self._state.place
+        gaps, stages = self._places.motion.gaps, self._places.stages
+        while True:
+            yield place
+            if place == 0 or not stages or self._places.rows(place).start in gaps or place % len(stages) == 0:
+                return
+            place -= 1
+            if self._places.lying_at(place) is not self._state.lying:
+                return
+
+    def _back(self, place: int) -> RecoveryPhase | str | None:
+        """A phase of the program from its end, or the stopped state, back to its beginning; a refusal in words."""
+        path = self._path_back(place)
+        if path is None:
+            return None
+        robots = moving(self._places.cell, path.q)
+        kept = sorted(set(robots) & self._fixed)
+        name = self._places.phases[place].name
+        if kept:
+            return f"the way back along '{name}' moves '{kept[0]}', which is to stand still"
+        scene = self._places.scene_of_phase(place)
+        q = timed_rows(path, transfer_retimer(scene))
+        if not certify(scene, q, with_minimum=False).is_kept:
+            return f"the way back along '{name}' is not certified"
+        begin = float(self._places.motion.times[self._places.rows(place).start])
+        words = f"back along the program to the beginning of '{name}' at {begin:g} s"
+        return RecoveryPhase(kind=RecoveryKind.BACK, robots=robots, words=words, q=q, place=place)
+
+    def _path_back(self, place: int) -> RowsPath | None:
+        """The program from the stopped state, or the end of a phase, to its beginning; None where that is no way."""
+        motion, rows = self._places.motion, self._places.rows(place)
+        last = self._state.at if place == self._state.place else float(motion.times[rows.stop - 1])
+        inner = [row for row in range(rows.start, rows.stop) if motion.times[row] < last - SAME]
+        if not inner:
+            return None
+        end = self._state.q if place == self._state.place else motion.q[rows.stop - 1]
+        q = np.concatenate([end[None], motion.q[inner][::-1]])
+        return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), q)
+
+
+class HoldersBack:
+    """Robots that hold the part together, back along the program while all others stand."""
+
+    def __init__(self, places: RunPlaces, state: StoppedState, scene: Scene) -> None:
+        """Prepare; nothing is planned yet.
+
+        Args:
+            places: The phases of the run.
+            state: The stopped state.
+            scene: The scene of the recovery.
+        """
+        self._places, self._state, self._scene = places, state, scene
+        self._group = scene.cell.positioners
+
+    def phase(self, q: Array) -> RecoveryPhase:
+        """The holders of the part as they came while all others stand.
+
+        Raises:
+            TransferNotFoundError: Something is in their way.
+        """
+        named = ", ".join(self._group)
+        place = self._places.at(self._state.times[self._group[0]])
+        first = self._places.motion.q[self._places.rows(place).start]
+        path = self._path_of_group(place, q, first)
+        if path is None or set(self._state.kept) & set(self._group):
+            raise TransferNotFoundError(f"{named} hold the part together and cannot be moved one by one")
+        rows = timed_rows(path, transfer_retimer(self._scene))
+        if not certify(self._scene, rows, with_minimum=False).is_kept:
+            raise TransferNotFoundError(f"{named} cannot go back together while the others stand: a body is in the way")
+        words = f"{named} together back along the program"
+        return RecoveryPhase(kind=RecoveryKind.HOLDERS_BACK, robots=self._group, words=words, q=rows)
+
+    def _path_of_group(self, place: int, q: Array, first: Array) -> RowsPath | None:
+        """The way of the holders back to the beginning of a phase; None where that is not where the program begins."""
+        motion, rows, columns = self._places.motion, self._places.rows(place), joints_of(self._places.cell, self._group)
+        last = self._state.times[self._group[0]]
+        inner = [row for row in range(rows.start, rows.stop) if motion.times[row] < last - SAME]
+        if not inner or np.any(np.abs(first - motion.q[0])[columns] > SAME):
+            return None
+        way = np.tile(q, (len(inner) + 1, 1))
+        way[1:, columns] = motion.q[inner][::-1][:, columns]
+        return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), way)

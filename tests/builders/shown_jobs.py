@@ -1,0 +1,108 @@
+"""Small export jobs whose programs the hand-over pages show in full."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from builders.export_jobs import cell_of, controlled, job_of, positioner_model
+from builders.rapid_jobs import multimove_cell
+from builders.scene_builders import arm_model
+from builders.stream_jobs import with_latency
+from cellplan.geometry.transforms import Array, pose
+from cellplan.model.cell import Robot, Tool
+from cellplan.model.controllers import ControllerKind, Handshake
+from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.robot import RobotModel
+
+ARMS = {
+    "weld": [
+        [0, -90, 90, 0, 0, 0],
+        [4.125, -88.31, 91.02, 0, 12.5, -3],
+        [8, -87, 92, 0, 20, -6],
+        [10, -85, 92.5, 0, 22, -7],
+    ],
+    "hold": [[0, -90, 90, 0, 45, 0], [0, -90, 90, 0, 45, 0], [5, -90, 90, 0, 45, 0], [5, -90, 90, 0, 45, 0]],
+}  # [deg] four rows of two arms
+TABLE = [[0, 0], [0.5, -1], [1.5, -3], [2, -4]]  # [deg] four rows of a positioner
+NUMBERS = {"weld": Handshake(output="10", inputs={"hold": "11"}), "hold": Handshake(output="20", inputs={"weld": "21"})}
+NAMES = {
+    "weld": Handshake(output="doThere", inputs={"hold": "diGo"}),
+    "hold": Handshake(output="doThere", inputs={"weld": "diGo"}),
+}
+STANDARD = {"weld": Handshake(output="1", inputs={"hold": "0"}), "hold": Handshake(output="1", inputs={"weld": "0"})}
+STEP = 0.04  # [s] between rows of the synchronised program
+SLOW_CYCLE = 0.02  # [s] of the stream, so that its rest takes few rows
+
+
+def waiting_arms(kind: ControllerKind, signals: Mapping[str, Handshake]) -> ExportJob:
+    """Two arms, four rows, one mark at the third row."""
+    tools = {"weld": 1, "hold": None}
+    model = _named("kr16")
+    robots = [controlled(n, model, handshake=signals[n], tool_number=tools[n]) for n in ARMS]
+    rows = {name: _rows(name, q, times=np.arange(4.0), marks=(2,)) for name, q in ARMS.items()}
+    return job_of(cell_of(*robots, kind=kind), ProgramRows(name=None, robots=rows), blend=0.1)
+
+
+def arm_and_positioner() -> ExportJob:
+    """An arm and a positioner in step on one controller; no tool is in process."""
+    cell = multimove_cell({"weld": _named("arm"), "table": positioner_model()})
+    torch = Tool(X_FT=pose((0.0, 0.0, 0.15)), bodies=(), mass=1.5)
+    cell = replace(
+        cell, robots=tuple(replace(each, tool=torch) if each.name == "weld" else each for each in cell.robots)
+    )
+    times = np.arange(4) * STEP
+    rows = {"weld": _rows("weld", ARMS["weld"], times=times), "table": _rows("table", TABLE, times=times)}
+    return job_of(cell, ProgramRows(name=None, robots=rows), promise=Promise.SYNCHRONISED, blend=0.25)
+
+
+def timed_table(kind: ControllerKind = ControllerKind.OTHER) -> ExportJob:
+    """A positioner whose rows have times, in process in the middle."""
+    table = controlled("table", positioner_model())
+    times = np.arange(4) * 0.5
+    speeds = np.deg2rad([[0, 0], [1.5, -3], [1.5, -3], [0, 0]])
+    process = np.array([False, True, True, False])
+    rows = _rows("table", TABLE, times=times, qd=speeds, process=process)
+    return job_of(cell_of(table, kind=kind), ProgramRows(name=None, robots={"table": rows}), promise=Promise.TIMED)
+
+
+def streamed_table() -> ExportJob:
+    """A positioner at the cycle of its controller, at rest for 0.1 s at both ends."""
+    table = controlled("table", positioner_model(), cycle=SLOW_CYCLE)
+    share = np.clip((np.arange(16) - 5) / 5, 0.0, 1.0)
+    q = np.outer(share**3 * (10 - 15 * share + 6 * share**2), [0.1, -0.2])
+    process = (share > 0.0) & (share < 1.0)
+    rows = _rows("table", q, times=np.arange(16) * SLOW_CYCLE, process=process)
+    cell = cell_of(table, kind=ControllerKind.KUKA)
+    return job_of(cell, ProgramRows(name=None, robots={"table": rows}), promise=Promise.TIMED)
+
+
+def streamed_arm() -> ExportJob:
+    """An arm at the cycle of its controller, at rest for 0.1 s at both ends."""
+    arm = controlled("weld", _named("arm"), cycle=SLOW_CYCLE)
+    share = np.clip((np.arange(16) - 5) / 5, 0.0, 1.0)
+    q = np.array(ARMS["weld"][0], dtype=float) + np.outer(share**2 * (3 - 2 * share), [1, 2, -1, 0, 3, 1])
+    rows = _rows("weld", q, times=np.arange(16) * SLOW_CYCLE)
+    cell = cell_of(arm, kind=ControllerKind.KUKA)
+    return job_of(cell, ProgramRows(name=None, robots={"weld": rows}), promise=Promise.TIMED)
+
+
+def servoed_arm() -> ExportJob:
+    """An arm that follows four rows at the cycle of its controller."""
+    arm: Robot = controlled("weld", _named("arm"), cycle=0.008)
+    start = np.array(ARMS["weld"][0], dtype=float)
+    q = start + np.outer([0.0, 0.001, 0.003, 0.004], [1, 2, -1, 0, 3, 1])
+    rows = _rows("weld", q, times=np.arange(4) * 0.008)
+    cell = with_latency(cell_of(arm, kind=ControllerKind.UR), 0.1)
+    return job_of(cell, ProgramRows(name=None, robots={"weld": rows}), promise=Promise.TIMED)
+
+
+def _named(name: str) -> RobotModel:
+    """An arm whose joints are called as on a controller."""
+    arm = arm_model()
+    return replace(arm, name=name, joints=tuple(replace(each, name=each.name.upper()) for each in arm.joints))
+
+
+def _rows(robot: str, q: object, *, times: Array, **others: object) -> RobotRows:
+    """Rows of a robot from degrees."""
+    return RobotRows(robot=robot, q=np.deg2rad(np.array(q, dtype=float)), times=times, **others)  # type: ignore[arg-type]

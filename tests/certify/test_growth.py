@@ -1,0 +1,81 @@
+"""Pairs that begin nearer than is demanded only come apart: discs of which the distance is known in closed form."""
+
+import numpy as np
+import pytest
+from builders.transfer_cells import gantry, scene_of
+
+from cellplan.certify.growth import certify_growth, rows_too_near, sampled_growth, scene_at_stop
+from cellplan.geometry.transforms import Array
+from cellplan.scene.scene import Scene
+
+RADII = 0.2  # [m] of both discs together
+DEMAND = 0.005  # [m]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """Two discs that slide in one plane."""
+    return scene_at_stop(scene_of(gantry("a"), gantry("b")))
+
+
+def apart(*distances: float) -> Array:
+    """Rows in which the second disc is so far from the first, each distance signed, in [m]."""
+    way = np.interp(np.linspace(0, len(distances) - 1, 40), np.arange(len(distances)), distances)
+    return np.column_stack([np.zeros((40, 2)), RADII + way, np.zeros(40)])
+
+
+@pytest.mark.parametrize("begin", [-0.03, -1e-4, 0.001, 0.004])
+def test_discs_that_part_are_proved_and_their_distances_are_the_closed_form(scene: Scene, begin: float) -> None:
+    growth = certify_growth(scene, apart(begin, 0.05))
+
+    (pair,) = growth.apart
+    assert growth.is_proved
+    assert growth.is_clear
+    tolerance = 1e-4 + 2e-3 * abs(begin)  # of a depth
+    assert pair.begin == pytest.approx(begin, abs=tolerance)
+    assert pair.end == pytest.approx(0.05, abs=1e-4)
+    rows = apart(begin, 0.05)[:, 2] - RADII
+    assert pair.row is not None
+    assert rows[pair.row] >= DEMAND
+
+
+@pytest.mark.parametrize(
+    "way", [(-0.02, -0.025, 0.05), (-0.001, -0.002, 0.05), (0.003, 0.002, 0.05), (0.002, 0.05, 0.002)]
+)
+def test_discs_that_come_nearer_on_the_way_are_a_fault(scene: Scene, way: tuple[float, ...]) -> None:
+    growth = certify_growth(scene, apart(*way))
+
+    assert not growth.is_proved
+    assert growth.faults[0][0] == ("a/disc", "b/disc")
+
+
+def test_discs_that_part_by_too_little_are_proved_but_not_clear(scene: Scene) -> None:
+    growth = certify_growth(scene, apart(-0.001, 0.003))
+
+    assert growth.is_proved
+    assert not growth.is_clear
+    assert growth.apart[0].row is None
+
+
+def test_a_pair_that_begins_with_its_demand_has_to_keep_it(scene: Scene) -> None:
+    kept, lost = certify_growth(scene, apart(0.02, 0.006)), certify_growth(scene, apart(0.02, 0.004))
+
+    assert (kept.is_clear, kept.apart) == (True, ())
+    assert not lost.is_proved
+
+
+def test_a_search_finds_what_the_proof_finds(scene: Scene) -> None:
+    for way in [(-0.02, 0.05), (0.001, 0.05), (-0.02, -0.025, 0.05)]:
+        near = rows_too_near(scene, apart(*way)[0])
+        found = sampled_growth(scene, apart(*way), near=near, moved=range(len(scene.pairs)))
+        assert found.is_clear == certify_growth(scene, apart(*way)).is_clear
+
+
+def test_the_pairs_that_are_too_near_are_those_below_the_demand(scene: Scene) -> None:
+    assert [bool(rows_too_near(scene, apart(d, d)[0])) for d in (-0.01, 0.0, 0.0049, 0.0052, 0.1)] == [
+        True,
+        True,
+        True,
+        False,
+        False,
+    ]

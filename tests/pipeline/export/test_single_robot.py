@@ -1,0 +1,64 @@
+"""A cell of one robot: nobody waits for it, so its programs of every maker have no handshakes."""
+
+from dataclasses import replace
+
+import pytest
+
+from cellplan import VerifiedRun, load_cell, open_gate, solve, write_run
+from cellplan.model.controllers import Controller, ControllerKind, RobotControl
+from cellplan.model.verified_run import ACCESS_TOKEN
+from cellplan.pipeline.export.choice import Choice
+from cellplan.pipeline.export.program import exported
+
+CELL = """\
+cellplan: 1
+name: alone
+robots:
+  pen:
+    model: kuka_kr6
+    base: {xyz_mm: [0, -1100, 0], rpy_deg: [0, 0, 90]}
+    tool: {xyz_mm: [0, 0, 150], geometry: {capsule: {radius_mm: 12, length_mm: 150}}}
+part:
+  geometry: {box: {size_mm: [600, 300, 200]}}
+  at: {xyz_mm: [0, 0, 900]}
+tasks:
+  line:
+    robot: pen
+    path: {polyline: {points_mm: [[-20, 0], [20, 0]], plane: xz}, project: -y}
+    tool_axis: normal
+motion: {mode: part_at_rest, duration_s: 1, step_s: 0.02, time_law: quintic}
+"""
+WAITS = {"krl": ("$OUT", "WAIT"), "rapid": ("SetDO", "WaitDI"), "urscript": ("digital",), "val3": ("dio", "wait(")}
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
+    folder = tmp_path_factory.mktemp("alone")
+    (folder / "alone.yaml").write_text(CELL, encoding="utf-8")
+    write_run(solve(load_cell(folder / "alone.yaml")), folder / "run")
+    return open_gate(folder / "run", cell=folder / "alone.yaml")
+
+
+@pytest.mark.parametrize(
+    ("form", "kind"),
+    [
+        ("krl", ControllerKind.KUKA),
+        ("rapid", ControllerKind.ABB),
+        ("urscript", ControllerKind.UR),
+        ("val3", ControllerKind.STAUBLI),
+    ],
+)
+def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str, kind: ControllerKind) -> None:
+    control = RobotControl(controller="c", task="T_ROB1" if kind is ControllerKind.ABB else None)
+    tasks = {"T_ROB1": "ROB_1"} if kind is ControllerKind.ABB else {}
+    cell = replace(
+        alone.cell,
+        robots=(replace(alone.cell.robots[0], control=control),),
+        controllers={"c": Controller(name="c", kind=kind, tasks=tasks)},
+    )
+
+    files, record = exported(replace(alone, cell=cell, token=ACCESS_TOKEN), form, Choice())
+
+    assert record["promise"] == "sequence only"
+    assert record["marks"] == []
+    assert not [word for text in files.values() for word in WAITS[form] if word in text.replace("waitEndMove()", "")]
