@@ -12,7 +12,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent
 sys.path.insert(0, str(DOCS))
 
-from reproduction import davies_planar, ellipse, filtered, nicolato, places, planar_search, ribeiro, vargas  # noqa: E402
+from reproduction import choices, davies_planar, ellipse, filtered, nicolato, places, planar_search, ribeiro, vargas  # noqa: E402
 from reproduction.page import lines, page  # noqa: E402
 from reproduction.runs import Numbers, rounded  # noqa: E402
 
@@ -37,6 +37,7 @@ CASES: dict[str, Callable[[], Numbers]] = {
     "vargas_filter": filtered.measure,
     "nicolato_planar": planar_search.measure,
     "nicolato_cooperation": ribeiro.measure_search,
+    "choices": choices.measure,
 }
 
 
@@ -50,9 +51,10 @@ def main(words: list[str]) -> None:
     if unknown := set(words) - set(CASES) - {"--page"}:
         raise SystemExit(f"expected --page or some of {', '.join(CASES)}, got {', '.join(sorted(unknown))}")
     numbers = recorded()
-    for name, measure in CASES.items():
-        if name in words or not words:
-            numbers[name] = rounded(measure())
+    chosen = [name for name in CASES if name in words or not words]
+    for count, name in enumerate(chosen, start=1):
+        sys.stderr.write(f"{count} of {len(chosen)}: {name}\n")
+        numbers[name] = rounded(CASES[name]())
     record = {name: numbers[name] for name in CASES if name in numbers}
     RECORD.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     LINES.write_text(json.dumps(lines(record), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -29,14 +29,20 @@ class MethodTraits:
         has_null_space: Whether goals besides the tasks can be pursued in the null space of the task Jacobian.
         feeds_back: Whether the pose error is fed back with the gain of the solver; searches minimise it directly.
         takes_euler_steps: Whether a joint step is a joint velocity times the time step.
-        is_accurate: Whether the motion can also be resolved by collocation (the integrator ``accurate``).
+        steps_because: Why the motion can only be stepped along the clock, as a predicate of the method; empty where it
+            can also be resolved by collocation (the integrator ``accurate``).
     """
 
     label: str
     has_null_space: bool = True
     feeds_back: bool = True
     takes_euler_steps: bool = False
-    is_accurate: bool = False
+    steps_because: str = ""
+
+    @property
+    def is_accurate(self) -> bool:
+        """Whether the motion can also be resolved by collocation (the integrator ``accurate``)."""
+        return not self.steps_because
 
     @property
     def is_search(self) -> bool:
@@ -44,22 +50,31 @@ class MethodTraits:
         return not self.feeds_back
 
 
+BY_FEEDBACK: Final = "follows the path only as far as the feedback of its errors takes it"
+AT_SAMPLES: Final = "is defined at the samples alone"
 METHODS: Final[Mapping[MethodName, MethodTraits]] = MappingProxyType(
     {
-        "weighted_pseudo_inverse": MethodTraits(
-            label="weighted pseudo-inverse", takes_euler_steps=True, is_accurate=True
+        "weighted_pseudo_inverse": MethodTraits(label="weighted pseudo-inverse", takes_euler_steps=True),
+        "damped_least_squares": MethodTraits(
+            label="damped least squares", takes_euler_steps=True, steps_because="leaves the path where it damps"
         ),
-        "damped_least_squares": MethodTraits(label="damped least squares", takes_euler_steps=True),
-        "jacobian_transpose": MethodTraits(label="Jacobian transpose", has_null_space=False),
-        "filtered_inverse": MethodTraits(label="filtered inverse I"),
-        "filtered_inverse_ii": MethodTraits(label="filtered inverse II"),
+        "jacobian_transpose": MethodTraits(label="Jacobian transpose", has_null_space=False, steps_because=BY_FEEDBACK),
+        "filtered_inverse": MethodTraits(label="filtered inverse I", steps_because=BY_FEEDBACK),
+        "filtered_inverse_ii": MethodTraits(label="filtered inverse II", steps_because=BY_FEEDBACK),
         "heuristic_search": MethodTraits(
-            label="heuristic search, the best joint first", has_null_space=False, feeds_back=False
+            label="heuristic search, the best joint first",
+            has_null_space=False,
+            feeds_back=False,
+            steps_because=AT_SAMPLES,
         ),
         "recursive_search": MethodTraits(
-            label="recursive search, joint by joint", has_null_space=False, feeds_back=False
+            label="recursive search, joint by joint", has_null_space=False, feeds_back=False, steps_because=AT_SAMPLES
         ),
-        "quadratic_program": MethodTraits(label="quadratic program", takes_euler_steps=True),
+        "quadratic_program": MethodTraits(
+            label="quadratic program",
+            takes_euler_steps=True,
+            steps_because="gives up part of a task at a limit, and limits accelerations from step to step",
+        ),
     }
 )
 NULL_SPACE_METHODS: Final = tuple(sorted(name for name, traits in METHODS.items() if traits.has_null_space))

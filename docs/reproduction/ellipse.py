@@ -39,6 +39,7 @@ tasks:
     axes: [x, y]
 {words}    tolerance: {{position_mm: 0.01}}
 motion: {{duration_s: {duration:g}, step_s: 0.001}}
+acceleration: {{unlimited: the path of the source starts and ends at speed}}
 solver: {{method: recursive_search, integrator: euler, search: {{tolerance_mm: 0.01, brakes: true}}}}
 """
 HEADER = """\

@@ -3,13 +3,16 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from reproduction import pages
+from reproduction.pages import ALGORITHM, FIGURE, PAGES, TABLE
+
 REPRODUCED = "reproduced"
 DIFFERS = "differs"
 CHOSEN = "chosen"
+CIRCULAR = "circular"
 USED = "used"
 NOT_ATTEMPTED = "not attempted"
 
-FIGURE, TABLE, ALGORITHM = "Fig.", "Tab.", "Alg."
 PICTURE = "an illustration without a result"
 OTHERS = "the literature, not a result of the thesis"
 
@@ -32,11 +35,17 @@ class Entry:
     verdict: str
     where: str
 
-    def text(self) -> str:
-        """The line in Markdown."""
-        first, last = self.numbers[0], self.numbers[-1]
-        named = f"{self.kind} {first}" if first == last else f"{self.kind} {first} to {last}"
-        return f"| {named} | {self.shows} | {self.verdict} | {self.where} |"
+    def text(self, paper: str) -> str:
+        """The line in Markdown, with the pages on which the items stand."""
+        named = f"{self.kind} {_span(self.numbers)}"
+        on = _span(tuple(str(PAGES[paper][self.kind][number]) for number in self.numbers))
+        return f"| {named} | {on} | {self.shows} | {self.verdict} | {self.where} |"
+
+
+def _span(numbers: Sequence[str]) -> str:
+    """The first and the last of several numbers."""
+    first, last = numbers[0], numbers[-1]
+    return first if first == last else f"{first} to {last}"
 
 
 def entry(kind: str, numbers: str, shows: str, verdict: str, where: str) -> Entry:
@@ -99,7 +108,7 @@ NICOLATO = (
     entry(FIGURE, "4.6", "ellipse by pseudo-inverse", REPRODUCED, "ellipse above"),
     entry(FIGURE, "4.7", "ellipse by recursive search", REPRODUCED, "ellipse above: from the second cycle on"),
     entry(TABLE, "4.2", "Denavit-Hartenberg parameters of the PUMA type", USED, "`nicolato_puma.yaml`"),
-    entry(FIGURE, "4.8", "position and orientation", REPRODUCED, "pose above; its errors are the stopping rule"),
+    entry(FIGURE, "4.8", "position and orientation", CIRCULAR, "pose above: its errors are the stopping rule"),
     entry(
         TABLE,
         "4.3",
@@ -141,7 +150,7 @@ NICOLATO = (
 
 MODE = "distribution of work above, by joint; curves depend on the layout, which is ours"
 SIZE = "largest position errors above: the gain was chosen for their size"
-ERRORS = "components of these errors; their largest norm is in the table of errors"
+PARTS = "components above: no number of them is in the text, and the gain was chosen for the size"
 ROBOT = "bundled robot; the limits and screws of the table"
 RIBEIRO = (
     entry(FIGURE, "1", "what goes into the model and comes out", NOT_ATTEMPTED, PICTURE),
@@ -169,23 +178,30 @@ RIBEIRO = (
     entry(FIGURE, "35", "first layout: REIS touches the floor", DIFFERS, "first layout above: ours is on a plinth"),
     entry(FIGURE, "36", "final layout", NOT_ATTEMPTED, "numbers are not in the text; ours: `ribeiro_mode_1`"),
     entry(FIGURE, "37-39", "mode 1: position errors", CHOSEN, SIZE),
-    entry(FIGURE, "40-42", "mode 1: components of the errors", NOT_ATTEMPTED, ERRORS),
+    entry(FIGURE, "40-42", "mode 1: components of the errors", CHOSEN, PARTS),
     entry(FIGURE, "43-44", "mode 1: REIS, positions and speeds", DIFFERS, MODE),
     entry(FIGURE, "45-46", "mode 1: KUKA, positions and speeds", DIFFERS, MODE),
     entry(FIGURE, "47-48", "mode 1: ABB, positions and speeds", DIFFERS, MODE),
     entry(FIGURE, "49-50", "mode 1: STAUBLI, positions and speeds", DIFFERS, MODE),
     entry(FIGURE, "51-53", "mode 2: position errors", CHOSEN, SIZE),
-    entry(FIGURE, "54", "mode 2, circle: components of the errors", NOT_ATTEMPTED, ERRORS),
+    entry(FIGURE, "54", "mode 2, circle: components of the errors", CHOSEN, PARTS),
     entry(FIGURE, "55-58", "mode 2, circle: REIS and KUKA", DIFFERS, MODE),
-    entry(FIGURE, "59", "mode 2, rhombus: components of the errors", NOT_ATTEMPTED, ERRORS),
+    entry(FIGURE, "59", "mode 2, rhombus: components of the errors", CHOSEN, PARTS),
     entry(FIGURE, "60-63", "mode 2, rhombus: REIS and ABB", DIFFERS, MODE),
-    entry(FIGURE, "64", "mode 2, rectangle: components of the errors", NOT_ATTEMPTED, ERRORS),
+    entry(FIGURE, "64", "mode 2, rectangle: components of the errors", CHOSEN, PARTS),
     entry(FIGURE, "65-68", "mode 2, rectangle: REIS and STAUBLI", DIFFERS, MODE),
     entry(FIGURE, "69-70", "mode 3: position errors of circle and rhombus", CHOSEN, SIZE),
     entry(FIGURE, "71", "mode 3: position error of the rectangle", DIFFERS, "18 times as large in our layout"),
     entry(FIGURE, "72-73", "mode 3: KUKA, positions and speeds", DIFFERS, MODE),
     entry(FIGURE, "74-75", "mode 3: ABB, positions and speeds", DIFFERS, MODE),
-    entry(FIGURE, "76-77", "mode 3: STAUBLI D4 and F4 beyond their limits", REPRODUCED, "distribution of work above"),
+    entry(
+        FIGURE,
+        "76",
+        "mode 3: STAUBLI, positions; D4 and F4 beyond their limits",
+        DIFFERS,
+        "distribution of work above: both pass a limit, but each the other one",
+    ),
+    entry(FIGURE, "77", "mode 3: STAUBLI, speeds; D4 and F4 too fast", REPRODUCED, "distribution of work above"),
     entry(FIGURE, "78-85", "frames, rotations, Denavit-Hartenberg, velocities", NOT_ATTEMPTED, PICTURE),
     entry(FIGURE, "86-92", "screws and their displacements", NOT_ATTEMPTED, PICTURE),
     entry(FIGURE, "93-94", "virtual chains in the plane and in space", USED, "`cellplan explain`; " + PICTURE),
@@ -198,23 +214,23 @@ RIBEIRO = (
     entry(FIGURE, "104", "null space of a Jacobian", NOT_ATTEMPTED, PICTURE),
     entry(FIGURE, "105-106", "two planar arms, virtual chain and graph", USED, "`ribeiro_appendix_e.yaml`"),
     entry(FIGURE, "107", "error of two arms without feedback", REPRODUCED, "Appendix E above: E.15 against E.16"),
-    entry(FIGURE, "108-109", "joints of the two arms", NOT_ATTEMPTED, "dimensions and path are not in the text"),
+    entry(FIGURE, "108-109", "joints of the two arms", DIFFERS, "Appendix E above: dimensions and path are ours"),
     entry(FIGURE, "110", "errors of the two arms", REPRODUCED, "Appendix E above"),
     entry(FIGURE, "111", "the two arms at four times", NOT_ATTEMPTED, PICTURE),
 )
 
-LISTS = {"Vargas, Leite and Costa 2012": VARGAS, "Nicolato 2007": NICOLATO, "Ribeiro 2010": RIBEIRO}
-HEAD = "| item | shows | verdict | where, or why not |\n|---|---|---|---|"
+LISTS = {pages.VARGAS: VARGAS, pages.NICOLATO: NICOLATO, pages.RIBEIRO: RIBEIRO}
+HEAD = "| item | page | shows | verdict | where, or why not |\n|---|---|---|---|---|"
 
 
 def listing() -> str:
     """The three tables in Markdown, with the count of every verdict."""
-    return "\n\n".join(f"### {paper}\n\n{_counts(found)}\n\n{_table(found)}" for paper, found in LISTS.items())
+    return "\n\n".join(f"### {paper}\n\n{_counts(found)}\n\n{_table(paper, found)}" for paper, found in LISTS.items())
 
 
-def _table(entries: Sequence[Entry]) -> str:
+def _table(paper: str, entries: Sequence[Entry]) -> str:
     """One table."""
-    return "\n".join([HEAD, *(each.text() for each in entries)])
+    return "\n".join([HEAD, *(each.text(paper) for each in entries)])
 
 
 def _counts(entries: Sequence[Entry]) -> str:
@@ -226,4 +242,4 @@ def _counts(entries: Sequence[Entry]) -> str:
 
 def _order() -> Iterator[str]:
     """Verdicts in the order in which they are counted."""
-    yield from (REPRODUCED, DIFFERS, CHOSEN, USED, NOT_ATTEMPTED)
+    yield from (REPRODUCED, DIFFERS, CHOSEN, CIRCULAR, USED, NOT_ATTEMPTED)

@@ -11,9 +11,10 @@ from reproduction.page_nicolato import circle_rows, ellipse_rows, limit_rows, li
 from reproduction.page_planar import camera_rows, cooperation_rows, planar_rows
 from reproduction.page_ribeiro import appendix_rows, layout_rows, main_rows, mode_rows, work_rows
 from reproduction.page_vargas import case_rows, filter_rows
+from reproduction.pages import with_pages
 from reproduction.places_in_papers import PLACES
 from reproduction.runs import Numbers
-from reproduction.sources import line_record, source_of, value
+from reproduction.sources import line_record, paper_of, source_of, value
 from reproduction.verdicts import ALONE, CHOSEN, CIRCULAR, NOT, REPRODUCED, Row, shown
 
 TEMPLATE = Path(__file__).resolve().parent / "template.txt"
@@ -47,14 +48,15 @@ def lines(numbers: Numbers) -> list[Numbers]:
 
 def _table(name: str, rows: Sequence[Row]) -> str:
     """One table in Markdown."""
-    return "\n".join([HEAD, *(row.text(source_of(PLACES, name, row).where) for row in rows)])
+    places = [with_pages(paper_of(name), source_of(PLACES, name, row).where) for row in rows]
+    return "\n".join([HEAD, *(row.text(place) for row, place in zip(rows, places, strict=True))])
 
 
 def all_rows(numbers: Numbers) -> dict[str, list[Row]]:
     """The lines of every table by its name in the template."""
-    modes = numbers["ribeiro_modes"]
+    modes, signs = numbers["ribeiro_modes"], numbers["choices"]["signs"]
     return {
-        **{f"vargas_{case}": case_rows(case, numbers[f"vargas_{case}"]) for case in (1, 2, 3)},
+        **{f"vargas_{case}": case_rows(case, numbers[f"vargas_{case}"], signs) for case in (1, 2, 3)},
         "vargas_filter": filter_rows(numbers["vargas_filter"]),
         "nicolato_circle": circle_rows(numbers["nicolato_circle"]),
         "nicolato_line": line_rows(numbers["nicolato_line"]),

@@ -3,7 +3,7 @@
 import math
 
 from reproduction.runs import Numbers
-from reproduction.verdicts import Row, bound, chosen, claim, shown
+from reproduction.verdicts import Row, alone, bound, chosen, claim, shown
 
 PUBLISHED = {  # [mm] largest position errors
     1: {"circle": 0.0016, "rhombus": 0.0015, "rectangle": 0.0015},
@@ -50,7 +50,21 @@ def mode_rows(numbers: Numbers) -> list[Row]:
         for task, error in errors.items()
     ]
     largest = max(max(numbers[f"mode_{mode}"]["errors_mm"].values()) for mode in PUBLISHED)
-    return [*rows, bound("all of them, as allowed", largest, ALLOWED, "mm")]
+    return [*rows, bound("all of them, as allowed", largest, ALLOWED, "mm"), *_component_rows(numbers["components"])]
+
+
+def _component_rows(components: Numbers) -> list[Row]:
+    """Figures 40 to 42, 54, 59 and 64, for which the text states no number."""
+    return [
+        alone(
+            f"mode {mode[-1]}: largest component of position and of orientation",
+            "; ".join(
+                f"{task} {shown(found['position_mm'])} mm and {shown(found['orientation_deg'])} deg"
+                for task, found in tasks.items()
+            ),
+        )
+        for mode, tasks in components.items()
+    ]
 
 
 def _size_row(what: str, ours: float, published: float) -> Row:

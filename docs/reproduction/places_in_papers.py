@@ -71,9 +71,6 @@ NICOLATO: dict[str, dict[str, Source]] = {
             "section 4.1, Fig. 4.2", None, "m", f"{CIRCLE}.dls.error_m", ours_at=f"{CIRCLE}.dls.error_at_s"
         ),
         "DLS: joint speeds": number("section 4.1, Fig. 4.2", None, "rad/s", f"{CIRCLE}.dls.speed_rad_s"),
-        "circle begun towards +z: search": number(
-            "section 4.1, Fig. 4.1", None, "rad/s²", f"{CIRCLE}.upwards.search.acceleration_rad_s2"
-        ),
         "circle begun towards +z: DLS": number("section 4.1, Fig. 4.2", None, "m", f"{CIRCLE}.upwards.dls.error_m"),
     },
     "nicolato_line": {

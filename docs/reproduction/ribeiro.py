@@ -13,6 +13,7 @@ from reproduction.sheet import Sheet, draw, draw_joints
 
 TASKS = {"circle": "kuka", "rhombus": "abb", "rectangle": "staubli"}
 MODES = {1: "all four robots", 2: "two at a time", 3: "part at rest"}
+LOW_GAIN = 15.0  # [1/s] beside 650
 WORN = ("D4", "F4")  # joints of the STAUBLI that break their limits in mode 3
 
 
@@ -20,6 +21,7 @@ def measure_modes() -> Numbers:
     """Solve all three modes and say how far the tools stray and how hard each robot works."""
     reports = {mode: [run.report for run in solve(paper_cell(f"ribeiro_mode_{mode}")).runs] for mode in MODES}
     _draw_errors(reports)
+    _draw_components(reports)
     _draw_positioner(reports[1][0])
     _draw_worn(reports[3][0])
     numbers: Numbers = {f"mode_{mode}": _of_mode(found) for mode, found in reports.items()}
@@ -33,6 +35,9 @@ def measure_modes() -> Numbers:
     }
     numbers["abb"] = {f"mode_{mode}": _of_joints(reports[mode], "abb") for mode in (1, 2, 3)}
     numbers["joints"] = joint_numbers(reports)
+    numbers["components"] = _components(reports)
+    (low,) = solve(paper_cell("ribeiro_mode_1", values={"solver.gain_per_s": LOW_GAIN})).runs
+    numbers["low_gain_mm"] = max(_errors(low.report).values())
     numbers["worn"]["wrist_deg"] = np.rad2deg(np.abs(reports[3][0].q["staubli"][:, 4]).min())
     return numbers
 
@@ -158,6 +163,36 @@ def _draw_errors(reports: Mapping[int, Sequence[Report]]) -> None:
             axes = sheet.panel(f"mode {mode} ({MODES[mode]}): {task}, {robot.upper()}", "time [s]", "[mm]")
             draw(axes, times, {"": 1e3 * np.linalg.norm(error, axis=1)})
     sheet.save("ribeiro_errors")
+
+
+def _components(reports: Mapping[int, Sequence[Report]]) -> Numbers:
+    """Largest component of the position and of the orientation error of each task, in modes 1 and 2."""
+    return {
+        f"mode_{mode}": {
+            each.task: {
+                "position_mm": 1e3 * np.abs(each.position_error).max(),
+                "orientation_deg": np.rad2deg(np.abs(each.orientation_error).max()),
+            }
+            for report in reports[mode]
+            for each in report.accuracy
+        }
+        for mode in (1, 2)
+    }
+
+
+def _draw_components(reports: Mapping[int, Sequence[Report]]) -> None:
+    """Components of the errors in the frame of the part, as in figures 40 to 42, 54, 59 and 64."""
+    sheet = Sheet(3, 4)
+    for task in TASKS:
+        for mode in (1, 2):
+            report = next(each for each in reports[mode] if task in each.tasks)
+            (found,) = [each for each in report.accuracy if each.task == task]
+            title = f"mode {mode}: {task}"
+            axes = sheet.panel(f"{title}, position", "time [s]", "[mm]")
+            draw(axes, report.times, dict(zip("xyz", 1e3 * found.position_error.T, strict=True)))
+            axes = sheet.panel(f"{title}, orientation", "time [s]", "[deg]")
+            draw(axes, report.times, dict(zip("xyz", np.rad2deg(found.orientation_error.T), strict=True)))
+    sheet.save("ribeiro_components")
 
 
 def _draw_positioner(report: Report) -> None:

@@ -1,5 +1,7 @@
 """Sheets of small plots in the form of the papers; the same curves give the same bytes."""
 
+import io
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,8 @@ GREY = "#8a8a8a"
 MOST_POINTS = 1500  # of a curve: more than a screen shows
 LEGEND_ROOM = 0.17  # [-] of the height of a plot
 PANEL = (4.3, 3.0)  # [inch] width and height of one plot
+DRAWN = re.compile(r' (?:d|x|y)="[^"]*"')  # attributes of an SVG that hold coordinates
+COORDINATE = re.compile(r"-?\d+\.\d+")
 
 mpl.use("svg")
 mpl.rcParams.update(
@@ -60,8 +64,19 @@ class Sheet:
         for axes in self._free:
             axes.axis("off")
         IMAGES.mkdir(parents=True, exist_ok=True)
-        self._figure.savefig(IMAGES / f"{name}.svg", metadata={"Date": None, "Creator": "docs/make_reproduction.py"})
+        text = io.StringIO()
+        self._figure.savefig(text, metadata={"Date": None, "Creator": "docs/make_reproduction.py"})
+        (IMAGES / f"{name}.svg").write_text(shortened(text.getvalue()), encoding="utf-8")
         plt.close(self._figure)
+
+
+def shortened(drawing: str) -> str:
+    """An SVG with coordinates to a hundredth of a point: less is rounding, and differs between processors."""
+
+    def short(number: re.Match[str]) -> str:
+        return f"{round(float(number[0]), 2) + 0.0:.2f}".rstrip("0").rstrip(".")
+
+    return DRAWN.sub(lambda attribute: COORDINATE.sub(short, attribute[0]), drawing)
 
 
 def draw(axes: Axes, x: Array, curves: Mapping[str, Array], **words: Any) -> None:

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
+from reproduction.pages import NICOLATO, RIBEIRO, VARGAS, pages_of
 from reproduction.runs import Numbers
 from reproduction.verdicts import ALONE, Row
 
-PAPERS = {"vargas": "Vargas, Leite and Costa 2012", "nicolato": "Nicolato 2007", "ribeiro": "Ribeiro 2010"}
+PAPERS = {"vargas": VARGAS, "nicolato": NICOLATO, "ribeiro": RIBEIRO}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +33,11 @@ class Source:
     ours_at: str = ""
 
 
+def paper_of(table: str) -> str:
+    """The paper that a table of the page is about."""
+    return PAPERS[table.partition("_")[0]]
+
+
 def said(where: str) -> Source:
     """A claim in words."""
     return Source(where=where)
@@ -48,11 +54,13 @@ NOWHERE = said("-")  # ours alone
 def line_record(table: str, row: Row, source: Source, numbers: Numbers) -> Numbers:
     """One line of the page for machines."""
     ours = value(numbers, source.ours) * source.scale if source.ours else None
+    paper = paper_of(table)
     return {
-        "paper": PAPERS[table.partition("_")[0]],
+        "paper": paper,
         "table": table,
         "quantity": row.what,
         "where": source.where,
+        "pages": pages_of(paper, source.where),
         "published": source.published,
         "published_text": row.published,
         "ours": None if ours is None else float(f"{ours:.6g}"),

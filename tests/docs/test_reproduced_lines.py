@@ -221,6 +221,26 @@ def test_the_planar_equations_of_davies_are_a_jacobian(script: ModuleType) -> No
     assert np.linalg.solve(davies.virtual(pose), N_s) == pytest.approx(np.array(differences).T[[2, 1, 0]], abs=1e-8)
 
 
+def test_singular_values_of_the_arm_on_the_circle(script: ModuleType) -> None:
+    q, size = np.array([[0.4, -0.3, 1.9], [0.0, 1.0, -2.9], [-1.2, 0.7, 0.2], [2.0, 1.5, 2.4]]), 1e-6
+    moved = [
+        (dh_poses(THREE_LINKS, q + size * e) - dh_poses(THREE_LINKS, q - size * e))[:, :3, 3] / (2 * size)
+        for e in np.eye(3)
+    ]
+    smallest = np.linalg.svd(np.stack(moved, axis=2), compute_uv=False)[:, -1]
+    found = sys.modules["reproduction.choices"].smallest_singular(*dh_poses(THREE_LINKS, q)[:, :3, 3].T)
+
+    assert found == pytest.approx(smallest, abs=1e-7)
+
+
+def test_choices_that_were_made_agree_with_the_program(script: ModuleType) -> None:
+    numbers = script.recorded()
+    choices, ellipse = numbers["choices"], numbers["nicolato_ellipse"]["pseudo_inverse"]
+
+    assert choices["plane"]["0"] == pytest.approx(numbers["nicolato_circle"]["dls"]["damped_from_s"], abs=0.011)
+    assert choices["ellipse"]["by_reading"]["0+"] == pytest.approx(ellipse["drift_deg"], rel=DIGIT)
+
+
 def test_a_picture_of_the_camera_is_undone_by_its_inverse(script: ModuleType) -> None:
     planar = sys.modules["reproduction.planar_search"]
 
@@ -235,6 +255,29 @@ def test_every_published_value_names_its_place() -> None:
     for line in lines:
         assert bool(places.search(line["where"])) is (line["verdict"] != "ours alone"), line
         assert line["published"] is None or line["verdict"] != "ours alone", line
+
+
+def test_figures_and_tables_follow_each_other_from_page_to_page(script: ModuleType) -> None:
+    """A slip in the list of pages would put an item before one with a smaller number, or have too few of them."""
+    for paper, kinds in sys.modules["reproduction.pages"].PAGES.items():
+        for kind in ITEMS[paper]:
+            found = list(kinds[kind].values())
+            assert set(kinds[kind]) == ITEMS[paper][kind]
+            assert found == sorted(found), (paper, kind)
+
+
+@pytest.mark.parametrize(
+    ("paper", "where", "expected"),
+    [
+        ("Ribeiro 2010", "section 5.3.1, Fig. 33, table 7", [72, 75, 76]),
+        ("Ribeiro 2010", "section 5.4, Figs. 37 to 39 and 51 to 53", [79, 80, 88, 89, 90]),
+        ("Nicolato 2007", "section 5.4.2, Figs. 5.8 and 5.10", [53, 54]),
+        ("Vargas, Leite and Costa 2012", "Eqs. 19 to 23, Fig. 2", [3544]),
+        ("Ribeiro 2010", "Eqs. C.21, E.8 and E.11", []),
+    ],
+)
+def test_pages_of_a_place(script: ModuleType, paper: str, where: str, expected: list[int]) -> None:
+    assert sys.modules["reproduction.pages"].pages_of(paper, where) == expected
 
 
 def test_every_named_place_belongs_to_a_line(script: ModuleType) -> None:
@@ -272,9 +315,9 @@ def test_every_figure_and_table_is_listed_once(script: ModuleType, paper: str) -
 
 def test_every_listed_item_has_a_verdict_and_a_reason(script: ModuleType) -> None:
     listing = sys.modules["reproduction.listing"]
-    verdicts = {"reproduced", "differs", "chosen", "used", "not attempted"}
+    verdicts = {"reproduced", "differs", "chosen", "circular", "used", "not attempted"}
 
-    for entry in [entry for found in listing.LISTS.values() for entry in found]:
+    for paper, entry in [(paper, entry) for paper, found in listing.LISTS.items() for entry in found]:
         assert entry.verdict in verdicts
         assert entry.where
-        assert entry.text() in script.PAGE.read_text(encoding="utf-8")
+        assert entry.text(paper) in script.PAGE.read_text(encoding="utf-8")

@@ -3,6 +3,7 @@
 import importlib
 import json
 import math
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -67,6 +68,13 @@ def test_every_cell_of_the_papers_loads_and_says_what_it_shows(path: Path) -> No
     assert any(word in header[0] for word in ("Nicolato 2007", "Ribeiro 2010", "Vargas, Leite and Costa 2012"))
 
 
+def test_drawings_hold_no_more_digits_than_can_be_seen(script: ModuleType) -> None:
+    shortened = sys.modules["reproduction.sheet"].shortened
+
+    assert shortened('<path d="M 1.23456 -2.000 \nL 30 4.5"/>') == '<path d="M 1.23 -2 \nL 30 4.5"/>'
+    assert shortened('<use x="7.128049" transform="scale(0.015625)"/>') == '<use x="7.13" transform="scale(0.015625)"/>'
+
+
 def test_the_page_says_what_was_measured(script: ModuleType) -> None:
     record = json.loads(RECORD.read_text(encoding="utf-8"))
 
@@ -74,6 +82,7 @@ def test_the_page_says_what_was_measured(script: ModuleType) -> None:
     assert script.PAGE.read_text(encoding="utf-8") == script.page(record), "run: make reproduce"
 
 
+@pytest.mark.slow
 def test_search_passes_the_singular_point_with_the_published_error() -> None:
     (run,) = solve(load_cell(PAPERS / "nicolato_circle.yaml")).runs
 
@@ -90,6 +99,7 @@ def test_damped_least_squares_damps_from_the_published_instant(script: ModuleTyp
     assert run.error.max() > 1e-3
 
 
+@pytest.mark.slow
 def test_search_follows_the_line_on_which_damped_least_squares_fails(script: ModuleType, unwritten: Path) -> None:
     found = script.CASES["nicolato_line"]()
 
@@ -97,6 +107,7 @@ def test_search_follows_the_line_on_which_damped_least_squares_fails(script: Mod
     assert found["dls"]["error_m"] > 0.01
 
 
+@pytest.mark.slow
 def test_limits_of_the_fourth_joint_are_held(script: ModuleType, unwritten: Path) -> None:
     found = script.CASES["nicolato_limits"]()
 
@@ -106,6 +117,7 @@ def test_limits_of_the_fourth_joint_are_held(script: ModuleType, unwritten: Path
     assert max(found["position"]["error_m"], found["speed"]["error_m"]) < 1e-5
 
 
+@pytest.mark.slow
 def test_a_pose_is_followed_and_ends_at_the_published_configuration(script: ModuleType, unwritten: Path) -> None:
     found = script.CASES["nicolato_pose"]()
 
@@ -121,6 +133,11 @@ def test_a_pose_is_followed_and_ends_at_the_published_configuration(script: Modu
         "vargas_2",
         "vargas_3",
         "nicolato_circle",
+        "nicolato_line",
+        "nicolato_limits",
+        "nicolato_pose",
+        "nicolato_cooperation",
+        "choices",
         "ribeiro_modes",
         "ribeiro_first_layout",
         "ribeiro_appendix_e",
@@ -146,6 +163,8 @@ def test_the_shipped_limits_are_those_of_the_procedure(script: ModuleType) -> No
     assert np.abs(robot.model.lower - wide.q.min(axis=0)).max() < room
     assert np.abs(robot.model.upper - wide.q.max(axis=0)).max() < room
     assert np.abs(robot.start - wide.q[-1]).max() < room
+    shipped, made = (PAPERS / "nicolato_ellipse_tightened.yaml").read_text(encoding="utf-8"), ellipse.tightened(wide)
+    assert re.sub(r"[-\d.]+", "#", made) == re.sub(r"[-\d.]+", "#", shipped)
 
 
 @pytest.mark.slow

@@ -150,10 +150,6 @@ class _Brake(NamedTuple):
         """The brake of a joint with limits on both sides."""
         return cls(lower, upper, 0.5 * (lower + upper), 4.0 / max(upper - lower, SMALLEST_TRUST) ** 2)
 
-    def brake(self, q: float) -> float:
-        """Factor of a move towards the nearer limit from a position (Eq. 3.29); moves away from it are whole."""
-        return max(self.scale * (self.upper - q) * (q - self.lower), 0.0)
-
 
 class _Line:
     """The joints of a sequence on one expansion of the cost, which each round moves.
@@ -209,10 +205,12 @@ class _Line:
         gram, factors, lowest, highest = self._plain
         q, slopes, gained = self.q.tolist(), self._slopes.tolist(), 0.0
         for i, row in enumerate(gram):
-            slope, here, limits = slopes[i], q[i], brakes[i]
+            slope, here, brake = slopes[i], q[i], brakes[i]
             move = slope * factors[i]
-            if limits is not None and (slope > 0.0) == (here > limits.middle):
-                move *= limits.brake(here)
+            if brake is not None:
+                lower, upper, middle, scale = brake
+                if (slope > 0.0) == (here > middle):  # Eq. 3.29; moves away from the nearer limit are whole
+                    move *= max(scale * (upper - here) * (here - lower), 0.0)
             reached = min(max(here + move, lowest[i]), highest[i])
             move = reached - here
             if move != 0.0:

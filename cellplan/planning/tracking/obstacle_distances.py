@@ -22,7 +22,7 @@ class ClosestPair:
 
     Attributes:
         row: Index into ``Scene.pairs``.
-        distance: In [m]; negative where they overlap by so much.
+        distance: In [m]; negative where their convex hulls overlap by so much. Reports state 0 for bodies in contact.
         point_a: Nearest point of the pair's first body in the world, shape (3,), in [m].
         point_b: Nearest point of its second body.
         gradient: Change of the distance per joint, shape (nq,), in [m/rad] or [m/m].
