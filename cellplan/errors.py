@@ -59,7 +59,7 @@ class NotVerifiedError(CellplanError):
     """A run on disk is whole, but a check fails on what it holds.
 
     Attributes:
-        findings: What fails, one line each.
+        findings: What fails, one line each; a line that begins with two spaces is a detail of the one before it.
     """
 
     status = ExitStatus.CHECK_FAILED

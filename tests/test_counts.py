@@ -7,7 +7,11 @@ import counts
 import pytest
 
 
-@pytest.mark.parametrize("case", counts.CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=pytest.mark.slow if case.name == "four_robots" else ()) for case in counts.CASES],
+    ids=lambda case: case.name,
+)
 def test_solving_a_cell_takes_no_more_work_than_it_used_to(case: counts.Case) -> None:
     assert counts.grown(case, counts.counted(case)) == []
 

@@ -53,7 +53,9 @@ WRITTEN = {
     "plot_joint": ["outputs/examples/joint.png"],
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],
 }
-MARKS = dict.fromkeys(("gallery/layout_result", "gallery/sweep_into_frame"), pytest.mark.slow)  # with processes
+MARKS = dict.fromkeys(
+    ("gallery/layout_result", "gallery/sweep_into_frame", "layout"), pytest.mark.slow
+)  # with processes
 
 
 def test_every_example_is_run() -> None:

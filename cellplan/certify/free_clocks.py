@@ -158,10 +158,11 @@ class WatchedPairs:
 def watched_pairs(scene: Scene, first: str, second: str) -> WatchedPairs:
     """All pairs of which the one body is carried by the first robot and the other by the second."""
     rows, ends, demands = list[int](), list[tuple[int, int]](), list[float]()
+    robots = [scene.carrier(index).robot for index in range(len(scene.engine.bodies))]
     for row in scene.solid_rows.tolist():
         pair = scene.pairs[row]
         u, v = pair.solids or (0, 0)
-        carriers = scene.carrier(u).robot, scene.carrier(v).robot
+        carriers = robots[u], robots[v]
         if set(carriers) == {first, second}:
             rows.append(row)
             ends.append((u, v) if carriers[0] == first else (v, u))
@@ -249,7 +250,9 @@ class _RegionSearch:
         boxes = self._bounds.sharpened(boxes)
         goals = levels[boxes.pair]
         is_closed = boxes.low >= goals
-        is_cut = ~is_closed & (boxes.is_read | (boxes.gap - HOPE * (boxes.gap - boxes.low) >= goals))
+        is_hopeful = boxes.gap - HOPE * (boxes.gap - boxes.low) >= goals
+        is_large = boxes.reach.sum(axis=1) > RESOLUTION  # in smaller ones rounding is what the bound is too low by
+        is_cut = ~is_closed & (boxes.is_read | (is_hopeful & is_large))
         asked = np.flatnonzero(~is_cut & ~is_closed)
         asked, waiting = asked[:READ_AT_ONCE], asked[READ_AT_ONCE:]
         read, readings = self._bounds.read(boxes.some(asked), goals[asked])

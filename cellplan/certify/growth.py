@@ -24,7 +24,9 @@ from cellplan.certify.certify import certify
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.collision.distance import APART_TOL, exact_reading, measure, quick_reading
+from cellplan.collision.overlap.containment import is_inside
 from cellplan.collision.overlap.depth import overlap_depth
+from cellplan.collision.overlap.sunk_points import SUNK_TOL
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.units import MM
 from cellplan.scene.pairs import Rule, ScenePair
@@ -36,6 +38,8 @@ READING_TOL: Final = 5e-5  # [m] a distance is measured to within this …
 DEPTH_SHARE: Final = 2e-3  # [-] … and a depth to within this share of it beside
 APART: Final = 3e-4  # [m] bodies farther apart than this are judged by the certificate of distances
 MOST_MOMENTS: Final = 4000  # of one pair while it overlaps
+SAMPLED_SHARE: Final = 0.1  # [-] of the depth at the beginning, to which a search measures depths in meshes
+SUNK_SHARE: Final = 0.5  # [-] of the tolerance of depths in meshes, that may be travelled between two of them
 SAMPLED: Final = 10.0  # [-] times that travel for a search, after which everything is proved
 MOST_LOOKED_AT: Final = 60  # rows at which blocks may end
 BLOCKS: Final = 6  # of the motion in which a pair comes apart, each certified with the distance at its beginning
@@ -129,7 +133,7 @@ def rows_too_near(scene: Scene, q: Array) -> list[int]:
             reading = quick_reading(engine, pair.solids, poses, sample=0)
             if not reading.touches and reading.bound < demand:
                 reading = exact_reading(engine, pair.solids, poses, sample=0, reading=reading)
-            is_near = reading.touches or reading.bound < demand
+            is_near = reading.touches or reading.bound < demand or is_inside(engine, pair.solids, poses, sample=0)
         if is_near:
             found.append(row)
     return found
@@ -162,17 +166,21 @@ def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collec
     return Growth.of(kept, [_Separation(scene, row, q, is_sampled=True) for row in near] if kept.is_kept else [])
 
 
-def signed_distances(scene: Scene, pair: ScenePair, q: Array) -> Array:
-    """Distance of a pair at configurations, shape (N, nq), in [m], negative by its depth where it overlaps, (N,)."""
+def signed_distances(scene: Scene, pair: ScenePair, q: Array, *, tolerance: float = SUNK_TOL) -> Array:
+    """Distance of a pair at configurations, shape (N, nq), in [m], negative by its depth where it overlaps, (N,).
+
+    The tolerance in [m] is that of depths in meshes, see ``overlap_depth``.
+    """
     if pair.solids is None:
         return scene.ground_heights(pair, scene.pair_poses((pair.first, pair.first), q))
     poses, found = scene.pair_poses(pair.solids, q), np.empty(len(q))
     for sample in range(len(q)):
         depth = 0.0
         reading = measure(scene.engine, pair.solids, poses, sample=sample)
-        if reading.touches:
-            depth = overlap_depth(scene.engine, pair.solids, poses, sample=sample)
-        found[sample] = reading.bound if not reading.touches else -depth
+        is_apart = not (reading.touches or is_inside(scene.engine, pair.solids, poses, sample=sample))
+        if not is_apart:
+            depth = overlap_depth(scene.engine, pair.solids, poses, sample=sample, tolerance=tolerance)
+        found[sample] = reading.bound if is_apart else -depth
     return found
 
 
@@ -186,7 +194,20 @@ class _Separation:
         self._begin = float(signed_distances(scene, self._pair, q[:1])[0])
         depth = max(0.0, -self._begin)
         self._travel = max(TRAVEL, TRAVEL_SHARE * depth) * (SAMPLED if is_sampled else 1.0)
+        self._sunk_tol = max(SUNK_TOL, SAMPLED_SHARE * depth) if is_sampled else SUNK_TOL
         self._tolerance = READING_TOL + DEPTH_SHARE * depth
+        if not self._is_convex():
+            self._tolerance += self._sunk_tol
+            self._travel = max(self._travel, SUNK_SHARE * self._sunk_tol)
+
+    def _is_convex(self) -> bool:
+        """Whether the depth of the pair is that of two convex solids, which has no tolerance of its own."""
+        bodies = self._scene.engine.bodies
+        return self._pair.solids is None or all(bodies[index].is_convex for index in self._pair.solids)
+
+    def _distances(self, q: Array) -> Array:
+        """Signed distances of the pair at configurations, shape (N, nq), in [m], shape (N,)."""
+        return signed_distances(self._scene, self._pair, q, tolerance=self._sunk_tol)
 
     def judged(self) -> tuple[ComingApart, str]:
         """What is found, and what is wrong with it in words; empty where nothing is."""
@@ -195,7 +216,7 @@ class _Separation:
             row, largest, fault = self._through_contact()
             if not fault and row < len(self._q) - 1:
                 reached, fault = self._beyond(row, largest)
-            end = float(signed_distances(self._scene, self._pair, self._q[-1:])[0])
+            end = float(self._distances(self._q[-1:])[0])
         found = ComingApart(
             names=self._scene.names(self._pair),
             begin=self._begin,
@@ -220,7 +241,7 @@ class _Separation:
                 return row, largest, "comes apart too slowly to be judged"
             share = np.arange(1, parts + 1)[:, None] / parts
             at = self._q[row] + share * (self._q[row + 1] - self._q[row])
-            for distance in signed_distances(self._scene, self._pair, at).tolist():
+            for distance in self._distances(at).tolist():
                 if distance < largest - self._tolerance:
                     return row, largest, f"comes nearer, from {_shown(largest)} to {_shown(distance)}"
                 largest = max(largest, distance)
@@ -233,7 +254,7 @@ class _Separation:
         if not len(moving):
             return None, ""
         ends = np.unique(np.append(self._blocks(int(moving[0]), int(moving[-1]) + 1, largest), [row, last]))
-        distances = signed_distances(self._scene, self._pair, self._q[ends])
+        distances = self._distances(self._q[ends])
         is_met = np.minimum.accumulate(distances[::-1])[::-1] >= self._demand + READING_TOL
         blocks = np.append(np.flatnonzero(~is_met), np.flatnonzero(is_met)[:1]).tolist()
         for place, following in pairwise(blocks):
@@ -254,7 +275,7 @@ class _Separation:
         if self._is_sampled:
             return np.linspace(first, last, count + 1).astype(np.intp)
         rows = np.linspace(first, last, min(MOST_LOOKED_AT, last - first + 1)).astype(np.intp)
-        distances = signed_distances(self._scene, self._pair, self._q[rows])
+        distances = self._distances(self._q[rows])
         levels = np.linspace(largest, self._demand + 2.0 * READING_TOL, count + 1)[1:]
         highest = np.maximum.accumulate(distances)
         ends = np.minimum(np.searchsorted(highest, levels), len(rows) - 1)
@@ -263,7 +284,7 @@ class _Separation:
     def _keeps(self, first: int, last: int, demand: float) -> bool:
         """Whether a distance in [m] is proved between two rows; for a search, that it is not less at both is enough."""
         if self._is_sampled:
-            at = signed_distances(self._scene, self._pair, self._q[[first, last]])
+            at = self._distances(self._q[[first, last]])
             return bool(at.min() >= demand)
         pair = replace(self._pair, rule=Rule.CLEARANCE, demand=max(APART_TOL, demand))
         scene = replace(self._scene, pairs=(pair,))

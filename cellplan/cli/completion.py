@@ -24,6 +24,7 @@ OBJECTIVES: Final = ("conforming", "cycle", "clearance", "change")
 TIMINGS: Final = ("laws", "retimed")
 FORMATS: Final = ("csv", "json", "krl", "rapid", "ros2", "stream", "urscript", "val3", "wide")
 TARGETS: Final = ("joints", "part")
+PROMISES: Final = ("timed", "synchronised", "sequence")
 CELL_SUFFIXES: Final = (".yaml", ".yml")
 ROBOT_SUFFIXES: Final = (".urdf", ".xacro", *CELL_SUFFIXES)
 LARGEST_CELL: Final = 2_000_000  # [bytes] of a cell file that is read for its names

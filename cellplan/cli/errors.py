@@ -9,6 +9,7 @@ import traceback
 from cellplan.errors import CellplanError, ExitStatus, InvalidFileError, NotVerifiedError
 
 DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
+DETAIL = "  "  # before a detail of the finding before it
 LOCATED = re.compile(r".+?:\d+: ")  # a message that begins with file and line needs no prefix
 
 
@@ -30,11 +31,11 @@ def exit_status(error: BaseException) -> ExitStatus:
 
 
 def error_lines(error: BaseException) -> list[str]:
-    """The findings, one per line; a finding about a line of a file begins with ``FILE:LINE:``."""
+    """The findings, one per line, details indented; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: no incomplete run folder was left behind"]
     if isinstance(error, InvalidFileError | NotVerifiedError):
-        return [_one_line(str(finding)) for finding in error.findings]
+        return [_indented(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))
         is_plain = LOCATED.match(line) or isinstance(error, InterruptedWorkError)
@@ -57,6 +58,11 @@ def report_failure(error: BaseException) -> ExitStatus:
     for line in error_lines(error):
         tell(line)
     return exit_status(error)
+
+
+def _indented(finding: str) -> str:
+    """A finding as one line; a detail of the one before it keeps its indentation."""
+    return f"{DETAIL if finding.startswith(DETAIL) else ''}{_one_line(finding)}"
 
 
 def _one_line(text: str) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cellplan.cli.completion import FORMATS, TARGETS, one_of
+from cellplan.cli.completion import FORMATS, PROMISES, TARGETS, one_of
 from cellplan.cli.errors import error_lines, exit_status
 from cellplan.cli.options import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
 from cellplan.cli.output import Result, json_failure, present
@@ -14,7 +14,7 @@ from cellplan.cli.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
 
 if TYPE_CHECKING:
-    from cellplan.model.exported import Targets
+    from cellplan.model.exported import Promise, Targets
     from cellplan.model.progress import Progress
     from cellplan.model.verified_run import VerifiedRun
     from cellplan.pipeline.export.several import Exported
@@ -51,6 +51,16 @@ TargetsOf = Annotated[
         autocompletion=one_of(TARGETS),
     ),
 ]
+PromiseOf = Annotated[
+    str | None,
+    typer.Option(
+        "--promise",
+        metavar="WORD",
+        help="Only this promise: timed, synchronised or sequence (default: the best that holds).",
+        show_default=False,
+        autocompletion=one_of(PROMISES),
+    ),
+]
 Split = Annotated[
     int | None, typer.Option("--split", metavar="N", help="Most rows of a file or routine (default: of the format).")
 ]
@@ -83,6 +93,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
     output: Output = None,
     robot: Robots = None,
     targets: TargetsOf = "joints",
+    promise: PromiseOf = None,
     split: Split = None,
     thin_mm: ThinMm = None,
     thin_deg: ThinDeg = None,
@@ -108,7 +119,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         formats = chosen_formats(form)
         require_choice(cell, without_cell=without_cell)
         choice: dict[str, Any] = {"robots": tuple(robot or ()), "targets": _targets(targets), "split": split}
-        choice |= {"thin_mm": thin_mm, "thin_deg": thin_deg}
+        choice |= {"thin_mm": thin_mm, "thin_deg": thin_deg, "promise": _promise(promise)}
         single = next(iter(formats)) if list(formats.values()) == [True] else None
         if single:
             refuse_choice(single, Choice(**choice))
@@ -222,6 +233,21 @@ def _targets(word: str) -> "Targets":
     if word not in TARGETS:
         raise InputError(f"--targets: expected one of {', '.join(TARGETS)}, got '{word}'")
     return Targets(word)
+
+
+def _promise(word: str | None) -> "Promise | None":
+    """The promise of a word of the command line; each begins with its word.
+
+    Raises:
+        InputError: There is no such promise.
+    """
+    from cellplan.model.exported import Promise
+
+    if word is None:
+        return None
+    if word not in PROMISES:
+        raise InputError(f"--promise: expected one of {', '.join(PROMISES)}, got '{word}'")
+    return next(each for each in Promise if each.startswith(word))
 
 
 def require_choice(cell: Path | None, *, without_cell: bool) -> None:

@@ -40,7 +40,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     "rehearse": ("cellplan rehearse cell.yaml --errors errors.yaml --feedback",),
     "recover": (
         "cellplan recover outputs/cell --at 1.32 --cell cell.yaml",
-        "cellplan recover outputs/cell --at 1.32 --frozen kuka@1.30 --keep abb --without-cell",
+        "cellplan recover outputs/cell --at 1.32 --frozen kuka@1.30 --without-cell",
     ),
     "robots": ("cellplan robots kuka_kr16_2", "cellplan robots arm.urdf --flange tool0"),
 }  # by command; each is understood

@@ -149,6 +149,20 @@ class Engine:
         return fcl.CollisionObject(_geometry(body.core if kind == "core" else body.shape))
 
 
+def nearest_triangle(engine: Engine, mesh: int, other: int, poses: BodyPoses, *, sample: int) -> tuple[int, Array]:
+    """The triangle of a mesh that is nearest to another body, and the way from it to that body in [m], shape (3,).
+
+    Where it is an edge that is nearest, any of its triangles. The way is zero between bodies that touch: FCL's nearest
+    points are none there.
+    """
+    engine.queries.distances += 1
+    a, b = engine._placed("core", mesh, poses, sample), engine._placed("core", other, poses, sample)
+    result = fcl.DistanceResult()
+    distance = fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)
+    p, q = result.nearest_points
+    return int(result.b1), np.subtract(q, p) if distance > 0.0 else np.zeros(3)
+
+
 def _geometry(shape: Solid) -> Any:
     """FCL's geometry of a solid; a mesh becomes a tree of triangles."""
     match shape:

@@ -49,14 +49,25 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
 def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
     """Share of the shorter neighbouring segment within which each row of a job may be rounded, by robot, shape (N,).
 
+    It is what the rows state, or else that of the job for all rows that may be rounded.
+
     What a zone does to a unit without a tool is known too little: it counts as rounded within half of its segments,
     beyond which no controller goes.
     """
-    if job.blend <= 0.0:
-        return {name: np.zeros(len(rows)) for name, rows in program.robots.items()}
+    chosen = {name: chosen_shares(job, rows) for name, rows in program.robots.items()}
+    if not any(np.any(own > 0.0) for own in chosen.values()):
+        return chosen
     free = may_round(program, job.frame.promise)
     has_arm = {name: bool(Axes.of(job.frame.robot(name)).arm) for name in free}
-    return {name: np.where(own, job.blend if has_arm[name] else LARGEST_SHARE, 0.0) for name, own in free.items()}
+    return {
+        name: np.where(free[name] & (own > 0.0), own if has_arm[name] else LARGEST_SHARE, 0.0)
+        for name, own in chosen.items()
+    }
+
+
+def chosen_shares(job: ExportJob, rows: RobotRows) -> Array:
+    """Share of its segments that is chosen for each row of a robot, whether it may be rounded or not, shape (N,)."""
+    return np.full(len(rows), job.blend) if rows.rounding is None else rows.rounding
 
 
 def moves(rows: RobotRows) -> Flags:

@@ -50,6 +50,21 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
     return (*up, Step(False, own.output, True), *down, Step(False, own.output, False))
 
 
+def lowering_step(frame: ExportFrame, robot: str) -> Step:
+    """The instruction before the first motion of a program with marks: the output of the robot is lowered.
+
+    A program that was aborted at a mark may have left it raised, which would release others at the next start.
+
+    Args:
+        frame: The robots that are exported, of a cell of several robots.
+        robot: Name of the robot.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
+    """
+    return next(step for step in reversed(handshake_steps(frame, robot)) if not step.waits)
+
+
 def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
     """Stated signals of a robot by their keys in the cell file, its output first; none where none is stated."""
     control = frame.robot(robot).control

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.export.corners import LARGEST_SHARE
-from cellplan.export.urscript_rows import tool_tips
+from cellplan.export.urscript.rows import tool_tips
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 
@@ -56,13 +56,13 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
     return found
 
 
-def axis_zones(robot: Robot, q: Array, share: float) -> Array:
+def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
     """Share of the way of the axis that moves most in the shorter segment of a row, in [deg] or [mm], shape (N,).
 
     Args:
         robot: The robot.
         q: Its rows in [rad] or [m], shape (N, n).
-        share: Of the segments, 0 to 0.5.
+        share: Of the segments, 0 to 0.5, of all rows or of each, shape (N,).
     """
     ways = _axis_ways(robot, q)
     zones: Array = share * np.min(np.max(np.where(np.isfinite(ways), ways, 0.0), axis=2), axis=0)

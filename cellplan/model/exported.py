@@ -45,8 +45,9 @@ class RobotRows:
         process: Whether its tool is in process from each row to the next, shape (N,); None where a format states none.
         marks: Rows at which it waits for the other robots, in their order; as many for every robot of a program.
         stops: Rows at which its tool stops on its path.
-        rounding: In what was read, share of the shorter neighbouring segment within which the target rounds each row,
-            0 for a stop, at most 0.5, shape (N,); None where a format states none.
+        rounding: Share of the shorter neighbouring segment within which the target rounds each row, 0 for a stop, at
+            most 0.5, shape (N,). In what is written None stands for the share of the job, in what was read for a format
+            that states none.
         X_PT: Its tool tip in the part frame in [m], shape (N, 4, 4), where a row is stated as a target on the part; NaN
             in all other rows, None where there is no such row. In what was read, ``q`` is NaN in these rows but for
             external axes.
@@ -117,8 +118,8 @@ class ExportJob:
         programs: Rows of the programs, in their order.
         notes: Lines for the head of every file: promise, allowed skew, deviations, digest of the run; without the
             sign of a comment, of any characters.
-        blend: Share of the shorter neighbouring segment, 0 to 0.5, within which a target may round rows; 0 for a stop
-            at each row. Which rows these are: ``export.corners``.
+        blend: Largest share of the shorter neighbouring segment, 0 to 0.5, within which a target may round rows; 0 for
+            a stop at each row. Which rows these are: ``export.corners``. Rows may state less for each of them.
     """
 
     frame: ExportFrame

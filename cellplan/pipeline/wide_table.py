@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from cellplan.checks.tools.tracking import part_poses
-from cellplan.export.wide import file_name, read_wide, render_wide
-from cellplan.export.wide_columns import PhaseRows, ProgramRows
+from cellplan.export.wide.columns import PhaseRows, ProgramRows
+from cellplan.export.wide.writer import file_name, read_wide, render_wide
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import JointTable, Motion, Schedule

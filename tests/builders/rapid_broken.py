@@ -225,6 +225,11 @@ BROKEN: dict[str, tuple[str, str, str, str, int | str | None, str]] = {
     # signals
     "another signal": ("signals", B, r"WaitDI di_beta_alpha,1", "WaitDI di_beta_gamma,1", 0, "WaitDI di_beta_alpha,1"),
     "a signal the other way round": ("signals", B, r"SetDO do_beta,1", "SetDO do_beta,0", 0, "SetDO do_beta,1"),
+    "an output not lowered": ("signals", B, r"    SetDO do_beta,0;\r\n", "", 1, "SetDO do_beta,0 before the first"),
+    "an output raised at first": ("signals", B, r"SetDO do_beta,0", "SetDO do_beta,1", 0, "SetDO do_beta,0 before"),
+    "another output lowered": ("signals", B, r"SetDO do_beta,0", "SetDO do_gamma,0", 0, "SetDO do_beta,0 before"),
+    "a wait at first": ("signals", B, r"SetDO do_beta,0", "WaitDI di_beta_alpha,0", 0, "SetDO do_beta,0 before"),
+    "an output lowered twice": ("signals", B, r"(    SetDO do_beta,0;\r\n)", r"\1\1", 1, "SetDO do_beta,1"),
     "a signal of another state": (
         "signals",
         B,

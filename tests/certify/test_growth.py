@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from builders.scene_builders import fixed_part, make_cell, placed, slide_model
 from builders.transfer_cells import gantry, scene_of
 
-from cellplan.certify.growth import certify_growth, rows_too_near, sampled_growth, scene_at_stop
+from cellplan.certify.growth import certify_growth, rows_too_near, sampled_growth, scene_at_stop, signed_distances
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import Array
 from cellplan.scene.scene import Scene
 
@@ -79,3 +82,20 @@ def test_the_pairs_that_are_too_near_are_those_below_the_demand(scene: Scene) ->
         False,
         False,
     ]
+
+
+def test_a_ball_inside_a_closed_mesh_is_as_deep_as_its_way_out() -> None:
+    """Nothing touches there: the surface of the mesh is far from the ball."""
+    block = tessellate(Box((0.2, 0.2, 0.2)))
+    cell = make_cell(placed("probe", slide_model(Sphere(0.005))), part=fixed_part(block, np.eye(4)))
+    scene = scene_at_stop(Scene.from_cell(cell))
+    way = np.linspace(0.0, 0.2, 40)[:, None]
+
+    (near,) = rows_too_near(scene, way[0])
+    growth = certify_growth(scene, way)
+
+    distances = signed_distances(scene, scene.pairs[near], way)
+    np.testing.assert_allclose(distances, way[:, 0] - 0.105, atol=2e-4)
+    assert growth.is_clear
+    assert growth.apart[0].begin == pytest.approx(-0.105, abs=2e-4)
+    assert not certify_growth(scene, way[:20][::-1]).is_proved

@@ -3,7 +3,15 @@
 import pytest
 
 from cellplan.cli.errors import error_lines, exit_status, report_failure
-from cellplan.errors import CellplanError, ExitStatus, InputError, InvalidFileError, NoSolutionError, SelfTestError
+from cellplan.errors import (
+    CellplanError,
+    ExitStatus,
+    InputError,
+    InvalidFileError,
+    NoSolutionError,
+    NotVerifiedError,
+    SelfTestError,
+)
 
 
 @pytest.mark.parametrize(
@@ -76,3 +84,9 @@ def test_bad_input_never_shows_a_traceback(capsys: pytest.CaptureFixture[str], m
     report_failure(InputError("x"))
 
     assert capsys.readouterr().err == "error: x\n"
+
+
+def test_details_of_a_finding_stay_indented_below_it() -> None:
+    error = NotVerifiedError(["krl: not sequence only: the part moves", "  not synchronised: two\ncontrollers"])
+
+    assert error_lines(error) == ["krl: not sequence only: the part moves", "  not synchronised: two\\ncontrollers"]

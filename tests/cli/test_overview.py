@@ -19,6 +19,11 @@ def test_every_example_is_understood(line: str, capsys: pytest.CaptureFixture[st
     assert (status, "Usage: cellplan" in capsys.readouterr().out) == (0, True)
 
 
+@pytest.mark.parametrize("line", LINES)
+def test_examples_fit_a_usual_terminal(line: str) -> None:
+    assert len(f"    {line}") <= 80
+
+
 def test_first_steps_are_shown_without_a_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([]) == 2
     assert capsys.readouterr().out == f"{FIRST_STEPS}\n"

@@ -86,6 +86,7 @@ def test_a_machine_gets_one_object(pair: str, capsys: pytest.CaptureFixture[str]
     assert Path("out/plots/envelope_before_circle.svg").is_file()
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(pair: str) -> None:
     for folder in ("one", "two"):
         run(["rehearse", pair, "--errors", "spread.yaml", "--trials", "2", "--feedback", "-o", folder, "-q"])

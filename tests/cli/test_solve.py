@@ -150,6 +150,7 @@ def test_a_wrong_choice_is_refused_before_anything_is_done(
     assert not folder.exists()
 
 
+@pytest.mark.slow
 def test_the_integrator_is_chosen_on_the_command_line_and_reported(
     coarse_cell: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -176,7 +177,9 @@ def test_an_integrator_that_does_not_go_with_the_cell_names_its_line(
     assert status == 2
     assert capsys.readouterr().err == (
         f"{coarse_cell}:{line} with solver.integrator = accurate: solver.method: expected weighted_pseudo_inverse in "
-        "the accurate mode, got 'jacobian_transpose'; choose it, or choose solver.integrator: euler\n"
+        "the accurate mode, got 'jacobian_transpose', "
+        "which follows the path only as far as the feedback of its errors takes it; "
+        "choose weighted_pseudo_inverse, or choose solver.integrator: euler\n"
     )
 
 

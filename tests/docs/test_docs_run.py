@@ -97,6 +97,18 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "templates.md",
     "programs.md",
     "recover.md",
+    "first-cell.md",
+    "from-python.md",
+    "use-the-numbers.md",
+    "floor-plan.md",
+    "watch-a-cell.md",
+    "real-robots.md",
+    "screen-layouts.md",
+    "my-robot.md",
+    "read-the-report.md",
+    "see-the-cell.md",
+    "skew.md",
+    "stops.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 

@@ -190,6 +190,7 @@ def run(folder: Path, *arguments: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_a_method_and_a_check_that_follow_their_recipes_are_in_the_report(extended: Path) -> None:
     report = json.loads((extended / "run" / "report.json").read_text(encoding="utf-8"))
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.export.corners import may_round, row_shares
-from cellplan.export.rapid import RAPID
+from cellplan.export.rapid.writer import RAPID
 from cellplan.export.zones import axis_shares, axis_zones, tool_shares, tool_zones
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ from builders.export_jobs import (
 from builders.scene_builders import arm_model
 
 from cellplan.errors import InputError
-from cellplan.export.krl import KRL
+from cellplan.export.corners import row_shares
+from cellplan.export.krl.writer import KRL
 from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, Promise, RobotRows
 from cellplan.model.robot import RobotModel
@@ -145,7 +147,28 @@ def test_rows_are_rounded_in_process_too_but_not_where_something_happens() -> No
     assert rounded == sorted({*range(20)} - {0, 5, 7, 10, 12, 19})
     (read,) = KRL.read(job.frame, files)
     np.testing.assert_allclose(read.robots["alpha"].rounding, 0.3 * np.isin(np.arange(20), rounded))
-    assert "$APO.CPTP=60" in files["alpha.src"]
+    assert [re.findall(r"APO.CPTP=(\d+)", files[f"alpha{page}.src"]) for page in ("", "_001", "_002")] == [
+        [],
+        ["60"],
+        ["60"],
+    ]
+
+
+def test_each_row_may_have_a_share_of_its_own() -> None:
+    job = one_arm(KUKA, blend=0.5)
+    (program,) = job.programs
+    free = row_shares(job, program)["alpha"] > 0.0
+    shares = np.where(free, np.resize([0.5, 0.5, 0.1, 0.0, 0.052], len(free)), 0.0)
+    rows = replace(program.robots["alpha"], rounding=shares)
+    job = replace(job, programs=(replace(program, robots={"alpha": rows}),))
+
+    files = KRL.render(job)
+
+    (read,) = KRL.read(job.frame, files)
+    np.testing.assert_allclose(read.robots["alpha"].rounding, np.floor(200.0 * shares + 1e-9) / 200.0)
+    stated = re.findall(r"APO.CPTP=(\d+)", files["alpha.src"])
+    assert set(stated) == {"100", "20", "10"}
+    assert all(one != other for one, other in pairwise(stated))
 
 
 @pytest.mark.parametrize(("blend", "percent"), [(0.0, None), (0.004, None), (0.005, 1), (0.05, 10), (0.5, 100)])

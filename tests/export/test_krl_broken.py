@@ -8,7 +8,7 @@ import pytest
 from builders.export_jobs import arm_on_a_rail, one_arm, two_arms
 
 from cellplan.errors import InputError
-from cellplan.export.krl import KRL
+from cellplan.export.krl.writer import KRL
 from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 
@@ -34,6 +34,7 @@ def message(job: ExportJob, files: dict[str, str]) -> str:
     return text
 
 
+LAST_WAIT = "WAIT FOR NOT $IN[101]\r\n"
 POINT = r"DECL E6AXIS XP4={[^}]*}"
 # what is replaced (once, the first one), what by, and the text that begins the refused line of the broken file
 SOURCE = {
@@ -101,22 +102,32 @@ SOURCE = {
     "two statements": ("PTP XP9 C_PTP\r\nPTP XP10", "PTP XP9 PTP XP10", "PTP XP9"),
     "call of another program": ("PTP XP9 C_PTP\r\n", "gripper()\r\nPTP XP9\r\n", "gripper"),
     "call of a page": ("PTP XP9 C_PTP\r\n", "alpha_001()\r\nPTP XP9\r\n", "alpha_001"),
-    "signal before all motions": ("PTP XP1\r\n", "$OUT[10]=TRUE\r\nPTP XP1\r\n", "$OUT"),
+    "signal before all motions": ("PTP XP1\r\n", "$OUT[10]=TRUE\r\nPTP XP1\r\n", "$OUT[10]=TRUE\r\nPTP"),
     "signal of no mark": ("PTP XP9 C_PTP\r\n", "PTP XP9\r\n$OUT[10]=TRUE\r\n", "$OUT[10]=TRUE\r\nPTP"),
     "signal to the world": ("PTP XP9 C_PTP\r\n", "PTP XP9\r\nPULSE($OUT[10],TRUE,1)\r\n", "PULSE"),
     "other output": ("$OUT[10]=TRUE", "$OUT[11]=TRUE", "$OUT[11]"),
-    "other state": ("$OUT[10]=TRUE", "$OUT[10]=FALSE", "$OUT[10]=FALSE"),
+    "other state": ("$OUT[10]=TRUE", "$OUT[10]=FALSE", "$OUT[10]=FALSE", 2),
     "state of no word": ("$OUT[10]=TRUE", "$OUT[10]=1", "$OUT[10]=1"),
     "other input": ("WAIT FOR $IN[101]", "WAIT FOR $IN[102]", "WAIT FOR $IN[102]"),
     "input turned round": ("WAIT FOR NOT $IN[101]", "WAIT FOR $IN[101]==TRUE", "WAIT FOR $IN[101]==TRUE"),
     "two negations": ("WAIT FOR NOT $IN[101]", "WAIT FOR NOT $IN[101]==TRUE", "WAIT FOR NOT"),
-    "handshake without its wait": ("WAIT FOR NOT $IN[101]\r\n", "", "$OUT[10]=FALSE"),
-    "handshake without its end": ("$OUT[10]=FALSE\r\n", "", "BAS(#VEL_PTP,100"),
+    "handshake without its wait": ("WAIT FOR NOT $IN[101]\r\n", "", "$OUT[10]=FALSE", 2),
+    "handshake without its end": (f"{LAST_WAIT}$OUT[10]=FALSE\r\n", LAST_WAIT, "BAS(#VEL_PTP,100"),
+    "output not lowered at the start": ("$OUT[10]=FALSE\r\n", "", "WAIT FOR $IN[101]"),
+    "output raised at the start": ("$OUT[10]=FALSE\r\n", "$OUT[10]=TRUE\r\n", "$OUT[10]=TRUE"),
+    "output lowered twice": ("PTP XP1\r\n", "$OUT[10]=FALSE\r\nPTP XP1\r\n", "$OUT[10]=FALSE", 2),
+    "another output lowered": ("$OUT[10]=FALSE\r\n", "$OUT[11]=FALSE\r\n", "$OUT[11]=FALSE"),
+    "wait at the start": ("$OUT[10]=FALSE\r\n", "WAIT FOR NOT $IN[101]\r\n", "WAIT FOR NOT $IN[101]"),
+    "output lowered after the first motion": (
+        "$OUT[10]=FALSE\r\nBAS(#VEL_PTP,10)\r\nPTP XP1\r\n",
+        "BAS(#VEL_PTP,10)\r\nPTP XP1\r\n$OUT[10]=FALSE\r\n",
+        "$OUT[10]=FALSE",
+    ),
     "handshake in another order": ("WAIT FOR $IN[101]\r\n$OUT", "$OUT", "$OUT[10]=TRUE"),
     "motion in a handshake": ("$OUT[10]=TRUE\r\n", "$OUT[10]=TRUE\r\nPTP XP2\r\n", "PTP XP2"),
     "handshake twice": (
-        "$OUT[10]=FALSE\r\n",
-        "$OUT[10]=FALSE\r\nWAIT FOR $IN[101]\r\n",
+        f"{LAST_WAIT}$OUT[10]=FALSE\r\n",
+        f"{LAST_WAIT}$OUT[10]=FALSE\r\nWAIT FOR $IN[101]\r\n",
         "WAIT FOR $IN[101]\r\nBAS",
     ),
     "no motion at all": (re.compile(r"BAS\(#VEL_PTP,10\).*(?=END)", re.S), "", "END"),

@@ -26,7 +26,7 @@ from hypothesis import strategies as st
 
 from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
-from cellplan.export.rapid import RAPID
+from cellplan.export.rapid.writer import RAPID
 from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, Targets
 from cellplan.pipeline.export.dialects import DIALECTS

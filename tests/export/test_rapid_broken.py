@@ -11,7 +11,7 @@ from builders.rapid_jobs import multimove_job, part_job, sequence_job
 from builders.rapid_rules import rules_broken
 
 from cellplan.errors import InputError
-from cellplan.export.rapid import RAPID
+from cellplan.export.rapid.writer import RAPID
 from cellplan.model.exported import ExportJob, Promise
 from cellplan.pipeline.export.part_targets import with_part_poses
 

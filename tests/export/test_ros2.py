@@ -18,8 +18,8 @@ from builders.stream_jobs import (
 )
 
 from cellplan.errors import InputError
-from cellplan.export.ros2 import render_ros2
-from cellplan.export.ros2_reader import read_ros2
+from cellplan.export.ros2.reader import read_ros2
+from cellplan.export.ros2.writer import render_ros2
 from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.pipeline.export.dialects import DIALECTS

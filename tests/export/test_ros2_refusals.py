@@ -6,8 +6,8 @@ import pytest
 from builders.stream_jobs import edited, timed_job, with_line_twice, without_line
 
 from cellplan.errors import InputError
-from cellplan.export.ros2 import render_ros2
-from cellplan.export.ros2_reader import read_ros2
+from cellplan.export.ros2.reader import read_ros2
+from cellplan.export.ros2.writer import render_ros2
 
 FILE = "gamma.yaml"  # two joints, 51 points
 JOB = timed_job(end=0.6, cycle=0.012, seed=2, robots=("gamma",))

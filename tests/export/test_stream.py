@@ -20,7 +20,7 @@ from builders.stream_jobs import (
 )
 
 from cellplan.errors import InputError
-from cellplan.export.stream import render_stream
+from cellplan.export.stream.writer import render_stream
 from cellplan.geometry.transforms import Array
 from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob, ProgramRows, Promise

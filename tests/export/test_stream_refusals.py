@@ -8,7 +8,7 @@ import pytest
 from builders.stream_jobs import cell_for, edited, timed_job, with_line_twice, without_line
 
 from cellplan.errors import InputError
-from cellplan.export.stream import read_stream, render_stream
+from cellplan.export.stream.writer import read_stream, render_stream
 from cellplan.model.controllers import ControllerKind
 
 JOB = timed_job(end=0.6, cycle=0.012, seed=2, robots=("gamma",))

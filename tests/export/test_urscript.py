@@ -9,9 +9,9 @@ from builders.export_jobs import arm_on_a_rail, job_of
 from builders.stream_jobs import is_within_limits, largest_error, round_trip, smooth_program, ur_cell, with_latency
 
 from cellplan.errors import InputError
-from cellplan.export.urscript import render_urscript
-from cellplan.export.urscript_reader import read_urscript
-from cellplan.export.urscript_rows import blend_radii, move_acceleration, move_speeds, tool_tips
+from cellplan.export.urscript.reader import read_urscript
+from cellplan.export.urscript.rows import blend_radii, move_acceleration, move_speeds, tool_tips
+from cellplan.export.urscript.writer import render_urscript
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.controllers import ControllerKind, Handshake
@@ -226,6 +226,19 @@ def test_a_blend_begins_no_earlier_than_its_share_of_a_segment(blend: float) -> 
             assert np.linalg.norm(away, axis=1).min() >= radii[row]
     chords = np.linalg.norm(np.diff(tips(rows.q), axis=0), axis=1)
     assert np.all(radii[:-1] + radii[1:] <= chords + 1e-12)
+
+
+def test_a_larger_radius_is_read_as_a_larger_share() -> None:
+    job = sequence(marks=(), blend=0.25)
+    files = URSCRIPT.render(job)
+
+    wide = {path: re.sub(r"r=[\d.]+", "r=9.0000", text) for path, text in files.items()}
+
+    before, after = (URSCRIPT.read(job.frame, each)[0].robots["alpha"].rounding for each in (files, wide))
+    radii = blend_radii(job.frame.robot("alpha"), job.programs[0].robots["alpha"], 0.25)
+    np.testing.assert_array_equal(before > 0.0, radii > 0.0)
+    assert np.all(before <= 0.25)
+    np.testing.assert_array_equal(after, 0.5 * (before > 0.0))
 
 
 def test_tool_tips_are_those_of_the_kinematics() -> None:

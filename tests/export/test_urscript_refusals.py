@@ -7,8 +7,8 @@ from builders.export_jobs import job_of
 from builders.stream_jobs import smooth_program, ur_cell, with_line_twice, without_line
 
 from cellplan.errors import InputError
-from cellplan.export.urscript import render_urscript
-from cellplan.export.urscript_reader import read_urscript
+from cellplan.export.urscript.reader import read_urscript
+from cellplan.export.urscript.writer import render_urscript
 from cellplan.model.exported import ExportJob, ProgramRows, Promise
 
 FILE = "beta.script"

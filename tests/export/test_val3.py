@@ -23,8 +23,9 @@ from builders.export_jobs import (
 from builders.scene_builders import arm_model
 
 from cellplan.errors import InputError
-from cellplan.export.val3 import VAL3
+from cellplan.export.val3.writer import VAL3
 from cellplan.geometry.transforms import pose_from, rotation_about, rotation_exp
+from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Tool
 from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, Promise, RobotRows
@@ -141,10 +142,53 @@ def test_decimals_of_the_robot_hold() -> None:
     assert re.search(r'j1="-?\d+\.\d{3}"', VAL3.render(job)["alpha/alpha.dtx"])
 
 
-def test_every_row_ends_in_a_stop_as_blending_is_stated_in_millimetres() -> None:
-    files = VAL3.render(one_arm(STAUBLI, blend=0.5))
+def test_rows_are_left_and_reached_within_their_share_and_stops_stay() -> None:
+    """By other kinematics: no point of both segments beyond the share is nearer to the row than what is stated."""
+    job = two_arms(STAUBLI, marks=(0, 7, 19), blend=0.3, split=13)  # process from row 5 to row 10
+    rng = np.random.default_rng(3)
+    robots = {
+        name: replace(rows, q=0.5 * rows.q[:1] + np.cumsum(rng.uniform(-0.01, 0.01, rows.q.shape), axis=0))
+        for name, rows in job.programs[0].robots.items()
+    }
+    job = replace(job, programs=(replace(job.programs[0], robots=robots),))
+    files = VAL3.render(job)
+
+    (read,) = VAL3.read(job.frame, files)
+
+    shares, q = read.robots["alpha"].rounding, job.programs[0].robots["alpha"].q
+    assert np.flatnonzero(shares == 0.0).tolist() == [0, 5, 7, 10, 12, 19]
+    assert np.all(shares <= 0.3 + 1e-6)
+    data = files["alpha/alpha.dtx"]
+    moves = re.findall(r"mMove\[(\d+)\]", files["alpha/alpha_001.pgx"] + files["alpha/alpha_002.pgx"])
+    sizes = re.findall(r'vel="\d+".*blend="(\w+)" leave="([\d.]+)" reach="([\d.]+)"', data)
+    tips = ScrewChain(job.frame.robot("alpha")).tool_poses
+    for row in np.flatnonzero(shares > 0.0):
+        blend, leave, reach = sizes[int(moves[row])]
+        assert (blend, leave) == ("joint", reach)
+        for other in (row - 1, row + 1):
+            beyond = q[row] + np.linspace(0.3, 1.0, 50)[:, None] * (q[other] - q[row])
+            away = np.linalg.norm(tips(beyond)[:, :3, 3] - tips(q[None, row])[:, :3, 3], axis=1)
+            assert 1e3 * away.min() >= float(leave) - 1e-3
+
+
+def test_a_row_that_is_not_rounded_ends_in_a_stop() -> None:
+    files = VAL3.render(one_arm(STAUBLI, blend=0.0))
 
     assert set(re.findall(r'blend="(\w+)"', files["alpha/alpha.dtx"])) == {"off"}
+
+
+@pytest.mark.parametrize("wide", ["leave", "reach"])
+def test_a_larger_distance_is_read_as_a_larger_share(wide: str) -> None:
+    job = one_arm(STAUBLI, blend=0.1)
+    files = VAL3.render(job)
+    data = re.sub(rf'(blend="joint".*{wide}=")[\d.]+', r"\g<1>9000", files["alpha/alpha.dtx"])
+
+    before, after = (
+        VAL3.read(job.frame, each)[0].robots["alpha"].rounding for each in (files, {**files, "alpha/alpha.dtx": data})
+    )
+
+    assert np.any(before > 0.0)
+    np.testing.assert_allclose(after[before > 0.0], 0.5)
 
 
 def test_signals_come_after_the_robot_stands() -> None:

@@ -8,7 +8,7 @@ import pytest
 from builders.export_jobs import one_arm, two_arms
 
 from cellplan.errors import InputError
-from cellplan.export.val3 import VAL3
+from cellplan.export.val3.writer import VAL3
 from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 
@@ -37,12 +37,13 @@ def after(name: str, added: str) -> tuple[str, str]:
     return f"  movej(jRow[{name}]", f"  {added}\n  movej(jRow[{name}]"
 
 
+LAST_WAIT = "  wait(diMark1==false)\n"
 # what is replaced (once, the first one), what by, and the text that begins the refused line of the broken file
 START = {
     "cut off": (re.compile(r"  waitEndMove\(\)\nend\]\]>.*", re.S), "", 'end of "start.pgx"'),
     "no end": ("end]]>", "]]>", "  waitEndMove()\n]]>"),
     "end is not the last": ("end]]>", "end\nwaitEndMove()]]>", "waitEndMove()]]>"),
-    "no begin": ("[begin", "[", "  movej(jRow[0]"),
+    "no begin": ("[begin", "[", "  doMark=false"),
     "empty code": (re.compile(r"\[begin.*?end\]", re.S), "[]", "    <Code>"),
     "begin in capitals": ("[begin", "[BEGIN", "    <Code>"),
     "tag not closed": ("  </Program>\n", "", "</Programs>"),
@@ -102,20 +103,28 @@ START = {
     "other output": ("doMark=true", "diMark1=true", "  diMark1=true"),
     "output of nowhere": ("doMark=true", "doOther=true", "  doOther"),
     "output of another type": ("doMark=true", "tTool=true", "  tTool"),
-    "other state": ("doMark=true", "doMark=false", "  doMark=false"),
+    "other state": ("doMark=true", "doMark=false", "  doMark=false", 2),
     "state of no word": ("doMark=true", "doMark=1", "  doMark=1"),
     "other input": ("wait(diMark1==true)", "wait(doMark==true)", "  wait(doMark"),
     "input turned round": ("wait(diMark1==true)", "wait(diMark1==false)", "  wait(diMark1==false)"),
     "one equals sign": ("wait(diMark1==true)", "wait(diMark1=true)", "  wait(diMark1="),
     "watch instead of wait": ("wait(diMark1==true)", "watch(diMark1==true,5)", "  watch"),
-    "handshake without its wait": ("  wait(diMark1==false)\n", "", "  doMark=false"),
-    "handshake without its end": ("  doMark=false\n", "", "  movej(jRow[1]"),
+    "handshake without its wait": ("  wait(diMark1==false)\n", "", "  doMark=false", 2),
+    "handshake without its end": (f"{LAST_WAIT}  doMark=false\n", LAST_WAIT, "  movej(jRow[1]"),
+    "output not lowered at the start": ("  doMark=false\n", "", "  wait(diMark1==true)"),
+    "output raised at the start": ("doMark=false", "doMark=true", "  doMark=true"),
+    "output lowered twice": (*after("0", "doMark=false"), "  doMark=false", 2),
+    "wait at the start": ("doMark=false", "wait(diMark1==false)", "  wait(diMark1==false)"),
     "motion in a handshake": (
         "  doMark=true\n",
         "  doMark=true\n  movej(jRow[1],tTool[0],mMove[0])\n",
         "  movej(jRow[1]",
     ),
-    "handshake twice": ("  doMark=false\n", "  doMark=false\n  doMark=true\n", "  doMark=true\n  movej"),
+    "handshake twice": (
+        f"{LAST_WAIT}  doMark=false\n",
+        f"{LAST_WAIT}  doMark=false\n  doMark=true\n",
+        "  doMark=true\n  movej",
+    ),
     "no motion at all": (re.compile(r"  movej\(jRow\[0\].*(?=  waitEndMove\(\)\nend)", re.S), "", "end]]>"),
 }
 DATA = {
@@ -167,13 +176,13 @@ DATA = {
     "speed below nothing": ('vel="10"', 'vel="-5"', '      <Value key="0" accel'),
     "unknown rounding": ('blend="off"', 'blend="some"', '      <Value key="0" accel'),
     "last row rounded": (
-        re.compile(r'(vel="100".*)blend="off"'),
-        r'\1blend="joint"',
+        re.compile(r'(vel="100".*)blend="off" leave="0"'),
+        r'\1blend="joint" leave="1"',
         "start:  waitEndMove()\n  wait",
         2,
     ),
     "signal without a link": (re.compile(r' link="[^"]*Q10"'), "", '      <Value key="0"/>'),
-    "other link of the output": (r"\%Q10", r"\%Q11", "start:  doMark=true"),
+    "other link of the output": (r"\%Q10", r"\%Q11", "start:  doMark=false"),
     "other link of the input": (r"\%I101", r"\%I102", "start:  wait(diMark1==true)"),
     "tool left out": (re.compile(r'    <Data name="tTool".*?</Data>\n', re.S), "", "start:  movej(jRow[0]"),
     "rows left out": (re.compile(r'    <Data name="jRow".*?</Data>\n', re.S), "", "start:  movej(jRow[0]"),

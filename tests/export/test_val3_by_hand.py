@@ -4,7 +4,7 @@ import numpy as np
 from builders.export_jobs import cell_of, controlled, job_of, random_program
 from builders.scene_builders import arm_model
 
-from cellplan.export.val3 import VAL3
+from cellplan.export.val3.writer import VAL3
 from cellplan.model.controllers import ControllerKind
 
 HAND_MADE = {

@@ -12,8 +12,8 @@ from builders.run_jobs import job_of_run
 from cellplan import Solution, VerifiedRun, export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
 from cellplan.export.csv import render_csv
-from cellplan.export.wide import read_wide
-from cellplan.export.wide_columns import ProgramRows, wide_columns
+from cellplan.export.wide.columns import ProgramRows, wide_columns
+from cellplan.export.wide.writer import read_wide
 from cellplan.geometry.transforms import inverse, roll_pitch_yaw, rotation_from_rpy
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.report import ClearanceClass

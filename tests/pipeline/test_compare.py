@@ -190,6 +190,7 @@ def test_the_table_has_a_row_for_each_variant(place: Path, modes: dict[str, Any]
     assert float(rows[1]["load_s left"]) == figures(modes, "pairwise")["robots"]["left"]["load_s"]
 
 
+@pytest.mark.slow
 def test_a_study_that_is_continued_has_the_same_bytes(place: Path, modes: dict[str, Any], tmp_path: Path) -> None:
     study = tmp_path / "study"
     study.mkdir()
@@ -251,6 +252,7 @@ def test_wrong_arguments_are_named(place: Path, sound: Path, capsys: pytest.Capt
     assert not (place / "study").exists()
 
 
+@pytest.mark.slow
 def test_the_command_prints_verdicts_first_and_its_status_is_that_of_a_study(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -68,6 +68,7 @@ def test_an_arm_with_spare_joints_drifts_from_cycle_to_cycle(planar):
     assert np.rad2deg(max(drift.worst for drift in found.drifts)) > 0.05
 
 
+@pytest.mark.slow
 def test_an_arm_without_spare_joints_comes_back_in_every_cycle(planar):
     found = solve(planar(2, path=RECTANGLE, step=0.002, gain=250)).runs[0].report.repeatability
 
@@ -77,6 +78,7 @@ def test_an_arm_without_spare_joints_comes_back_in_every_cycle(planar):
     assert max(drift.worst for drift in found.drifts) <= 2e-5  # half of acceleration times step over gain
 
 
+@pytest.mark.slow
 def test_cycles_under_one_law_differ_in_length(planar):
     found = solve(planar(2)).runs[0].report.repeatability
 
@@ -86,6 +88,7 @@ def test_cycles_under_one_law_differ_in_length(planar):
     assert found.period is None
 
 
+@pytest.mark.slow
 def test_a_closed_trajectory_is_repeated_period_by_period(planar):
     t = np.linspace(0.0, 2.0, 41)
     w = np.pi * t

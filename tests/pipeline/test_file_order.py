@@ -58,6 +58,7 @@ def by_robot(solution: Solution) -> Mapping[str, Array]:
     return {name: q for run in solution.runs for name, q in run.report.q.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method", ["weighted_pseudo_inverse", pytest.param("recursive_search", marks=pytest.mark.slow)]
 )

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from cellplan.io.cell.load import load_cell
 
 SOLVE = """
@@ -46,6 +48,7 @@ def files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_cold_warm_damaged_and_without_a_cache(sound: Path, tmp_path: Path) -> None:
     cell, cache = sound / "cell" / "small.yaml", tmp_path / "cache"
     without, cold, warm, damaged = (tmp_path / name for name in ("without", "cold", "warm", "damaged"))

@@ -59,6 +59,7 @@ def test_the_part_goes_where_the_task_in_the_world_says(planar):
     assert np.ptp(tip, axis=0) == pytest.approx([0.2, 0.2], abs=1e-5)  # once round
 
 
+@pytest.mark.slow
 def test_moving_the_whole_cell_changes_no_joint_table(cells):
     cell = with_overrides(load_cell(cells / "load_sharing_planar.yaml"), duration=3.0)
     cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0), obstacles=())

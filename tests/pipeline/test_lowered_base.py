@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from cellplan import load_cell, solve
 from cellplan.checks.clearance.check import check_clearance
@@ -12,6 +13,7 @@ from cellplan.scene.scene import Scene
 LOWERED = 0.7  # [m] by which the base of the REIS is too low
 
 
+@pytest.mark.slow
 def test_the_part_and_the_links_that_hit_the_floor_are_named_with_their_instants(cells):
     cell = load_cell(cells / "four_robots_initial.yaml")
     cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0))

@@ -49,6 +49,7 @@ def assert_proved(report: Report, operators: int) -> None:
     assert np.ptp(report.q["tray"], axis=0).max() > MOVES
 
 
+@pytest.mark.slow
 def test_eight_robots_are_solved_and_certified(cell_with: Callable[..., str], tmp_path: Path) -> None:
     solution = solved(cell_with(8, step_s=COARSE_S), tmp_path)
 

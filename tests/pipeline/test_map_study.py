@@ -135,6 +135,7 @@ def test_the_status_says_how_many_tiles_are_done(folder: Path, capsys: pytest.Ca
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_any_number_of_workers_writes_the_same_files(folder: Path, tmp_path: Path) -> None:
     for count in (1, 2, 4):
         map_study(REQUEST, tmp_path / str(count), workers=count)

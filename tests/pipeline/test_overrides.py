@@ -95,7 +95,8 @@ def test_the_integrator_is_the_one_a_cell_file_with_these_words_would_take(
 def test_a_method_against_the_integrator_of_the_cell_file_is_refused(cell_with: Write) -> None:
     assert refusal(cell_with("solver: {integrator: accurate}"), method="jacobian_transpose") == [
         "c with solver.method = jacobian_transpose: solver.method: expected weighted_pseudo_inverse in the accurate "
-        "mode, got 'jacobian_transpose'; choose it, or choose solver.integrator: euler"
+        "mode, got 'jacobian_transpose', which follows the path only as far as the feedback of its errors takes it; "
+        "choose weighted_pseudo_inverse, or choose solver.integrator: euler"
     ]
 
 
@@ -107,7 +108,9 @@ def test_a_method_against_the_integrator_of_the_cell_file_is_refused(cell_with: 
             {},
             [
                 "c:14 with solver.integrator = accurate: solver.method: expected weighted_pseudo_inverse in the "
-                "accurate mode, got 'quadratic_program'; choose it, or choose solver.integrator: euler"
+                "accurate mode, got 'quadratic_program', "
+                "which gives up part of a task at a limit, and limits accelerations from step to step; "
+                "choose weighted_pseudo_inverse, or choose solver.integrator: euler"
             ],
         ),
         (
@@ -115,7 +118,9 @@ def test_a_method_against_the_integrator_of_the_cell_file_is_refused(cell_with: 
             {"method": "quadratic_program"},
             [
                 "c with solver.method = quadratic_program: solver.method: expected weighted_pseudo_inverse in the "
-                "accurate mode, got 'quadratic_program'; choose it, or choose solver.integrator: euler"
+                "accurate mode, got 'quadratic_program', "
+                "which gives up part of a task at a limit, and limits accelerations from step to step; "
+                "choose weighted_pseudo_inverse, or choose solver.integrator: euler"
             ],
         ),
     ],

@@ -11,9 +11,9 @@ from builders.rapid_rules import rules_broken
 from builders.scene_builders import arm_model, fixed_part, placed
 
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.export.rapid import RAPID
-from cellplan.export.rapid_targets import configuration
-from cellplan.export.rapid_units import quaternions
+from cellplan.export.rapid.targets import configuration
+from cellplan.export.rapid.units import quaternions
+from cellplan.export.rapid.writer import RAPID
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotation, rotation_exp
 from cellplan.model.cell import Robot

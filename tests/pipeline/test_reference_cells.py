@@ -127,6 +127,7 @@ def test_planar_pair_of_appendix_e(cells):
     assert np.radians(orientation) < 1e-12
 
 
+@pytest.mark.slow
 def test_euler_reference_agrees_with_a_finer_one(cells):
     """The redundancy is resolved too: the final configuration at half the step is the same to first order."""
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), duration=4.0)
@@ -138,6 +139,7 @@ def test_euler_reference_agrees_with_a_finer_one(cells):
     assert np.degrees(np.abs(ends[0] - ends[1]).max()) < 0.06  # Euler at 1 ms is 0.024 deg from the limit
 
 
+@pytest.mark.slow
 def test_moving_the_whole_cell_changes_nothing(coarse):
     cell = coarse.cell
     X = np.eye(4)
@@ -202,6 +204,7 @@ def test_run_folder_holds_what_it_promises(four_robots, tmp_path):
     assert record["joints"]["reis"]["B1"]["margin"] == pytest.approx(37.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_same_input_gives_the_same_bytes(coarse, cells, tmp_path):
     """For pictures: what they are painted from; that painting repeats itself is tested with the plots."""
     write_run(coarse, tmp_path / "first")

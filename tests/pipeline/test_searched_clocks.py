@@ -27,6 +27,7 @@ def on_two_controllers(**checks: Any) -> Cell:
     return load_cell(SHIPPED / "planar_pair.yaml").with_values(values | checks)
 
 
+@pytest.mark.slow
 def test_a_search_has_the_same_program_without_figures_of_clocks() -> None:
     cell = on_two_controllers()
 
@@ -40,7 +41,7 @@ def test_a_search_has_the_same_program_without_figures_of_clocks() -> None:
     assert (full.program.tables, full.program.clock) == (searched.program.tables, searched.program.clock)
 
 
-@pytest.mark.parametrize("clearance_mm", [0.001, 9000])
+@pytest.mark.parametrize("clearance_mm", [pytest.param(0.001, marks=pytest.mark.slow), 9000])
 def test_what_a_cell_demands_of_stops_counts_in_a_search_too(clearance_mm: float) -> None:
     cell = on_two_controllers(**{"checks.stop": {"clearance_mm": clearance_mm}})
     scene, motion = solve_motion(cell, task=None, progress=silent)

@@ -117,5 +117,8 @@ def test_a_path_that_leads_tools_out_of_reach_is_named_by_line(given: Case) -> N
     away = JointSpline(coefficients=np.stack([start, far]), degree=5)
     cell = slowly_clocked(on_path(CELL, away), 0.01)
 
-    with pytest.raises(DivergedError, match=r"yaml:\d+: robots\.reis\.path: at 2\.9\d+ s the tool of 'abb' is"):
+    # Beyond the reach either the tool is left behind or the wrist flips first: rounding decides which.
+    with pytest.raises(
+        DivergedError, match=r"yaml:\d+: robots\.reis\.path: at 2\.9\d+ s (the tool|joint '\w+') of 'abb' "
+    ):
         case_of(cell).resolved()

@@ -36,6 +36,7 @@ def tips(case: Case, q: Array) -> Array:
     return found
 
 
+@pytest.mark.slow
 def test_euler_s_steps_lead_to_the_same_posture_the_better_the_shorter_they_are() -> None:
     """What is left falls with the step; twice the better minus the worse is better than both."""
     case = case_of(shipped("four_robots"))

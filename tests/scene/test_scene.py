@@ -61,6 +61,7 @@ def test_a_tool_ends_at_the_tool_tip(cell: Cell) -> None:
     np.testing.assert_allclose(tip, scene.chains["a"].tool_poses(q[:, cell.columns("a")])[:, :3, 3], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_single_postures_and_whole_motions_get_the_same_answer(cell: Cell) -> None:
     scene, q = Scene.from_cell(cell), configurations(cell, 60)
     touching = [scene.touching(configuration) for configuration in q]

@@ -24,6 +24,7 @@ def check_between_rows(
     *,
     accuracy: Sequence[TaskAccuracy],
     closures: Sequence[ClosureAccuracy],
+    off: Sequence[Array] | None = None,
 ) -> tuple[tuple[TaskAccuracy, ...], tuple[ClosureAccuracy, ...]]:
     """The errors of all tasks and closures with those between the rows, where the schedule knows what is desired there.
 
@@ -33,11 +34,13 @@ def check_between_rows(
         q: Positions by robot in [rad] or [m], shape (N, n) each.
         accuracy: Errors of the tasks at the rows.
         closures: Errors of the closures at the rows.
+        off: By how much each tool, those of the tasks first, may be off besides at the rows in [m] and [rad], shape
+            (N, 2) each; between two rows by no more than the value between both. None for nothing.
     """
     if not schedule.is_continuous or not (accuracy or closures):
         return tuple(accuracy), tuple(closures)
     program = ErrorsBetweenRows(scene, schedule, q)
-    of_tasks, of_closures = program.errors_between(accuracy, closures)
+    of_tasks, of_closures = program.errors_between(accuracy, closures, off)
     return (
         tuple(replace(errors, between=between) for errors, between in zip(accuracy, of_tasks, strict=True)),
         tuple(replace(errors, between=between) for errors, between in zip(closures, of_closures, strict=True)),

@@ -51,6 +51,7 @@ class _Tool:
         allowed: Largest errors allowed between the rows.
         place: Place of its task among those of the schedule; None for a grasp.
         first: First row from which on it is judged.
+        off: By how much it may be off besides at the rows in [m] and [rad], shape (N, 2); None for nothing.
     """
 
     relation: Relation
@@ -58,6 +59,13 @@ class _Tool:
     allowed: tuple[float, float]
     place: int | None
     first: int
+    off: Array | None = None
+
+    def more(self, k: Indices, s: Array) -> Array:
+        """By how much it may be off besides at shares s of steps k, shape (M, 2)."""
+        if self.off is None:
+            return np.zeros((len(k), 2))
+        return (1.0 - s)[:, None] * self.off[k] + s[:, None] * self.off[k + 1]
 
 
 class ErrorsBetweenRows:
@@ -78,10 +86,25 @@ class ErrorsBetweenRows:
         self._jumped, self._share = _within_steps(schedule.times, schedule.jumps)
 
     def errors_between(
-        self, accuracy: Sequence[TaskAccuracy], closures: Sequence[ClosureAccuracy]
+        self,
+        accuracy: Sequence[TaskAccuracy],
+        closures: Sequence[ClosureAccuracy],
+        off: Sequence[Array] | None = None,
     ) -> tuple[list[BetweenRows], list[BetweenRows]]:
-        """Largest errors between the rows of every task and of every closure."""
+        """Largest errors between the rows of every task and of every closure.
+
+        Args:
+            accuracy: Errors of the tasks at the rows.
+            closures: Errors of the closures at the rows.
+            off: By how much each tool may be off besides at the rows, in [m] and [rad], shape (N, 2) each. As it is no
+                more between two rows than the value between both, it keeps the bound as it is: a chord of errors and
+                an even length are no longer together than at an end.
+        """
         tools = [*self._task_tools(accuracy), *self._closure_tools(closures)]
+        if off is not None:
+            tools = [
+                replace(tool, off=each, at_rows=tool.at_rows + each) for tool, each in zip(tools, off, strict=True)
+            ]
         count = len(self._schedule.times) - 1
         middle, sag = self._middles(tools, count)
         bounds = [self._bounds(tool, middle[:, place], sag[:, place]) for place, tool in enumerate(tools)]
@@ -170,6 +193,7 @@ class ErrorsBetweenRows:
             error = errors_on_part(X_PT, desired, relation)
             errors[:, place, 0] = np.linalg.norm(error[:, :3], axis=1)
             errors[:, place, 1] = np.linalg.norm(error[:, 3:], axis=1)
+            errors[:, place] += tool.more(k, s)
         return errors
 
     def _bounds(self, tool: _Tool, middle: Array, sag: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from cellplan.collision.bodies import BodyPoses, CollisionBody
 from cellplan.collision.engine import Engine
 from cellplan.collision.overlap.containment import is_inside
-from cellplan.collision.overlap.sunk_points import deepest_point
+from cellplan.collision.overlap.sunk_points import SUNK_TOL, deepest_point
 from cellplan.collision.separation import heights
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
@@ -29,12 +29,15 @@ MAX_LEVELS: Final = 40  # [-] times that triangles are cut, at most: by then the
 WORK: Final = 2_000_000  # [-] products of a direction and a vertex worked out at once: 16 MB
 
 
-def overlap_depth(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> float:
+def overlap_depth(
+    engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int, tolerance: float = SUNK_TOL
+) -> float:
     """Depth of two solids at a sample in [m]; zero where they do not overlap.
 
     Exact to 0.01 mm and 0.1 %, and never less than the truth, for convex solids. Where one is a mesh that is not
     convex, it is the depth of the deepest point of the surface of one inside the other (see ``sunk_points``), which is
-    never more than the way out. Of two open meshes that touch, the depth of their convex hulls is taken.
+    never more than the way out, and less than that depth by no more than the tolerance in [m]. Of two open meshes that
+    touch, the depth of their convex hulls is taken.
     """
     first, second = pair
     if _are_far(engine, pair, poses, sample=sample):
@@ -50,7 +53,9 @@ def overlap_depth(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sa
         return 0.0
     if not (_is_solid(a) or _is_solid(b)):
         return depth
-    return min(depth, max(deepest_point(b, a, R_AB, p_AB), deepest_point(a, b, R_AB.T, -R_AB.T @ p_AB)))
+    of_second = deepest_point(b, a, R_AB, p_AB, tolerance=tolerance)
+    of_first = deepest_point(a, b, R_AB.T, -R_AB.T @ p_AB, tolerance=tolerance)
+    return min(depth, max(of_first, of_second))
 
 
 def ground_depth(body: CollisionBody, poses: BodyPoses, index: int, *, X_WS: Array) -> Array:

@@ -7,6 +7,7 @@ Why not a library: trimesh's rays took 31.8 s for 3969 oblique rays on 20 000 tr
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -16,6 +17,7 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Mesh
 
 MAX_LEAF: Final = 4  # triangles in a leaf of the tree, at most
+MOST_KEPT: Final = 32  # trees
 RAY_CHUNK: Final = 2048  # rays followed at once
 BOX_FRACTION: Final = 1e-9  # [-] of the extent: boxes are grown by it so that rays along their faces stay in
 EDGE_TOL: Final = 1e-14  # [-] rounding of a triple product against the squared distance of the corners
@@ -79,7 +81,7 @@ def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
     triangles = mesh.vertices[mesh.faces]
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     ahead = np.sum((middle - origins) * rays, axis=1)  # rays are followed from their point nearest to the middle
-    tree = _Tree.over(triangles)
+    tree = _tree(mesh)
     face, way = np.full(len(origins), -1), np.full(len(origins), np.inf)
     for first in range(0, len(origins), RAY_CHUNK):
         chosen = slice(first, first + RAY_CHUNK)
@@ -111,7 +113,7 @@ class _Tree:
         low, high = triangles.min(axis=1), triangles.max(axis=1)
         depth = max(0, int(np.ceil(np.log2(len(triangles) / MAX_LEAF))))
         per_leaf = -(-len(triangles) // 2**depth)
-        order = np.argsort(_morton(0.5 * (low + high)), kind="stable")
+        order = along_curve(0.5 * (low + high))
         order = np.pad(order, (0, per_leaf * 2**depth - len(order)), mode="edge").reshape(-1, per_leaf)
         slack = BOX_FRACTION * float(np.abs(triangles - triangles[0, 0]).max())
         lows, highs = [low[order].min(axis=1) - slack], [high[order].max(axis=1) + slack]
@@ -129,6 +131,17 @@ class _Tree:
             passed = _passes(low[node] - starts[ray], high[node] - starts[ray], rays[ray])
             ray, node = ray[passed], node[passed]
         return np.repeat(ray, self.order.shape[1]), self.order[node].ravel()
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _tree(mesh: Mesh) -> _Tree:
+    """The tree of a mesh; a path, or a depth, asks for the same mesh again and again."""
+    return _Tree.over(mesh.vertices[mesh.faces])
+
+
+def along_curve(points: Array) -> Indices:
+    """Order of points, shape (M, 3), along a space-filling curve, shape (M,): groups of neighbours stay together."""
+    return np.argsort(_morton(points), kind="stable")
 
 
 def _morton(points: Array) -> NDArray[np.uint64]:
@@ -165,7 +178,7 @@ def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
         directions: Unit directions, shape (N, 3).
     """
     triangles = mesh.vertices[mesh.faces]
-    tree = _Tree.over(triangles)
+    tree = _tree(mesh)
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     ahead = np.sum((middle - points) * directions, axis=1)
     lines, ways, enters = [], [], []

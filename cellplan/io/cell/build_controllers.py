@@ -16,6 +16,8 @@ from cellplan.model.robot import RobotModel
 ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
 EXTERNAL: Final = 6  # external axes that a row of these programs holds
 OF_SIX_AXES: Final = frozenset({ControllerKind.ABB, ControllerKind.KUKA, ControllerKind.STAUBLI})
+SIGNALS: Final = {"kuka": (1, 4096), "ur": (0, 7)}  # first and last number, by kinds whose signals are numbers
+FRAMES: Final = {"kuka": 128}  # largest number of a tool or base, by kind
 WITH_GROUPS: Final = (ControllerKind.FANUC, ControllerKind.YASKAWA)
 Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
 
@@ -84,6 +86,8 @@ def control_findings(
         elif control.id in valid.controllers:
             entry = valid.controllers[control.id]
             yield from _of_kind(path, control, entry, document)
+            yield from _signals((*path, "handshake"), control, entry, document)
+            yield from _frames(path, control, entry, document)
             if name in models:
                 yield from _joints((*path, "id"), entry, models[name], document)
     yield from _without_robots(valid, document)
@@ -136,6 +140,36 @@ def _handshake(
         if robot not in others:
             text = unknown_name("another robot of this cell", robot, others)
             yield document.key_finding((*path, "inputs", robot), text)
+
+
+def _signals(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Signals are numbered, or named, as controllers of the kind do."""
+    if control.handshake is None:
+        return
+    stated: list[tuple[KeyPath, str | int]] = [((*path, "output"), control.handshake.output)]
+    stated += [((*path, "inputs", robot), signal) for robot, signal in control.handshake.inputs.items()]
+    for place, signal in stated:
+        if entry.kind in SIGNALS:
+            first, last = SIGNALS[entry.kind]
+            if not isinstance(signal, int) or not first <= signal <= last:
+                text = f"expected a whole number from {first} to {last}, as controllers of kind {entry.kind} number "
+                yield document.finding(place, f"{text}their signals, got {signal!r}")
+        elif entry.kind == "abb" and isinstance(signal, int):
+            text = f"expected a name, as controllers of kind abb name their signals, got {signal}"
+            yield document.finding(place, text)
+
+
+def _frames(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Numbers of tools and bases that a controller of the kind has."""
+    last = FRAMES.get(entry.kind)
+    for key, number in (("tool_number", control.tool_number), ("base_number", control.base_number)):
+        if last is not None and number is not None and number > last:
+            text = f"expected at most {last}, as many as controllers of kind {entry.kind} have, got {number}"
+            yield document.finding((*path, key), text)
 
 
 def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:

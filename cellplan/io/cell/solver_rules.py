@@ -34,8 +34,11 @@ def accurate_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[F
     if solver is None or solver.integrator != "accurate":
         return
     if solver.method not in ACCURATE_METHODS:
-        text = f"expected {listed(ACCURATE_METHODS)} in the accurate mode, got {shown(solver.method)}; choose it, "
-        yield document.finding(("solver", "method"), text + OR_EULER)
+        text = (
+            f"expected {listed(ACCURATE_METHODS)} in the accurate mode, got {shown(solver.method)}, which "
+            f"{METHODS[solver.method].steps_because}; choose {listed(ACCURATE_METHODS)}, {OR_EULER}"
+        )
+        yield document.finding(("solver", "method"), text)
 
 
 def _goals(solver: SolverEntry) -> list[str]:

@@ -9,7 +9,7 @@ from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.model.cell import Cell
-from cellplan.model.exported import Targets
+from cellplan.model.exported import Promise, Targets
 
 THIN_MM: Final = 0.05  # [mm] a tool or sliding joint, where rows may be left out and nothing is chosen
 THIN_DEG: Final = 0.05  # [deg] a turning joint, likewise
@@ -27,6 +27,7 @@ class Choice:
         thin_mm: How far a tool on the part, or a sliding joint, may be off in [mm] where rows are left out; None for
             what is usual.
         thin_deg: How far a turning joint may be off in [deg], likewise.
+        promise: What is to be promised; None for the best that holds.
     """
 
     robots: tuple[str, ...] = ()
@@ -34,6 +35,7 @@ class Choice:
     split: int | None = None
     thin_mm: float | None = None
     thin_deg: float | None = None
+    promise: Promise | None = None
 
     @property
     def is_thinned(self) -> bool:
@@ -48,6 +50,8 @@ class Choice:
         """
         if self.targets not in dialect.targets:
             raise InputError(f"--targets: expected {listed(dialect.targets)} with {dialect.name}, got {self.targets}")
+        if self.promise is not None and self.promise not in dialect.promises:
+            raise InputError(f"--promise: expected {listed(dialect.promises)} with {dialect.name}, got {self.promise}")
         if self.split is not None and dialect.split is None:
             raise InputError(f"--split: expected no --split with {dialect.name}, whose files have no limit")
         if self.split is not None and not LEAST_SPLIT <= self.split <= (dialect.split or 0):

@@ -1,14 +1,12 @@
 """Judgement of a written program: every demand of the cell once more, on what a reader found in the files."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from cellplan.cache import nothing_kept
-from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.verify import stacked
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.geometry.arrays import Array
@@ -16,16 +14,14 @@ from cellplan.model.exported import ExportJob, ProgramRows, Promise
 from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.compare_rows import other_rows
-from cellplan.pipeline.export.judge_path import PathRows, keeps_demands, path_findings
+from cellplan.pipeline.export.judge_path import PathRows, path_findings, path_rows
 from cellplan.pipeline.export.judge_speeds import joint_findings, motion_findings, position_findings
-from cellplan.pipeline.export.margins import off_chords, tool_margins
 from cellplan.pipeline.export.part_errors import ToolsOnPart
 from cellplan.pipeline.export.played import Played, Stretch
 from cellplan.pipeline.export.rows import full_rows
 from cellplan.pipeline.export.shared import Shared, played_digest
 from cellplan.scene.scene import Scene
 
-BLENDS: Final = (0.5, 0.25, 0.1)  # [-] shares that are tried, the largest first
 SAME: Final = 1e-12  # [rad] or [m] cycles that are played alike are judged once
 HELD_TOL: Final = (
     1e-3  # [rad] or [m] a robot that holds may be off by rounding, and by a cycle that begins beside a phase
@@ -103,7 +99,7 @@ def judge(
         return Judgement(findings=tuple(findings))
     with nothing_kept():
         shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
-        programs = list(_played(run, dialect, job, read, lead=lead))
+        programs = list(played_programs(run, dialect, job, read, lead=lead))
         for played in programs:
             own_findings, own_deviations, own_corners = _judged_once(played, shared, dialect, job)
             findings += own_findings
@@ -118,29 +114,7 @@ def judge(
     )
 
 
-def largest_blend(
-    run: VerifiedRun, dialect: Dialect, job: ExportJob, *, lead: float = 0.0, shared: Shared | None = None
-) -> float:
-    """The largest share of the shorter neighbouring segment within which rows may be rounded: 0.5, 0.25, 0.1 or 0.
-
-    Args:
-        run: The verified run.
-        dialect: The format.
-        job: What is to be written; its own share does not count.
-        lead: As in ``judge``.
-        shared: As in ``judge``.
-    """
-    with nothing_kept():
-        scenes = (shared or Shared(run)).scenes
-        for blend in BLENDS:
-            tried = replace(job, blend=blend)
-            programs = _played(run, dialect, tried, job.programs, lead=lead)
-            if all(keeps_demands(rows) for played in programs for _, rows in _path_rows(played, scenes)):
-                return blend
-    return 0.0
-
-
-def _played(
+def played_programs(
     run: VerifiedRun, dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows], *, lead: float
 ) -> Iterator[Played]:
     """The programs as targets play them."""
@@ -213,17 +187,7 @@ def _path_findings(played: Played, scenes: Sequence[Scene]) -> Iterator[str]:
 def _path_rows(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[str, PathRows]]:
     """The path in every phase, with what its findings begin with."""
     for stretch, scene in _judged(played, scenes):
-        times = played.grid(stretch.begin, stretch.end)
-        rows = PathRows(
-            scene=scene,
-            schedule=stretch.motion.schedule,
-            times=times - stretch.begin,
-            q=played.at(times),
-            is_row=played.is_row(times),
-            is_break=played.is_break(times),
-            off=off_chords(played, times),
-        )
-        yield f"{stretch.motion.name}: " if stretch.motion.name else "", rows
+        yield f"{stretch.motion.name}: " if stretch.motion.name else "", path_rows(played, stretch, scene)
 
 
 def _judged(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[Stretch, Scene]]:
@@ -280,10 +244,10 @@ def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
     if not any(np.any(shares > 0.0) for shares in played.shares.values()):
         return
     for stretch, scene in _judged(played, scenes):
-        times = played.grid(stretch.begin, stretch.end)
-        arms, off = LeverArms(scene, stacked(scene.cell, played.at(times))), off_chords(played, times)
+        rows = path_rows(played, stretch, scene)
+        times = rows.times + stretch.begin
         for scheduled in stretch.motion.schedule.tasks:
-            margins = tool_margins(arms, scene, scheduled.task, off)
+            margins = rows.tool_off(scheduled.task)
             for kind, (unit, scale) in enumerate((MILLIMETRES, DEGREES)):
                 step = int(np.argmax(margins[:, kind]))
                 yield Deviation(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from cellplan.certify.certify import certify
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
+from cellplan.checks.clearance.tool_depth import check_depths, tool_depths, tool_reach
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.tools.between_checks import (
     check_between_rows,
@@ -21,14 +22,17 @@ from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.checks.verify import stacked
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.cell import Relation
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import Check, TaskAccuracy
+from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
 from cellplan.model.task import Task
 from cellplan.model.units import MM
-from cellplan.pipeline.export.margins import body_margin, tool_margin
+from cellplan.pipeline.export.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
+from cellplan.pipeline.export.played import Played, Stretch
 from cellplan.pipeline.export.schedule_at import schedule_at
-from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
+
+Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,7 +46,9 @@ class PathRows:
         q: Positions of all robots there in [rad] or [m], shape (M, n), by robot.
         is_row: Which of them are rows of the run, where what the cell demands of rows holds, shape (M,).
         is_break: Which of them are needed, the joints being straight between these already, shape (M,).
-        off: How far all joints may be from the straight motion in each step, shape (M - 1, nq).
+        off: How far each joint may be from the straight motion by itself in each step, shape (M - 1, nq).
+        corners: How far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
+            ``margins.corners_at``.
     """
 
     scene: Scene
@@ -52,6 +58,52 @@ class PathRows:
     is_row: Flags
     is_break: Flags
     off: Array
+    corners: Array
+
+    @property
+    def stacked(self) -> Array:
+        """Positions of all robots, shape (M, nq)."""
+        return stacked(self.scene.cell, self.q)
+
+    @property
+    def is_off(self) -> bool:
+        """Whether joints may be off the straight motion at all."""
+        return bool(np.any(self.off) or np.any(self.corners))
+
+    def tool_off(self, relation: Relation) -> Array:
+        """By how much a tool may be off on the part at each time in [m], and turned in [rad], shape (M, 2).
+
+        Between two times it is no more than the value between both values.
+        """
+        found = np.zeros((len(self.times), 2))
+        if not self.is_off:
+            return found
+        arms = LeverArms(self.scene, self.stacked)
+        if np.any(self.off):
+            steps = np.pad(tool_margins(arms, self.scene, relation, self.off), ((1, 1), (0, 0)))
+            found += np.maximum(steps[:-1], steps[1:])
+        return found + tool_corners(arms, self.scene, relation, self.stacked, self.corners)
+
+    def depth_off(self, task: Task) -> Array:
+        """By how much deeper a tool may be for it at each time in [m], shape (M,): as far as any point of it moves."""
+        off = self.tool_off(task)
+        found: Array = off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
+        return found
+
+
+def path_rows(played: Played, stretch: Stretch, scene: Scene) -> PathRows:
+    """The path of a program in one of its phases."""
+    times = played.grid(stretch.begin, stretch.end, with_corners=True)
+    return PathRows(
+        scene=scene,
+        schedule=stretch.motion.schedule,
+        times=times - stretch.begin,
+        q=played.at(times),
+        is_row=played.is_row(times),
+        is_break=played.is_break(times),
+        off=off_chords(played, times),
+        corners=all_corners(played, times),
+    )
 
 
 def path_findings(rows: PathRows) -> Iterator[str]:
@@ -62,60 +114,84 @@ def path_findings(rows: PathRows) -> Iterator[str]:
     yield from clearance_findings(rows)
 
 
-def keeps_demands(rows: PathRows) -> bool:
-    """Whether all of it is kept, without a word about what is not: several times as fast where something is not."""
-    arms = LeverArms(rows.scene, stacked(rows.scene.cell, rows.q))
-    for scheduled in rows.schedule.tasks:
-        margin = tool_margin(arms, rows.scene, scheduled.task, rows.off)
-        if any(off >= allowed for off, allowed in zip(margin, scheduled.task.tolerance.between, strict=True)):
-            return False
-    if not all(check.passed for check in _checks(rows)):
-        return False
+def keeps_tools(rows: PathRows) -> bool:
+    """Whether tools and further holders are where they have to be."""
+    return all(check.passed for check in _checks(rows))
+
+
+def keeps_clearance(rows: PathRows) -> bool:
+    """Whether bodies keep the distances that are demanded of them."""
     scene = _demanding(rows)
-    return certify(scene, stacked(scene.cell, rows.q)[rows.is_break], with_minimum=False, with_curves=False).is_kept
+    return certify(scene, rows.stacked[rows.is_break], with_minimum=False, with_curves=False).is_kept
 
 
 def _checks(rows: PathRows) -> list[Check]:
     """Tool errors at the rows and between them, depth, further holders, locked joints and mounted bodies."""
     scene, cell, q = rows.scene, rows.scene.cell, rows.q
-    arms = LeverArms(scene, stacked(cell, q))
-    schedule = _relaxed(schedule_at(rows.schedule, rows.times), rows, arms)
+    schedule = relaxed(schedule_at(rows.schedule, rows.times))
+    tools = [rows.tool_off(scheduled.task) for scheduled in schedule.tasks]
+    holders = [rows.tool_off(grasp) for grasp in cell.closures]
     X_WP = part_poses(cell, scene.chains, q)
     accuracy = tuple(
         task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
     )
     closures = closure_accuracy(cell, scene.chains, q, X_WP)
-    accuracy, closures = check_between_rows(scene, schedule, q, accuracy=accuracy, closures=closures)
+    strict_accuracy = accuracy
+    accuracy, closures = check_between_rows(
+        scene, schedule, q, accuracy=accuracy, closures=closures, off=[*tools, *holders]
+    )
+    accuracy = tuple(with_off(errors, off) for errors, off in zip(accuracy, tools, strict=True))
+    closures = tuple(with_off(errors, off) for errors, off in zip(closures, holders, strict=True))
     checks: list[Check] = []
-    for own, given, errors in zip(schedule.tasks, rows.schedule.tasks, accuracy, strict=True):
+    for own, given, errors, plain in zip(schedule.tasks, rows.schedule.tasks, accuracy, strict_accuracy, strict=True):
         tolerance = own.task.tolerance
         found = with_between(check_accuracy(schedule, errors, own.task), check_task_between(errors, tolerance))
-        strict = _at_rows(rows, given, errors) if all(check.passed for check in found) else ()
+        strict = _at_rows(rows, given, plain) if all(check.passed for check in found) else ()
         both = [*found, *strict]
         checks += with_locked_joints(both, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
-    checks += check_depths(cell, tool_depths(cell, schedule, scene.chains, q))
+    checks += check_depths(cell, _depths(rows, schedule))
     checks += check_locked(cell, schedule.times, q)
     checks += check_mounting(scene, stacked(cell, q), schedule.times)
     return checks
 
 
-def _relaxed(schedule: Schedule, rows: PathRows, arms: LeverArms) -> Schedule:
-    """The schedule with what is allowed between rows everywhere, less what joints may be off the straight motion."""
+def relaxed(schedule: Schedule) -> Schedule:
+    """The schedule with what is allowed between rows everywhere."""
     tasks = []
     for scheduled in schedule.tasks:
         position, orientation = scheduled.task.tolerance.between
-        margin = tool_margin(arms, rows.scene, scheduled.task, rows.off)
         allowed = replace(
             scheduled.task.tolerance,
-            position=position - margin[0],
-            orientation=orientation - margin[1],
-            position_between=position - margin[0],
-            orientation_between=orientation - margin[1],
+            position=position,
+            orientation=orientation,
+            position_between=position,
+            orientation_between=orientation,
         )
-        depth = scheduled.task.tool_depth - margin[0]
-        tasks.append(replace(scheduled, task=replace(scheduled.task, tolerance=allowed, tool_depth=depth)))
+        tasks.append(replace(scheduled, task=replace(scheduled.task, tolerance=allowed)))
     return replace(schedule, tasks=tuple(tasks))
+
+
+def with_off(errors: Errors, off: Array) -> Errors:
+    """Errors at times that are as much larger as the tool may be off there, shape (M, 2)."""
+    position, orientation = (
+        _longer(vectors, off[:, kind]) for kind, vectors in enumerate((errors.position_error, errors.orientation_error))
+    )
+    return replace(errors, position_error=position, orientation_error=orientation)
+
+
+def _longer(vectors: Array, by: Array) -> Array:
+    """Vectors of shape (M, 3) that are longer by something, shape (M,); those without a length along the first axis."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    along = np.where(lengths > 0.0, vectors / np.maximum(lengths, np.finfo(float).tiny), np.eye(3)[0])
+    return vectors + by[:, None] * along
+
+
+def _depths(rows: PathRows, schedule: Schedule) -> tuple[ToolDepth, ...]:
+    """The largest depth of the tool of each task, with what it may be deeper by rounding."""
+    found = tool_depths(rows.scene.cell, schedule, rows.scene.chains, rows.q)
+    tasks = {scheduled.task.name: scheduled.task for scheduled in schedule.tasks}
+    return tuple(replace(each, depth=each.depth + float(rows.depth_off(tasks[each.task]).max())) for each in found)
 
 
 def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple[Check, ...]:
@@ -154,10 +230,6 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
 def _demanding(rows: PathRows) -> Scene:
     """The scene of a phase whose pairs are to keep what joints may be off besides their clearance."""
     scene = scene_of_run(rows.scene, [scheduled.task.name for scheduled in rows.schedule.tasks])
-    margin = body_margin(LeverArms(scene, stacked(scene.cell, rows.q)), scene, rows.off)
-    if margin == 0.0:
+    if not rows.is_off:
         return scene
-    pairs = tuple(
-        replace(pair, demand=pair.demand + margin) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs
-    )
-    return replace(scene, pairs=pairs)
+    return raised(LeverArms(scene, rows.stacked), scene, rows.off + in_steps(rows.corners))

@@ -45,7 +45,8 @@ def skew_lines(prepared: Prepared) -> Iterator[str]:
     """What the start skew may be."""
     if prepared.skew is not None:
         least = prepared.skew.least
-        yield f"allowed skew {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}"
+        across = "" if prepared.job.frame.cell.program is None else "; across the ends of phases too"
+        yield f"allowed skew {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}{across}"
 
 
 def deviation_line(judgement: Judgement) -> str:
@@ -65,7 +66,9 @@ def rounding_line(blend: float, judgement: Judgement) -> str:
     most = {each.unit: max(o.largest for o in judgement.corners if o.unit == each.unit) for each in judgement.corners}
     off = " and ".join(f"{largest:.2g} {unit}" for unit, largest in most.items()) or "nothing"
     rounded, count = judgement.rounded
-    return f"{rounded} of {count} rows rounded within {blend:g} of the shorter segment: tools off by at most {off} more"
+    return (
+        f"{rounded} of {count} rows rounded within {blend:g} of their segments or less: tools off by at most {off} more"
+    )
 
 
 def _deviation(deviation: Deviation) -> str:

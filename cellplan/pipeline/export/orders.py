@@ -6,7 +6,7 @@ a rectangle is not clear further ones are set inside it, as few as the rows allo
 the motion that the run proves. No tool waits for others while it is in process.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.free_clocks import ClockRegion, RegionBound, certify_regions
+from cellplan.certify.lever_arms import LeverArms
 from cellplan.errors import NotVerifiedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
@@ -21,6 +22,7 @@ from cellplan.model.exported import ProgramRows
 from cellplan.model.progress import Progress, silent
 from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.margins import raised
 from cellplan.pipeline.export.run_programs import RunPhase, RunProgram, run_programs, scenes_of
 from cellplan.pipeline.plan.program import STILL_TOL
 from cellplan.scene.scene import Scene
@@ -103,7 +105,12 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
 
 
 def certify_written(
-    run: VerifiedRun, orders: Sequence[Orders], read: Sequence[ProgramRows], *, progress: Progress = silent
+    run: VerifiedRun,
+    orders: Sequence[Orders],
+    read: Sequence[ProgramRows],
+    corners: Sequence[Mapping[str, Array]],
+    *,
+    progress: Progress = silent,
 ) -> Iterator[str]:
     """Certify every order once more on rows that were read: findings, one for each pair that is not clear.
 
@@ -111,28 +118,52 @@ def certify_written(
         run: The run, whose rows are those of robots that are not exported.
         orders: Marks of its programs.
         read: What a reader found in the programs, marks included.
+        corners: How far each robot may be off at its rows by rounding, see ``margins.robot_corners``, by program.
         progress: Called with the stage and the fraction done.
     """
-    scenes = scenes_of(run)
-    for program, own, rows in zip(run_programs(run), orders, read, strict=True):
+    for own, rows, off in zip(orders, read, corners, strict=True):
         for name, each in rows.robots.items():
             if len(each.marks) != len(own.marks):
                 yield f"program of '{name}': expected {len(own.marks)} marks, got {len(each.marks)}"
                 return
-        known: set[tuple[bytes, ...]] = set()
-        for count, stretch in enumerate(own.stretches):
-            progress(STAGE, count / len(own.stretches))
-            if not stretch.pairs:
-                continue
-            q = _positions(run.cell, program, rows, count, stretch)
-            key = (str(stretch.place).encode(), *(each.tobytes() for each in q.values()))
-            if key in known:  # a further cycle
-                continue
-            known.add(key)
-            regions = [_region(q, pair) for pair in stretch.pairs]
-            for bound in certify_regions(scenes[stretch.place], q, regions):
-                if not bound.is_kept:
-                    yield _not_clear(stretch.phase, bound, program.times[[stretch.first, stretch.last]])
+        yield from dict.fromkeys(finding for _, finding in blocked_orders(run, own, rows, off, progress=progress))
+
+
+def blocked_orders(
+    run: VerifiedRun,
+    orders: Orders,
+    rows: ProgramRows,
+    corners: Mapping[str, Array],
+    *,
+    progress: Progress = silent,
+) -> Iterator[tuple[int, str]]:
+    """Places of the stretches of a program in which a pair is not clear in every order, with what is not.
+
+    Args:
+        run: The run, whose rows are those of robots that are not exported.
+        orders: Marks of the program.
+        rows: Its rows, with as many marks.
+        corners: How far each robot may be off at its rows by rounding, in [rad] or [m], shape (N, n), by robot.
+        progress: Called with the stage and the fraction done.
+    """
+    scenes = scenes_of(run)
+    program = next(each for each in run_programs(run) if each.name == orders.program)
+    known: dict[tuple[bytes, ...], list[str]] = {}
+    for count, stretch in enumerate(orders.stretches):
+        progress(STAGE, count / len(orders.stretches))
+        if not stretch.pairs:
+            continue
+        q, off = _positions(run.cell, program, rows, count, stretch), _off(run.cell, rows, corners, count)
+        key = (str(stretch.place).encode(), *(each.tobytes() for each in q.values()), off.tobytes())
+        if key not in known:  # or else a further cycle
+            scene, regions = scenes[stretch.place], [_region(q, pair) for pair in stretch.pairs]
+            if np.any(off):
+                ends = [np.stack([each.min(axis=0), each.max(axis=0)]) for each in q.values()]
+                scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off[None], in_step=False)
+            times = program.times[[stretch.first, stretch.last]]
+            bounds = certify_regions(scene, q, regions)
+            known[key] = [_not_clear(stretch.phase, bound, times) for bound in bounds if not bound.is_kept]
+        yield from ((count, finding) for finding in known[key])
 
 
 class PhaseSearch:
@@ -229,6 +260,15 @@ def _positions(cell: Cell, program: RunProgram, rows: ProgramRows, count: int, s
         if len(found[robot.name]) < 2:
             found[robot.name] = np.repeat(found[robot.name], 2, axis=0)
     return found
+
+
+def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int) -> Array:
+    """How far all joints may be off by rounding between two marks, in [rad] or [m], shape (nq,)."""
+    off = np.zeros(cell.joint_count)
+    for name, each in rows.robots.items():
+        between = slice(each.marks[count], each.marks[count + 1] + 1)
+        off[cell.columns(name)] = corners[name][between].max(axis=0, initial=0.0)
+    return off
 
 
 def _not_clear(phase: str, bound: RegionBound, times: Array) -> str:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.joints import Axes, to_numbers
-from cellplan.export.rapid_targets import QUARTER, configuration
-from cellplan.export.rapid_units import part_frame, works_on_part
+from cellplan.export.rapid.targets import QUARTER, configuration
+from cellplan.export.rapid.units import part_frame, works_on_part
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows

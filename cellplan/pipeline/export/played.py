@@ -159,19 +159,22 @@ class Played:
             if end > begin:
                 yield Stretch(place=place, motion=run.motions[place], begin=float(begin), end=float(end))
 
-    def grid(self, begin: float, end: float, *, with_run: bool = True) -> Array:
+    def grid(self, begin: float, end: float, *, with_run: bool = True, with_corners: bool = False) -> Array:
         """Times in [s] from begin to end, between which joints move evenly, or on a part of a cubic taken as even.
 
         Args:
             begin: First time.
             end: Last time.
             with_run: Whether the rows of the run are among them.
+            with_corners: Whether the times are among them at which the rounding of a row begins and ends.
         """
         times = [times_of(self.rows[name]) for name in self.exported]
         if self.interpolation is Interpolation.CUBIC:
             times = [_finer(times_of(self.rows[name]), self.parts(name)) for name in self.exported]
         if with_run or len(self.exported) < len(self.rows):
             times.append(self.run_times)
+        if with_corners:
+            times += [_ends_of_corners(times_of(self.rows[name]), self.shares[name]) for name in self.exported]
         every = np.unique(np.concatenate(times))
         inner = every[(every > begin + SAME_TIME) & (every < end - SAME_TIME)]
         inner = inner[np.diff(inner, prepend=-np.inf) > SAME_TIME]
@@ -193,6 +196,12 @@ def _is_near(times: Array, others: Array) -> Flags:
     after = np.clip(np.searchsorted(others, times), 1, len(others) - 1)
     near: Flags = np.minimum(np.abs(others[after] - times), np.abs(others[after - 1] - times)) <= SAME_TIME
     return near
+
+
+def _ends_of_corners(times: Array, shares: Array) -> Array:
+    """Times at which the rounding of rows begins and ends."""
+    rows, h = np.flatnonzero(shares > 0.0), np.diff(times)
+    return np.concatenate([times[rows] - shares[rows] * h[rows - 1], times[rows] + shares[rows] * h[rows]])
 
 
 def _finer(times: Array, parts: int) -> Array:

@@ -12,17 +12,18 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.units import DEG, MM
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
-from cellplan.pipeline.export.judge import largest_blend
 from cellplan.pipeline.export.orders import Orders
 from cellplan.pipeline.export.part_targets import with_part_poses
 from cellplan.pipeline.export.promises import Promised, choose_promise, controllers_of
 from cellplan.pipeline.export.resample import lead_time, resampled
+from cellplan.pipeline.export.round_rows import stops_left, with_rounding
 from cellplan.pipeline.export.rows import full_rows, kept_rows
 from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.skew import RunSkew, run_skew
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 
 FINER: Final = 0.3  # [-] of the usual thinning, where no rounding keeps the demands with that: it adds rows, not stops
+FEW_STOPS: Final = 0.1  # [-] of the rows that may be rounded: where more of them stay stops, more rows are tried
 BOTH: tuple[Promise, ...] = (Promise.TIMED, Promise.SYNCHRONISED)  # promises that keep the rows of robots together
 
 
@@ -34,6 +35,7 @@ class Prepared:
         dialect: The format.
         job: Frame and rows, without notes.
         promised: What is promised.
+        asked: The promise that was asked for; None where the best one was.
         skew: What the start skew may be; None where there is one controller only, or the promise does not depend on it.
         orders: Marks and what was certified between them, of each program; empty unless robots wait at marks.
         thinning: How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out.
@@ -44,6 +46,7 @@ class Prepared:
     dialect: Dialect
     job: ExportJob
     promised: Promised
+    asked: Promise | None
     skew: RunSkew | None
     orders: tuple[Orders, ...]
     thinning: tuple[float, float] | None
@@ -71,7 +74,7 @@ def prepare(
     shared = shared or Shared(run)
     robots = exported_robots(run.cell, dialect, choice.robots)
     skew = run_skew(run, progress=progress) if Promise.TIMED in dialect.promises else None
-    promised = choose_promise(run, dialect, robots, skew=skew)
+    promised = choose_promise(run, dialect, robots, skew=skew, asked=choice.promise)
     frame = frame_of(run, robots, promised.promise, choice)
     if is_at_cycle(dialect, frame.promise) and choice.is_thinned:
         raise InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
@@ -79,14 +82,17 @@ def prepare(
     has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
     job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
-    if dialect.is_rounded and job.blend == 0.0 and not choice.is_thinned and not is_at_cycle(dialect, frame.promise):
+    is_rounded = dialect.is_rounded and not is_at_cycle(dialect, frame.promise)
+    stops, count = stops_left(job) if is_rounded else (0, 0)
+    if stops > FEW_STOPS * count and not choice.is_thinned:
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
         other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
-        job, choice = (other, finer) if other.blend > 0.0 else (job, choice)
+        job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
     return Prepared(
         dialect=dialect,
         job=job,
         promised=promised,
+        asked=choice.promise,
         skew=skew if promised.promise is Promise.TIMED else None,
         orders=orders,
         thinning=thinning_of(dialect, promised.promise, choice),
@@ -104,7 +110,8 @@ def _job(
         programs = with_part_poses(frame, programs)
     job = ExportJob(frame=frame, programs=programs)
     if dialect.is_rounded and not is_at_cycle(dialect, frame.promise):
-        job = replace(job, blend=largest_blend(shared.run, dialect, job, lead=lead, shared=shared))
+        read = None if frame.targets is Targets.PART else dialect.read(frame, dialect.render(job))
+        job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
     return job, lead
 
 

@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import Promise
 from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.export.dialects import DIALECTS
 from cellplan.pipeline.export.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.pipeline.export.skew import PER_SECOND, ClockPair, RunSkew, skew_text
 
@@ -51,6 +52,7 @@ class _Export:
     dialect: Dialect
     robots: tuple[str, ...]
     skew: RunSkew | None
+    asked: Promise | None
 
     @property
     def controllers(self) -> list[Controller]:
@@ -60,21 +62,28 @@ class _Export:
 
 
 def choose_promise(
-    run: VerifiedRun, dialect: Dialect, robots: Sequence[str], *, skew: RunSkew | None = None
+    run: VerifiedRun,
+    dialect: Dialect,
+    robots: Sequence[str],
+    *,
+    skew: RunSkew | None = None,
+    asked: Promise | None = None,
 ) -> Promised:
-    """The best promise that a format can keep for some robots of a run.
+    """The best promise that a format can keep for some robots of a run, or the one that is asked for.
 
     Args:
         run: The run.
         dialect: The format.
         robots: Names of the robots that are exported.
         skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
+        asked: The only promise that will do; None for the best.
 
     Raises:
         InputError: None can be kept, as something is not stated in the cell.
-        NotVerifiedError: None can be kept with this motion.
+        NotVerifiedError: None can be kept with this motion; the first line says why not the least one that the format
+            can hold, indented ones say why not the better ones.
     """
-    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew)
+    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, asked=asked)
     found: dict[Promise, _Against] = {}
     for promise in BEST_FIRST:
         against = _against(export, promise)
@@ -85,7 +94,9 @@ def choose_promise(
     unstated = [found[promise].text for promise in dialect.promises if found[promise].is_input]
     if unstated:
         raise InvalidFileError([InputError(text) for text in unstated])
-    raise NotVerifiedError([f"{dialect.name}: not {promise}: {each.text}" for promise, each in found.items()])
+    *better, last = [promise for promise in found if promise in dialect.promises]
+    details = [f"  not {promise}: {found[promise].text}" for promise in better]
+    raise NotVerifiedError([f"{dialect.name}: not {last}: {found[last].text}", *details])
 
 
 def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:
@@ -101,6 +112,8 @@ def _against(export: _Export, promise: Promise) -> _Against | None:
     """Why a promise cannot be made; None where it can."""
     if promise not in export.dialect.promises:
         return _Against(f"{export.dialect.name} programs cannot state it")
+    if export.asked is not None and promise is not export.asked:
+        return _Against(f"'{export.asked}' was asked for")
     match promise:
         case Promise.TIMED:
             return _against_timed(export)
@@ -168,10 +181,34 @@ def _remarks(export: _Export, promise: Promise) -> Iterator[str]:
             if len(set(controllers_of(cell, every).values())) > 1:
                 yield ONE_CLOCK
             yield from _skew_remarks(export)
+            if Promise.SEQUENCE_ONLY in export.dialect.promises and _against_sequence(export) is None:
+                yield from _unmet(export)
         case Promise.SYNCHRONISED:
             yield "same row at the same time within the blend zones; the controller may take longer than planned"
         case Promise.SEQUENCE_ONLY:
             yield "the controller makes the speed between rows: times and feeds of the plan are not kept"
+            yield from _unwritten(cell)
+
+
+def _unmet(export: _Export) -> Iterator[str]:
+    """What timed programs without waits are no match for: robots of other formats that wait for them."""
+    others = [robot.name for robot in export.run.cell.robots if robot.name not in export.robots]
+    if any(waits(export.run.cell, name) for name in others):
+        yield "not to be played with programs that wait at marks: --promise sequence writes those that do"
+
+
+def _unwritten(cell: Cell) -> Iterator[str]:
+    """Robots that have to wait at the marks, and that no format is written for."""
+    names = [robot.name for robot in cell.robots if not waits(cell, robot.name)]
+    if names and len(cell.robots) > 1:
+        yield f"no format writes the waits of {listed(names)}: program the marks of export.json there by hand"
+
+
+def waits(cell: Cell, robot: str) -> bool:
+    """Whether the controller of a robot plays a format whose programs wait for one another at marks."""
+    control = cell.robot(robot).control
+    kind = None if control is None else cell.controllers[control.controller].kind
+    return any(kind in each.kinds and Promise.SEQUENCE_ONLY in each.promises for each in DIALECTS.values())
 
 
 def _skew_remarks(export: _Export) -> Iterator[str]:

@@ -33,6 +33,7 @@ def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Rec
     frame = written.job.frame
     about = {
         "promise": str(frame.promise),
+        "asked_promise": None if prepared.asked is None else str(prepared.asked),
         "reasons": list(prepared.promised.reasons),
         "remarks": list(prepared.promised.remarks),
         "robots": list(frame.robots),

@@ -66,8 +66,14 @@ class StoredExport:
             split = required(self.record, "split", int, file=self.where)
         mm, deg = (None, None) if thinning is None else (self._number("mm"), self._number("deg"))
         targets = Targets(self._one_of("targets", [str(each) for each in Targets]))
+        asked = self.record.get("asked_promise")
         return Choice(
-            robots=tuple(str(name) for name in robots), targets=targets, split=split, thin_mm=mm, thin_deg=deg
+            robots=tuple(str(name) for name in robots),
+            targets=targets,
+            split=split,
+            thin_mm=mm,
+            thin_deg=deg,
+            promise=None if asked is None else Promise(self._one_of("asked_promise", [str(each) for each in Promise])),
         )
 
     def changed(self) -> Iterator[InputError]:

@@ -94,7 +94,8 @@ def _made_again(
     except InputError as error:
         raise _placed(stored, error) from None
     except NotVerifiedError as error:
-        raise NotVerifiedError([f"{stored.folder}: {finding}" for finding in error.findings]) from None
+        named = (each if each.startswith("  ") else f"{stored.folder}: {each}" for each in error.findings)
+        raise NotVerifiedError([*named]) from None
 
 
 def _read(stored: StoredExport, run: VerifiedRun, choice: Choice) -> Any:

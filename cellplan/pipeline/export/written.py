@@ -1,22 +1,25 @@
 """Written: the files of an export, read back by the reader of their format and judged as they were read."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.model.exported import ExportJob, ProgramRows, RobotRows, Targets
+from cellplan.export.timed_rows import cycle_of
+from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows, Targets
 from cellplan.model.progress import Progress, silent
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.judge import Judgement, judge
+from cellplan.pipeline.export.judge import Judgement, judge, played_programs
+from cellplan.pipeline.export.margins import robot_corners
 from cellplan.pipeline.export.notes import export_notes
 from cellplan.pipeline.export.orders import certify_written
 from cellplan.pipeline.export.part_targets import joints_of_part_poses
-from cellplan.pipeline.export.prepare import Prepared
+from cellplan.pipeline.export.prepare import Prepared, is_at_cycle
 
 STAGE: Final = "checking what was written"
+RATIO_NOISE: Final = 1e-9  # [-] of a step that is the cycle of a controller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,10 +98,37 @@ def judged(
     progress(STAGE, 1.0)
     findings = list(found.findings)
     if not findings and prepared.orders:
-        findings += certify_written(run, prepared.orders, read, progress=progress)
+        played = played_programs(run, prepared.dialect, prepared.job, read, lead=prepared.lead)
+        corners = [robot_corners(each) for each in played]
+        findings += certify_written(run, prepared.orders, read, corners, progress=progress)
     if findings:
-        raise NotVerifiedError(findings)
+        named = [f"{prepared.dialect.name}: {finding}" for finding in findings]
+        raise NotVerifiedError([*named, *_unresolved(run, prepared, named), *_stated_coarsely(run, prepared)])
     return found
+
+
+def _unresolved(run: VerifiedRun, prepared: Prepared, findings: Sequence[str]) -> Iterator[str]:
+    """A detail of findings of accelerations: steps of the run that are longer than the cycle of a controller."""
+    shortest = min(cycle_of(run.cell.robot(name)) for name in prepared.job.frame.robots)
+    step = run.cell.motion.step
+    is_timed = prepared.job.frame.promise is Promise.TIMED
+    if is_timed and step > (1.0 + RATIO_NOISE) * shortest and any("acceleration" in finding for finding in findings):
+        yield f"  motion.step_s: {step:g} is stated; steps of {shortest:g}, a controller's cycle, resolve accelerations"
+
+
+def _stated_coarsely(run: VerifiedRun, prepared: Prepared) -> Iterator[str]:
+    """Details of findings: what the cell states of the robots that makes rows coarse."""
+    dialect, robots = prepared.dialect, [run.cell.robot(name) for name in prepared.job.frame.robots]
+    for robot in robots if dialect.kinds else ():
+        decimals = None if robot.control is None else robot.control.decimals
+        if decimals is not None and decimals < dialect.decimals:
+            key = f"robots.{robot.name}.controller.decimals"
+            yield f"  {key}: {decimals} are stated, the usual ones of {dialect.name} are {dialect.decimals}"
+    if is_at_cycle(dialect, prepared.job.frame.promise):
+        cycles = {robot.name: cycle_of(robot) for robot in robots if robot.name in run.cell.positioners}
+        if len(set(cycles.values())) > 1:
+            shown = " and ".join(f"{1e3 * cycle:g} ms of {name}" for name, cycle in cycles.items())
+            yield f"  cycle_ms: {shown}: holders of one part that share a cycle strain it less between rows"
 
 
 def same_rows(one: Sequence[ProgramRows], other: Sequence[ProgramRows]) -> bool:

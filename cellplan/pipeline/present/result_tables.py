@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.export.wide_columns import wide_columns
+from cellplan.export.wide.columns import wide_columns
 from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.json_reader import parse_json
 from cellplan.io.run.folder import MANIFEST

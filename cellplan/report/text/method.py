@@ -47,6 +47,8 @@ def _integration_lines(record: Record, step: str) -> Iterator[str]:
     if record["integrator"] != Integrator.ACCURATE:
         steps = f", Euler steps of {step}" if traits.takes_euler_steps else ""
         yield f"Method: {name}{steps}." if traits.is_search else f"Method: {name}{steps}; {feedback}."
+        if not traits.is_accurate:
+            yield no_accurate_mode(record["method"])
         return
     yield f"Method: {name}."
     if resolution is None:
@@ -64,6 +66,11 @@ def _integration_lines(record: Record, step: str) -> Iterator[str]:
             f"Collocation failed at {resolution['euler_from_s']:.3f} s; continued with Euler steps of {step}{reason}; "
             f"{feedback}."
         )
+
+
+def no_accurate_mode(method: MethodName) -> str:
+    """Why a method steps along the clock, as a sentence."""
+    return f"No accurate mode: {method} {METHODS[method].steps_because}."
 
 
 def _counted(count: int, what: str) -> str:

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
+from cellplan.model.solver import METHODS
 from cellplan.report.record.common import Record
 from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
-from cellplan.report.text.method import DEFAULT_METHOD
+from cellplan.report.text.method import DEFAULT_METHOD, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
 from cellplan.report.text.skew import skew_row
 from cellplan.report.text.stops import stop_rows
@@ -44,7 +45,7 @@ def figure_lines(record: Record, more: str) -> list[str]:
     return [
         *_program_lines(record),
         *aligned(_rows(record)),
-        *_fallback_lines(record["solver"]),
+        *_integration_lines(record["solver"]),
         *(f"  note: {line}" for line in record.get("remarks", [])),
         *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grip_notes(record)),
@@ -191,8 +192,10 @@ def _slack_rows(slack: Record | None) -> Iterator[Row]:
         yield "largest task slack", f"{slack['max']:.2g}", f"{slack['unit']}{_time(slack['max_at_s'])}"
 
 
-def _fallback_lines(solver: Record) -> Iterator[str]:
-    """The time at which collocation failed."""
+def _integration_lines(solver: Record) -> Iterator[str]:
+    """Why a method has no accurate mode; the time at which collocation failed."""
+    if not METHODS[solver["method"]].is_accurate:
+        yield f"  note: {no_accurate_mode(solver['method'])}"
     resolution = solver.get("resolution")
     if resolution and solver["integrator"] == "accurate" and resolution["euler_from_s"] is not None:
         lost = resolution.get("lost")

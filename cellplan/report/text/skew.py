@@ -7,7 +7,7 @@ from cellplan.model.skew import MOST_SKEW, PairSkew, SkewReport
 from cellplan.report.record.common import Record
 from cellplan.report.text.columns import Row
 
-DIGITS = 2  # significant ones of a skew
+DIGITS = 3  # significant ones of a skew
 
 
 def skew_row(record: Record) -> Iterator[Row]:
@@ -39,7 +39,7 @@ def skew_notes(skew: SkewReport) -> tuple[str, ...]:
 
 
 def skew_text(skew_ms: float, *, or_more: bool) -> str:
-    """A skew in milliseconds, rounded down to two significant digits, so that a small one is not none."""
+    """A skew in milliseconds, rounded down to three significant digits, so that a small one is not none."""
     if or_more:
         return f"{skew_ms:g} ms or more"
     if not skew_ms > 0.0:

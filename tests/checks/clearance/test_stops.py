@@ -1,11 +1,14 @@
 """One robot stops and the others go on: figures of motions whose worst stop is known by hand."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from builders.scene_builders import body, fixed_part, held_part, make_cell, placed, slide_model, work
 
+from cellplan import load_cell, solve
+from cellplan.certify.free_boxes import Boxes
 from cellplan.certify.free_clocks import MINIMUM_TOL
 from cellplan.checks.clearance.stops import BAND_PARTS, check_stops, one_stop, stop_report
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
@@ -205,3 +208,24 @@ def test_a_tool_on_a_part_at_rest_is_as_deep_as_without_a_stop() -> None:
 
     assert found is not None
     assert found.depths[0].depth == pytest.approx(0.03, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_the_search_of_a_level_distance_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tools pass over a turning table at one height: many boxes differ from the level by rounding only."""
+    path = Path(__file__).parents[3] / "cells" / "multimove.yaml"
+    values = {"controllers.irc5.reaction_ms": 100, "controllers.irc5.brake_s": 0.4}
+    most, joined = [0], Boxes.joined
+
+    def counted(*parts: Boxes) -> Boxes:
+        most[0] = max(most[0], sum(len(part) for part in parts))
+        return joined(*parts)
+
+    monkeypatch.setattr(Boxes, "joined", staticmethod(counted))
+    stops = solve(load_cell(path).with_values(values)).runs[0].report.stops
+
+    assert stops is not None
+    assert most[0] < 20_000
+    nearest = min(pair.distance for pair in stops.distances)
+    for pair in stops.distances:
+        assert pair.proved >= nearest - MINIMUM_TOL - 1e-8

@@ -97,6 +97,7 @@ def turned_mesh(mesh: Mesh, R: np.ndarray) -> Mesh:
     return Mesh(vertices=mesh.vertices @ R.T, faces=mesh.faces, source=mesh.source, is_closed=True)
 
 
+@pytest.mark.slow
 def test_points_are_inside_where_the_solid_is() -> None:
     shape = Capsule(0.2, 0.5)
     mesh = turned_mesh(tessellate(shape, 64), TURN)

@@ -109,7 +109,7 @@ def test_values_of_controllers_are_changed_by_address(connected: Load) -> None:
         {
             "controllers.c1.skew_ms": 6,
             "robots.worker.controller.decimals": 5,
-            "robots.holder.controller.handshake.inputs.worker": "go",
+            "robots.holder.controller.handshake.inputs.worker": 9,
             "robots.worker.controller.task": None,
             "checks.stop.depth_mm": None,
         }
@@ -120,7 +120,7 @@ def test_values_of_controllers_are_changed_by_address(connected: Load) -> None:
     assert worker is not None
     assert (worker.decimals, worker.task) == (5, None)
     assert holder is not None
-    assert holder.handshake == Handshake(output="5", inputs={"worker": "go"})
+    assert holder.handshake == Handshake(output="5", inputs={"worker": "9"})
     assert changed.checks.stop == StopDemand(clearance=0.0015)
 
 
@@ -131,7 +131,7 @@ def test_several_robots_share_a_controller_with_tasks_and_signals_of_their_own(c
         ("{T_ROB1: ROB_1}", "{T_ROB1: ROB_1, T_ROB2: ROB_2}"),
         (
             "{id: c1, handshake: {output: 5, inputs: {worker: 7}}}",
-            "{id: c2, task: T_ROB2, handshake: {output: 5, inputs: {worker: di_5}}}",
+            "{id: c2, task: T_ROB2, handshake: {output: do_5, inputs: {worker: di_5}}}",
         ),
     )
 
@@ -313,13 +313,6 @@ def test_what_one_robot_uses_on_a_controller_no_other_one_does(connected: Load, 
     assert str(caught.value).splitlines() == [f"c:13: robots.worker.controller.{message}"]
 
 
-def test_numbers_of_signals_begin_at_zero(connected: Load) -> None:
-    holder = connected(("output: 5, inputs: {worker: 7}", "output: 0, inputs: {worker: 0}")).robot("holder").control
-
-    assert holder is not None
-    assert holder.handshake == Handshake(output="0", inputs={"worker": "0"})
-
-
 def test_the_same_number_may_be_an_output_and_an_input(connected: Load) -> None:
     holder = connected(("inputs: {worker: 7}", "inputs: {worker: 5}")).robot("holder").control
 
@@ -338,7 +331,9 @@ def test_a_controller_moves_the_joints_that_its_kind_can(
     connected: Load, kind: str, joints: int, is_right: bool
 ) -> None:
     rail = [(RIGHT, f"{RIGHT}    mount: {{rail: {{{RAIL}, velocity_mm_s: 900}}}}\n"), (ABB, "")] if joints == 7 else []
+    signals = ("output: do_there, inputs: {holder: di_go}", "output: 1, inputs: {holder: 1}")
     changes = [(SECOND, f"  c2: {{kind: {kind}}}\n"), ("task: T_ROB1, ", ""), *rail]
+    changes += [signals] if kind == "ur" else []
 
     if is_right:
         assert len(connected(*changes).robot("worker").model.joints) == joints

@@ -77,15 +77,17 @@ def test_the_accuracy_is_read_in_millimetres(load: Load, settings: str, accuracy
         (
             "method: jacobian_transpose",
             [
-                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'jacobian_transpose'; "
-                f"choose it, {OR_EULER}"
+                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'jacobian_transpose', "
+                "which follows the path only as far as the feedback of its errors takes it; "
+                f"choose weighted_pseudo_inverse, {OR_EULER}"
             ],
         ),
         (
             "method: quadratic_program, weighting: {near_limits: 0.5, load: 1}",
             [
-                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'quadratic_program'; "
-                f"choose it, {OR_EULER}",
+                "c:22: solver.method: expected weighted_pseudo_inverse in the accurate mode, got 'quadratic_program', "
+                "which gives up part of a task at a limit, and limits accelerations from step to step; "
+                f"choose weighted_pseudo_inverse, {OR_EULER}",
             ],
         ),
     ],

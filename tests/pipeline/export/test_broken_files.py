@@ -24,7 +24,7 @@ from cellplan.pipeline.export.verify_export import verify_export
 FORMATS = ("csv", "json", "ros2", "stream", "wide")  # those that the small cell can be exported in
 MAKERS = {"krl": ("kuka", "abb"), "rapid": ("kuka", "abb"), "val3": ("staubli", "ur"), "urscript": ("staubli", "ur")}
 QUICK = ("val3", "urscript")  # of one cell
-ROUNDS, SEALED_ROUNDS, ALL_ROUNDS = 4, 1, 8
+ROUNDS, SEALED_ROUNDS, ALL_ROUNDS = 2, 1, 8
 
 
 @pytest.fixture(scope="module")

@@ -16,9 +16,11 @@ from cellplan.model.controllers import ControllerKind, RobotControl
 from cellplan.model.exported import Interpolation, ProgramRows, Promise, RobotRows
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.compare_rows import other_rows
-from cellplan.pipeline.export.judge import judge, largest_blend
+from cellplan.pipeline.export.judge import judge
 from cellplan.pipeline.export.resample import lead_time, resampled
+from cellplan.pipeline.export.round_rows import stops_left, with_rounding
 from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
 
@@ -259,22 +261,27 @@ def test_robots_that_are_not_exported_move_as_in_the_run(run: VerifiedRun) -> No
     assert any("position error of task 'path'" in finding for finding in found)
 
 
-def test_rounded_corners_count_with_what_they_may_be_off(run: VerifiedRun) -> None:
-    """Half of each segment may be rounded off a holder whose rows are dense, and nothing of one with few rows."""
+@pytest.mark.parametrize(("limits", "stops"), [(LIMITS, False), (replace(LIMITS, turn=0.1, tool=0.01), True)])
+def test_rounded_corners_count_with_what_they_may_be_off(
+    run: VerifiedRun, limits: ThinningLimits, *, stops: bool
+) -> None:
+    """Half of each segment may be rounded where rows are dense; some rows stay stops where segments are long."""
     scene, names = Scene.from_cell(run.cell), [robot.name for robot in run.cell.robots]
-    full = full_rows(run)
     few = [
-        thinned(scene, program, groups=[names], limits=LIMITS, kept=kept)
-        for program, kept in zip(full, kept_rows(run), strict=True)
+        thinned(scene, program, groups=[names], limits=limits, kept=kept)
+        for program, kept in zip(full_rows(run), kept_rows(run), strict=True)
     ]
-    sparse, job = dialect(decimals=5, is_thinned=True), job_of(run, few, promise=Promise.SEQUENCE_ONLY)
+    sparse, job = dialect(decimals=9, is_thinned=True), job_of(run, few, promise=Promise.SEQUENCE_ONLY)
 
-    blend = largest_blend(run, sparse, job)
+    chosen = with_rounding(sparse, job, shared=Shared(run))
 
-    assert judge(run, sparse, replace(job, blend=blend), read_back(job, decimals=5)).findings == ()
-    assert blend < 0.5
-    rounded = judge(run, sparse, replace(job, blend=0.5), read_back(job, decimals=5)).findings
-    assert any("position error of task 'path'" in finding for finding in rounded)
+    found = judge(run, sparse, chosen, read_back(chosen, decimals=9))
+    left, count = stops_left(chosen)
+    assert found.findings == ()
+    assert (0 < left < count) if stops else left == 0
+    assert found.rounded[0] == count - left
+    wide = judge(run, sparse, replace(job, blend=0.5), read_back(job, decimals=9)).findings
+    assert any("position error of task 'path'" in finding for finding in wide) == stops
 
 
 def test_rows_that_are_read_with_more_rounding_than_written_are_found(run: VerifiedRun) -> None:

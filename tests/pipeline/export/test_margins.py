@@ -1,29 +1,23 @@
 """How far rounded rows may be off straight motion: against corner paths that are sampled densely."""
 
-from types import SimpleNamespace
-from typing import cast
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cellplan.model.exported import Interpolation, RobotRows
-from cellplan.pipeline.export.margins import off_chords
-from cellplan.pipeline.export.played import Played
+from cellplan import load_cell
+from cellplan.certify.lever_arms import LeverArms
+from cellplan.model.exported import RobotRows
+from cellplan.pipeline.export.margins import corners_at, in_steps, raised, tool_corners
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
 
 SHARE = 0.4
 
 
 def bound(q: np.ndarray, times: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """What one robot may be off in each step."""
-    rows = RobotRows(robot="a", q=q, times=times)
-    played = SimpleNamespace(
-        run=SimpleNamespace(cell=SimpleNamespace(robots=[SimpleNamespace(name="a")])),
-        rows={"a": rows},
-        exported=("a",),
-        interpolation=Interpolation.LINEAR,
-        shares={"a": shares},
-    )
-    return off_chords(cast("Played", played), times)
+    return in_steps(corners_at(RobotRows(robot="a", q=q, times=times), shares, times))
 
 
 def straight(q: np.ndarray, times: np.ndarray, at: float) -> np.ndarray:
@@ -77,3 +71,89 @@ def test_only_the_steps_beside_a_rounded_row_are_off() -> None:
 
     assert np.all(allowed[1:3] > 0.0)
     np.testing.assert_array_equal(allowed[[0, 3, 4]], 0.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_point_of_the_triangle_is_off_by_less_the_farther_it_is_from_the_row(seed: int) -> None:
+    """Any place within the triangle, with a share of its own on either side: never beyond the bound at its time."""
+    rng = np.random.default_rng(seed)
+    q, times = rng.normal(size=(3, 4)), np.cumsum(rng.uniform(0.1, 2.0, 3))
+    rows, shares = RobotRows(robot="a", q=q, times=times), np.array([0.0, SHARE, 0.0])
+    h, v = np.diff(times), np.diff(q, axis=0) / np.diff(times)[:, None]
+
+    for before, after in rng.uniform(0.0, SHARE, (200, 2)) * h:
+        one, other = np.sort(rng.uniform(0.0, 1.0, 2))
+        back, on = one * before, (1.0 - other) * after
+        time = times[1] + on - back
+        off = q[1] - back * v[0] + on * v[1] - straight(q, times, time)
+        (allowed,) = corners_at(rows, shares, np.array([time]))
+        along = float(off @ allowed) / float(allowed @ allowed)
+        assert -1e-9 <= along <= 1.0 + 1e-9
+        np.testing.assert_allclose(off, along * allowed, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def scene(cells: Path) -> Scene:
+    return Scene.from_cell(load_cell(cells / "two_robots.yaml"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_tool_is_moved_farther_on_the_part_than_its_bound(scene: Scene, seed: int) -> None:
+    """By other kinematics: each robot off by any part of what it may be, the whole between two times too."""
+    cell, rng = scene.cell, np.random.default_rng(seed)
+    middle = np.array([0.5 * (joint.lower + joint.upper) for robot in cell.robots for joint in robot.model.joints])
+    q = middle + rng.uniform(-0.6, 0.6, len(middle)) + np.cumsum(rng.uniform(-0.004, 0.004, (5, len(middle))), axis=0)
+    corners = rng.uniform(-0.002, 0.002, q.shape) * np.array([0.0, 0.6, 1.0, 0.3, 0.0])[:, None]
+    corners[1:4] = corners[2] * np.array([0.6, 1.0, 0.3])[:, None]
+    (task,) = cell.tasks
+    columns = [cell.columns(robot.name) for robot in cell.robots]
+
+    allowed = tool_corners(LeverArms(scene, q), scene, task, q, corners)
+
+    assert np.all(allowed[[0, -1]] >= 0.0)
+    largest = np.zeros(2)
+    for step in range(4):
+        for s in np.linspace(0.0, 1.0, 5):
+            at, off = q[step] + s * (q[step + 1] - q[step]), corners[step] + s * (corners[step + 1] - corners[step])
+            most = allowed[step] + s * (allowed[step + 1] - allowed[step])
+            for parts in [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), *rng.uniform(0.0, 1.0, (3, 2))]:
+                moved = at.copy()
+                for part, own in zip(parts, columns, strict=True):
+                    moved[own] += part * off[own]
+                one, other = (_on_part(scene, task.robot, each) for each in (at, moved))
+                turn = np.arccos(np.clip(0.5 * (np.trace(one[:3, :3].T @ other[:3, :3]) - 1.0), -1.0, 1.0))
+                found = np.array([np.linalg.norm(one[:3, 3] - other[:3, 3]), turn])
+                assert np.all(found <= most + 1e-9)
+                largest = np.maximum(largest, found)
+    assert np.all(allowed.max(axis=0) <= 1.25 * largest)
+
+
+def _on_part(scene: Scene, robot: str, q: np.ndarray) -> np.ndarray:
+    """Tool in the part frame."""
+    cell = scene.cell
+    holder = cell.part.held_by[0].robot
+    X = {name: scene.chains[name].tool_poses(q[None, cell.columns(name)])[0] for name in (robot, holder)}
+    found: np.ndarray = np.linalg.inv(X[holder] @ cell.part.X_CP) @ X[robot]
+    return found
+
+
+def test_pairs_are_to_keep_what_joints_may_be_off_besides(scene: Scene) -> None:
+    """Those that need not keep a distance have to keep this much; those that do not move nothing more."""
+    q = np.zeros((2, scene.cell.joint_count))
+    off = np.zeros((1, scene.cell.joint_count))
+    off[0, scene.cell.columns(scene.cell.tasks[0].robot)] = 1e-3
+
+    more = raised(LeverArms(scene, q), scene, off)
+
+    assert len(more.pairs) == len(scene.pairs)
+    moved = {
+        index for index, body in enumerate(scene.bodies) if body.robot == scene.cell.tasks[0].robot and body.link >= 0
+    }
+    for pair, other in zip(scene.pairs, more.pairs, strict=True):
+        before = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
+        if moved & {pair.first, pair.second} and other.rule is Rule.CLEARANCE:
+            assert other.demand >= before
+        else:
+            assert other == pair
+    assert any(other.demand > pair.demand for pair, other in zip(scene.pairs, more.pairs, strict=True))
+    assert raised(LeverArms(scene, q), scene, 0.0 * off).pairs == scene.pairs

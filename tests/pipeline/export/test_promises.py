@@ -110,9 +110,10 @@ def test_what_is_not_synchronised_and_no_free_order_either_is_refused(
     with pytest.raises(NotVerifiedError, match=reason) as refusal:
         choose_promise(apart, IN_STEP, robots)
 
-    last = str(refusal.value).splitlines()[-1]
-    assert last.startswith("in-step: not sequence only: phase 'all tasks', ")
-    assert last.endswith(
+    first, detail = refusal.value.findings
+    assert detail.startswith("  not synchronised: ")
+    assert first.startswith("in-step: not sequence only: phase 'all tasks', ")
+    assert first.endswith(
         "the part moves while the tool of 'right' is in process ('path'): another order spoils the tool path"
     )
 

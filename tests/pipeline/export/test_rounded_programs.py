@@ -10,9 +10,13 @@ import pytest
 from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
+from cellplan.pipeline.export.choice import Choice
+from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.pipeline.export.prepare import prepare
 from cellplan.pipeline.export.program import export_program
 from cellplan.pipeline.export.stored import read_stored_export
 from cellplan.pipeline.export.verify_export import verify_export
+from cellplan.pipeline.export.written import judged, read_files
 
 RING = 60.0  # [mm] radius of the desired paths, in planes of constant x on the part
 SIDE = 150.0  # [mm] x of these planes
@@ -105,3 +109,39 @@ def test_tools_keep_their_tolerance_on_the_part_at_rounded_rows(cells: Path, tmp
     assert found <= straight + corner
     assert "rounded within" in " ".join(files["left.mod"].replace("\n  !", " ").split())
     assert verify_export(read_stored_export(tmp_path / "rapid"), run).record == record
+
+
+def off_the_circle(scene_cell: Cell, q: np.ndarray, holder: np.ndarray) -> np.ndarray:
+    """Distance of a tool from its circle on the end of the part in [mm]: 60 mm round x, at 150 mm, shape (M,)."""
+    chains = {name: ScrewChain(scene_cell.robot(name)) for name in ("kuka", "reis")}
+    X_WP = chains["reis"].tool_poses(holder[None]) @ scene_cell.part.X_CP
+    p = 1e3 * (np.linalg.inv(X_WP) @ chains["kuka"].tool_poses(q))[:, :3, 3]
+    off: np.ndarray = np.hypot(np.hypot(p[:, 1], p[:, 2]) - RING, p[:, 0] - SIDE)
+    return off
+
+
+@pytest.mark.slow
+def test_a_robot_that_works_on_a_part_at_rest_stops_at_few_rows(cells: Path, tmp_path: Path) -> None:
+    """Points of all triangles at rows in process are within the tolerance, and most of what is proved is needed."""
+    path = cells / "in_turn.yaml"
+    write_run(solve(load_cell(path)), tmp_path / "run")
+    run = open_gate(tmp_path / "run", cell=path)
+
+    prepared = prepare(run, DIALECTS["krl"], Choice())
+
+    (read,) = read_files(prepared, DIALECTS["krl"].render(prepared.job))
+    written, rows = prepared.job.programs[0].robots["kuka"], read.robots["kuka"]
+    assert np.count_nonzero(rows.rounding) > 0.9 * len(rows)
+    (tables,) = run.programs.values()
+    rng, worst = np.random.default_rng(0), 0.0
+    for row in np.flatnonzero(written.process[1:-1] & written.process[:-2]) + 1:
+        back, on = np.sort(rng.uniform(0.0, 1.0, (2, 100)), axis=0)
+        back, on = np.append(back, 0.5), np.append(1.0 - on, 0.5)  # the middle of the chord too
+        ways = rows.rounding[row] * (rows.q[[row - 1, row + 1]] - rows.q[row])
+        holder = np.array([np.interp(written.times[row], tables["reis"].times, c) for c in tables["reis"].q.T])
+        off = off_the_circle(run.cell, rows.q[row] + back[:, None] * ways[0] + on[:, None] * ways[1], holder)
+        worst = max(worst, float(off.max()))
+    found = judged(run, prepared, (read,))
+    proved = max(each.largest for each in found.corners if each.unit == "mm")
+    assert worst <= 0.1
+    assert 0.7 * proved <= worst <= proved + 1e-3

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from cellplan import VerifiedRun, load_cell, open_gate, solve, write_run
+from cellplan.errors import NotVerifiedError
 from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.verified_run import ACCESS_TOKEN
 from cellplan.pipeline.export.choice import Choice
@@ -62,3 +63,35 @@ def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str
     assert record["promise"] == "sequence only"
     assert record["marks"] == []
     assert not [word for text in files.values() for word in WAITS[form] if word in text.replace("waitEndMove()", "")]
+
+
+def test_few_decimals_are_named_where_they_spoil_the_path(alone: VerifiedRun) -> None:
+    control = RobotControl(controller="c", decimals=0)
+    cell = replace(
+        alone.cell,
+        robots=(replace(alone.cell.robots[0], control=control),),
+        controllers={"c": Controller(name="c", kind=ControllerKind.KUKA)},
+    )
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        exported(replace(alone, cell=cell, token=ACCESS_TOKEN), "krl", Choice())
+
+    first, *_, detail = refusal.value.findings
+    assert first.startswith("krl: position error of task 'line': ")
+    assert detail == "  robots.pen.controller.decimals: 0 are stated, the usual ones of krl are 5"
+
+
+@pytest.mark.parametrize(("step", "details"), [(0.02, 1), (0.004, 0)])
+def test_long_steps_are_named_where_accelerations_between_them_are_too_large(
+    alone: VerifiedRun, step: float, details: int
+) -> None:
+    robot = alone.cell.robots[0]
+    slow = replace(robot, acceleration=replace(robot.acceleration, full_speed_in=(60.0,)))
+    cell = replace(alone.cell, robots=(slow,), motion=replace(alone.cell.motion, step=step))
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        exported(replace(alone, cell=cell, token=ACCESS_TOKEN), "stream", Choice())
+
+    assert "exceeds its acceleration limit" in refusal.value.findings[0]
+    expected = ["  motion.step_s: 0.02 is stated; steps of 0.004, a controller's cycle, resolve accelerations"]
+    assert [each for each in refusal.value.findings if each.startswith("  ")] == expected[:details]

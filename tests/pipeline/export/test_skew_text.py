@@ -9,12 +9,12 @@ from cellplan.pipeline.export.skew import skew_text
     ("seconds", "text"),
     [
         (0.0, "0 ms"),
-        (5.49e-5, "0.054 ms"),  # not "0 ms": somebody would give up a program that can be started
-        (1.379e-4, "0.13 ms"),
-        (0.0365, "36 ms"),
-        (0.1999, "190 ms"),
+        (5.49e-5, "0.0549 ms"),  # not "0 ms": somebody would give up a program that can be started
+        (1.379e-4, "0.137 ms"),
+        (0.0365, "36.5 ms"),
+        (0.1999, "199 ms"),
         (0.2, "200 ms or more"),
     ],
 )
-def test_a_skew_is_rounded_down_to_two_digits(seconds: float, text: str) -> None:
+def test_a_skew_is_rounded_down_to_three_digits(seconds: float, text: str) -> None:
     assert skew_text(seconds) == text

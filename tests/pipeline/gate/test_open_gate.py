@@ -275,6 +275,7 @@ def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, own_cac
     assert "closest_pairs" in refusal(copy / "run", cell)
 
 
+@pytest.mark.slow
 def test_pictures_in_requested_formats_are_listed_and_held_to_their_digests(sound: Path, tmp_path: Path) -> None:
     cell = sound / "cell" / "small.yaml"
     write_run(solve(load_cell(cell)), tmp_path / "run", formats=["png"])

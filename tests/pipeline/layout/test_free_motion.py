@@ -58,6 +58,7 @@ def test_bases_and_tools_stay_whatever_the_cell_says() -> None:
     assert {str(each.kind) for each in settings.ranges} == {"start", "weight"}
 
 
+@pytest.mark.slow
 def test_beside_a_path_start_and_weights_mean_nothing() -> None:
     both = prepared(LayoutRequest(cell=FOUR, settings=BRIEF, free=("start", "weights", "path", "spin"), margin=15.0))
 
@@ -70,6 +71,7 @@ def test_beside_a_path_start_and_weights_mean_nothing() -> None:
     }
 
 
+@pytest.mark.slow
 def test_the_first_path_is_near_the_motion_of_the_cell(ready: Prepared) -> None:
     assert ready.unled is not None
     along = ready.coarse.evaluate(ready.coarse.given, ready.given_start)

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from cellplan import LayoutRequest
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.search.programs.objective import Objective
@@ -11,6 +13,7 @@ CELLS = Path(__file__).parents[3] / "cells"
 FAR = "robots.right.base.xyz_mm=[4000, 2000, 500]"
 
 
+@pytest.mark.slow
 def test_where_no_motion_begins_at_the_given_layout_a_sample_takes_its_place() -> None:
     settings = ("motion.duration_s=2", "motion.step_s=0.02", FAR)
     request = LayoutRequest(cell=CELLS / "planar_pair.yaml", settings=settings, objective=Objective.CONFORMING)

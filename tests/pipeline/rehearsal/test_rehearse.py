@@ -161,6 +161,7 @@ def test_fixed_errors_make_one_trial_however_many_are_asked_for(pair):
     assert len(run.trials) == 1
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(pair):
     spread = RobotErrors(base=PoseAmounts(xyz=(Amount(Spread.NORMAL, 5e-4), Amount(), Amount())))
     stated = CellErrors(robots={"right": spread}, position_noise=1e-6, trials=2, seed=5)

@@ -84,6 +84,7 @@ def test_a_cell_that_passes_is_left_alone(sound: Path) -> None:
     assert found.record["remedies"] == found.record["tried"] == []
 
 
+@pytest.mark.slow
 def test_a_cycle_too_short_is_made_as_long_as_the_accelerations_ask(sound: Path) -> None:
     settings = ("motion.step_s=0.001", "layout.vary={right.base: {yaw_deg: [179, 181]}}")
     found = repair(request_of(sound / "cell" / "small.yaml", duration=0.15, settings=settings))

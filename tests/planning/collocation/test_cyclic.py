@@ -70,7 +70,9 @@ def closing_tol(case: Case) -> float:
     return float(np.sqrt(free)) * CLOSED + 4.0 * STEADY
 
 
-@pytest.mark.parametrize("name", ["plain", "sliding", "mixed", "closed", "spin and partial"])
+@pytest.mark.parametrize(
+    "name", ["plain", "sliding", pytest.param("mixed", marks=pytest.mark.slow), "closed", "spin and partial"]
+)
 def test_joints_come_back_in_every_cycle_and_no_task_notices(name: str) -> None:
     case = cyclic(triangles(CELLS[name]), 3)
     path = closed(case)
@@ -136,6 +138,7 @@ def test_a_coarse_accuracy_does_not_keep_cycles_from_closing() -> None:
     assert drift(closed(replace(case, cell=coarse)), [0.0, 1.0, 2.0]).max() <= closing_tol(case)
 
 
+@pytest.mark.slow
 def test_tasks_without_a_common_cycle_close_over_the_whole_motion() -> None:
     case = cyclic(triangles(CELLS["mixed"]), 6)
     counts = zip(case.cell.tasks, (1, 2, 3, 6), strict=True)

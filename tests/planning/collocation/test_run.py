@@ -152,7 +152,7 @@ def test_the_same_motion_may_take_any_time(factor: float) -> None:
     np.testing.assert_allclose(other.path().at(t * factor), case.path().at(t), atol=POSTURES)
 
 
-@pytest.mark.parametrize("rows", [30, 400])
+@pytest.mark.parametrize("rows", [30, pytest.param(400, marks=pytest.mark.slow)])
 def test_files_of_many_points_are_followed_over_their_knots(rows: int) -> None:
     """A smooth curve through so many points, and one through as many noisy ones: each knot is a break of the third
     derivative, and panels reach over many of them where the noise lets them."""
@@ -172,6 +172,7 @@ def test_files_of_many_points_are_followed_over_their_knots(rows: int) -> None:
     assert rows < 100 or any(panel.knots for panel in panels)
 
 
+@pytest.mark.slow
 def test_a_path_on_a_mesh_takes_fewer_panels_than_rays() -> None:
     cell = shipped("four_robots")
     meshed = case_of(replace(cell, part=replace(cell.part, shape=tessellate(Cylinder(0.25, 0.5)))))

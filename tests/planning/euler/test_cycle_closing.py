@@ -41,6 +41,7 @@ def four_robots_planned(*, cyclic: bool) -> tuple[Cell, Schedule, Motion]:
     return (cell, *planned(cell, start))
 
 
+@pytest.mark.slow
 def test_four_robots_come_back_only_when_they_are_asked_to() -> None:
     drift = {}
     for cyclic in (False, True):

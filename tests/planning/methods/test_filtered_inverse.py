@@ -31,6 +31,7 @@ def settled(run, values):
     return values[run.times >= TRANSIENT]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_case_one_is_the_same_for_all_methods_and_never_damped(step):
     found = runs("I", step)
@@ -40,6 +41,7 @@ def test_case_one_is_the_same_for_all_methods_and_never_damped(step):
         assert run.manipulability.min() > 1.0  # w0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_case_two_lets_the_filtered_inverses_nearer_to_the_singular_point_with_less_error(step):
     found = runs("II", step)

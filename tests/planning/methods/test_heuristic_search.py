@@ -47,6 +47,7 @@ def circle_through_shoulder(count):
     return times, 0.5 * BIG * np.stack([1 + np.cos(phi), 0 * phi, np.sin(phi)], axis=1)
 
 
+@pytest.mark.slow
 def test_circle_through_the_shoulder_singularity_is_followed_smoothly():
     cell = arm_cell(dh_arm(ANTHROPOMORPHIC), method="heuristic_search", tolerance=4.5e-8)
     schedule = points_schedule(cell, *circle_through_shoulder(601))

@@ -120,6 +120,7 @@ def arm_motion(**limits):
     return schedule, integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
 
 
+@pytest.mark.slow
 def test_position_limit_is_kept_within_the_redundancy():
     """[Nicolato2007]_ section 4.2: the fourth joint may turn from 0.60 to 0.85 rad only; three others do its share."""
     free_schedule, free = arm_motion()

@@ -119,6 +119,7 @@ def test_search_gives_the_same_configuration_again(cell, missing):
     np.testing.assert_array_equal(first, again)
 
 
+@pytest.mark.slow
 def test_all_postures_of_the_positioner_may_be_open_as_well(cells):
     cell = load_cell(cells / "mesh_part_csv.yaml")
     assert any(robot.start is None for robot in cell.robots)
@@ -153,6 +154,7 @@ def test_a_wrist_that_turns_round_begins_where_a_whole_turn_has_room(tmp_path):
     assert margin_shares(cell.robot("kuka").model, q).min() > 0.0
 
 
+@pytest.mark.slow
 def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path):
     """Seven free arms of a few branches each beside one that stands in a wall make thousands of combinations."""
     lines = ["cellplan: 1", "name: eight-arms", "robots:"]

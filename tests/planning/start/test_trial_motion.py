@@ -55,6 +55,7 @@ def test_the_coarse_clock_forestates_what_the_full_motion_leaves_free(cell):
     assert closely.shares[0] == pytest.approx(expected, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_an_operator_judged_alone_is_judged_as_in_a_run_of_its_own(cell):
     task = cell.task("rectangle")
     holder = cell.robot("reis").start

@@ -85,6 +85,7 @@ def test_a_clock_without_a_length_ends_when_the_tool_has_left(cell: Cell) -> Non
     assert times[-1] == pytest.approx(4.3)
 
 
+@pytest.mark.slow
 def test_a_program_starts_and_ends_clear_of_the_part(cell: Cell) -> None:
     report = solve(cell).runs[0].report
 

@@ -312,6 +312,7 @@ def test_each_goal_improves_along_a_whole_motion_of_four_robots(kind: GoalKind) 
     assert worst < 1.5 * worst_plain  # Euler's error is of second order in all speeds, the goal's among them
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(GOALS))
 def test_no_step_of_a_whole_motion_is_noticed_by_a_task(kind: GoalKind) -> None:
     cell, start = planar_pair()

@@ -20,6 +20,8 @@ from cellplan.report.record.summary import summary_record
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 
+ENDS = 25  # entries of a long list that are validated, from each end
+
 
 @pytest.fixture(scope="module")
 def validator() -> Draft202012Validator:
@@ -45,6 +47,15 @@ def planned(run: Any) -> Motion:
     )
     q = np.zeros((steps + 1, 1))
     return Motion(times=run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps), resolution=resolution)
+
+
+def shortened(value: Any) -> Any:
+    """A record whose long lists hold their first and last entries only: all of a list are of one type."""
+    if isinstance(value, dict):
+        return {key: shortened(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [shortened(entry) for entry in (value if len(value) <= 2 * ENDS else value[:ENDS] + value[-ENDS:])]
+    return value
 
 
 @pytest.mark.parametrize("kind", ["passed_run", "failed_run", "rail_run"])
@@ -114,7 +125,7 @@ def test_the_series_of_a_run_conform(kind: str, has_motion: bool, request: pytes
     run = request.getfixturevalue(kind)
     schema = series_schema(closed=True)
     Draft202012Validator.check_schema(schema)
-    curves = json.loads(series_json(run.report, planned(run) if has_motion else None))
+    curves = shortened(json.loads(series_json(run.report, planned(run) if has_motion else None)))
 
     assert list(map(str, Draft202012Validator(schema).iter_errors(curves))) == []
     del curves["joints"]

@@ -62,6 +62,7 @@ def test_a_method_of_ones_own_choice_and_what_it_gave_up_are_reported(record: di
 
     assert lines[1] == "  1 check passed; mode simultaneous, 4 s, method quadratic_program"
     assert "largest task slack 0.012 m/s at 1.500 s" in words(lines)
+    assert any(line.startswith("  note: No accurate mode: quadratic_program gives up part of a task") for line in lines)
 
 
 def test_where_the_accurate_mode_gave_up_is_reported(record: dict[str, Any], tmp_path: Path) -> None:

@@ -1,0 +1,1 @@
+"""KRL of KUKA controllers: writer, names and reader."""

@@ -1,0 +1,288 @@
+"""Strict reader of KUKA programs: the written subset and harmless variants of it, nothing else."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isnan
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.joints import Axes, from_numbers
+from cellplan.export.krl.names import WHOLE
+from cellplan.export.krl.text import Module, Statement, located, read_module
+from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
+
+MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
+_SETUP: Final = ("INITMOV", "ADVANCE", "TOOL", "BASE")  # what is set once before the first motion
+
+
+def read_krl(
+    frame: ExportFrame, files: Mapping[str, str], paths: Mapping[tuple[str | None, str], str]
+) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back, strictly: positions and marks; these programs state neither times nor process.
+
+    Args:
+        frame: Which robots and programs.
+        files: Text by path.
+        paths: Path of each main module without its ending, by program and robot.
+
+    Raises:
+        InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
+    """
+    found: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
+    left = dict(files)
+    for (program, robot), path in paths.items():
+        found[program][robot] = _rows(frame, robot, _played(frame, robot, left, path))
+        if len({len(rows.marks) for rows in found[program].values()}) > 1:
+            raise InputError(f"{path}.src: expected as many marks as the programs of the other robots have")
+    if left:
+        raise InputError(f"{min(left)}: expected no such file in this export")
+    return tuple(ProgramRows(name=program, robots=robots) for program, robots in found.items())
+
+
+def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_Player":
+    """A main module and its pages, from begin to end; takes their files out of those that are left."""
+    main = read_module(left, path)
+    player = _Player(frame=frame, robot=robot, path=path)
+    for statement in main.statements:
+        if statement.kind == "CALL":
+            page = read_module(left, player.called(main, statement))
+            if page.externals:
+                raise located(f"{page.path}.src", min(page.externals.values()), "no declaration in a page", "one")
+            player.begin(page)
+            for inner in page.statements:
+                player.play(page, inner)
+            player.finish(page)
+        else:
+            player.play(main, statement)
+    _refuse_other_declarations(main, player)
+    if player.calls == 0:
+        player.finish(main)
+    if player.lowered and not player.marks:
+        raise located(f"{path}.src", player.lowered, "a handshake at a row, as its output is lowered", "none")
+    return player
+
+
+def _refuse_other_declarations(main: Module, player: "_Player") -> None:
+    """Make sure that what is declared is called, and that a main module of pages has no points."""
+    source = f"{main.path}.src"
+    name = main.path.rpartition("/")[2]
+    calls = {f"{name}_{number:03d}" for number in range(1, player.calls + 1)}
+    for declared, line in main.externals.items():
+        if declared not in calls:
+            raise located(source, line, "declarations of pages that are called", declared)
+    if player.calls and main.points:
+        raise located(f"{main.path}.dat", min(main.lines.values()), "no point in a program of pages", "one")
+    player.require_setup(source, main.end)
+
+
+def _rows(frame: ExportFrame, robot: str, player: "_Player") -> RobotRows:
+    """Rows of the model from the numbers of the points."""
+    placed = frame.robot(robot)
+    axes, numbers = Axes.of(placed), np.array(player.rows, dtype=np.float64)
+    written = np.zeros((len(numbers), len(placed.model.joints)))
+    written[:, axes.arm] = numbers[:, :6]
+    written[:, axes.external] = numbers[:, 6 : 6 + len(axes.external)]
+    return RobotRows(
+        robot=robot,
+        q=from_numbers(placed, written),
+        marks=tuple(player.marks),
+        rounding=np.array(player.rounding) / WHOLE,
+    )
+
+
+@dataclass(slots=True, kw_only=True)
+class _Player:
+    """Follows a program statement by statement.
+
+    Attributes:
+        frame: Which robots.
+        robot: The robot.
+        path: Path of the main module without its ending.
+        rows: Values of all components of each row.
+        marks: Rows with a handshake.
+        calls: Number of pages that were called.
+        settings: What was set before the first motion.
+        speed: Whether a speed was set.
+        rounded: Whether the last row is rounded.
+        rounding: How far each row is, in [%]; 0 for a stop.
+        share: How far rows are from here on, in [%]; 0 before it is set.
+        step: Number of instructions of a handshake that were met.
+        lowered: Line at which its output was lowered before the first motion, 0 if it was not.
+        names: Points of the module that are still to come.
+    """
+
+    frame: ExportFrame
+    robot: str
+    path: str
+    rows: list[Sequence[float]] = field(default_factory=list)
+    marks: list[int] = field(default_factory=list)
+    calls: int = 0
+    settings: set[str] = field(default_factory=set)
+    speed: bool = False
+    rounded: bool = False
+    rounding: list[int] = field(default_factory=list)
+    share: int = 0
+    step: int = 0
+    lowered: int = 0
+    names: list[str] | None = None
+
+    def play(self, module: Module, statement: Statement) -> None:
+        """Follow one statement."""
+        if self.step and statement.kind not in {"OUT", "WAIT"}:
+            expected = f"the rest of the handshake ({self._expected()})"
+            raise located(f"{module.path}.src", statement.line, expected, statement.text)
+        if statement.kind in {"OUT", "WAIT"}:
+            self._signal(module, statement)
+        elif statement.kind == "PTP":
+            self._move(module, statement)
+        elif statement.kind == "VEL_PTP":
+            if not 0.0 < float(statement.words[0] or 0) <= 100.0:
+                raise located(f"{module.path}.src", statement.line, "a speed above 0 and up to 100", statement.text)
+            self.speed = True
+        elif statement.kind == "APO":
+            self.share = _share(module, statement)
+        else:
+            self._set(module, statement)
+
+    def called(self, main: Module, statement: Statement) -> str:
+        """Path of the page that a call is for."""
+        source, name = f"{main.path}.src", main.path.rpartition("/")[2]
+        expected = f"{name}_{self.calls + 1:03d}"
+        if (self.rows and not self.calls) or self.step:
+            raise located(source, statement.line, "no call in a program with motions of its own", statement.text)
+        if statement.words[0] != expected:
+            raise located(source, statement.line, f"{expected}()", statement.text)
+        self.require_setup(source, statement.line)
+        self.calls += 1
+        return f"{self.path}_{self.calls:03d}"
+
+    def require_setup(self, source: str, line: int) -> None:
+        """Refuse a motion before everything is set that motions need."""
+        missing = [kind for kind in _SETUP if kind not in self.settings]
+        if missing:
+            raise located(source, line, f"{missing[0]} to be set before the first motion", "none")
+
+    def begin(self, module: Module) -> None:
+        """Begin with the points of a module."""
+        self.names = list(module.points)[::-1]
+
+    def finish(self, module: Module) -> None:
+        """Make sure that a module with motions ends in order."""
+        source = f"{module.path}.src"
+        if self.step:
+            raise located(source, module.end, f"the rest of the handshake ({self._expected()})", "the end")
+        if self.names is None or not module.points:
+            raise located(source, module.end, "at least one motion", "none")
+        if self.names:
+            unused = self.names[-1]
+            raise located(f"{module.path}.dat", module.lines[unused], "points that are used", unused.upper())
+        if self.rounded:
+            raise located(source, module.end, "an exact stop at the last row", "C_PTP")
+
+    def _set(self, module: Module, statement: Statement) -> None:
+        """What is set once, before the first motion."""
+        source, value = f"{module.path}.src", statement.words[0] if statement.words else None
+        if self.rows or module.path != self.path:
+            raise located(source, statement.line, "settings before the first motion", statement.text)
+        if statement.kind in self.settings:
+            raise located(source, statement.line, "each setting once", statement.text)
+        expected = None
+        if statement.kind in {"TOOL", "BASE"}:
+            number = self._stated(statement.kind)
+            if int(value or 0) != number:
+                data = f"{statement.kind}_DATA[{number}]" if number else "$NULLFRAME"
+                expected = f"${statement.kind}={data} as the cell states it"
+        elif statement.kind == "ADVANCE" and int(value or 0) > MOST_ADVANCE:
+            expected = f"a number from 0 to {MOST_ADVANCE}"
+        if expected:
+            raise located(source, statement.line, expected, statement.text)
+        self.settings.add(statement.kind)
+
+    def _stated(self, kind: str) -> int:
+        """Number of the tool or of the base on the controller, 0 for none."""
+        control = self.frame.robot(self.robot).control
+        if control is None:
+            return 0
+        return (control.tool_number if kind == "TOOL" else control.base_number) or 0
+
+    def _move(self, module: Module, statement: Statement) -> None:
+        """A motion to the next point of the module."""
+        source = f"{module.path}.src"
+        self.require_setup(source, statement.line)
+        if not self.speed:
+            raise located(source, statement.line, "a speed before the first motion", statement.text)
+        if self.calls and module.path == self.path:
+            raise located(source, statement.line, "no motion in a program that calls pages", statement.text)
+        if self.names is None:
+            self.begin(module)
+        name = str(statement.words[0]).lower()
+        if name not in module.points:
+            raise located(source, statement.line, f"a point of {module.path}.dat", statement.text)
+        if not self.names or self.names[-1] != name:
+            order = self.names[-1].upper() if self.names else "no further motion"
+            raise located(source, statement.line, f"points in their order, each once ({order})", statement.text)
+        self.rounded = statement.words[1] is not None
+        if self.rounded and not self.share:
+            raise located(source, statement.line, "$APO.CPTP to be set before C_PTP", statement.text)
+        self.names.pop()
+        self.rounding.append(self.share if self.rounded else 0)
+        self.rows.append(self._values(module, name))
+
+    def _values(self, module: Module, name: str) -> Sequence[float]:
+        """Components of a point, as many as the robot has axes; unused external ones have to be at zero."""
+        values, axes = module.points[name], Axes.of(self.frame.robot(self.robot))
+        count = len(axes.arm) + len(axes.external)
+        if any(map(isnan, values[:count])) or any(value != 0.0 and not isnan(value) for value in values[count:]):
+            expected = f"values for the {count} axes of the robot and for no other"
+            raise located(f"{module.path}.dat", module.lines[name], expected, name.upper())
+        return values[:count]
+
+    def _signal(self, module: Module, statement: Statement) -> None:
+        """An instruction of a handshake."""
+        source, expected = f"{module.path}.src", self._steps()
+        row = len(self.rows) - 1
+        if expected and not self.lowered:
+            first = lowering_step(self.frame, self.robot)
+            if row >= 0 or self.calls or _step(statement) != first:
+                before = f"$OUT[{first.signal}]=FALSE before the first motion"
+                raise located(source, statement.line, before, statement.text)
+            self.lowered = statement.line
+            return
+        is_main = self.calls > 0 and module.path == self.path
+        if not expected or row < 0 or self.rounded or is_main or row in self.marks:
+            raise located(source, statement.line, "signals only once after an exact stop at a mark", statement.text)
+        if _step(statement) != expected[self.step]:
+            raise located(source, statement.line, f"the handshake of the cell ({self._expected()})", statement.text)
+        self.step = (self.step + 1) % len(expected)
+        if self.step == 0:
+            self.marks.append(row)
+
+    def _steps(self) -> tuple[Step, ...]:
+        """Instructions at a mark."""
+        return handshake_steps(self.frame, self.robot)
+
+    def _expected(self) -> str:
+        """The next instruction of a handshake."""
+        step = self._steps()[self.step]
+        state = "TRUE" if step.is_on else "FALSE"
+        return f"WAIT FOR $IN[{step.signal}]=={state}" if step.waits else f"$OUT[{step.signal}]={state}"
+
+
+def _share(module: Module, statement: Statement) -> int:
+    """How far the rows that follow are rounded, in [%]."""
+    share = int(statement.words[0] or 0)
+    if not 1 <= share <= 100:
+        raise located(f"{module.path}.src", statement.line, "a share of 1 to 100", statement.text)
+    return share
+
+
+def _step(statement: Statement) -> Step:
+    """A signal statement as a step of a handshake."""
+    words = statement.words
+    if statement.kind == "OUT":
+        return Step(False, str(int(words[0] or 0)), str(words[1]).upper() == "TRUE")
+    is_on = words[0] is None and str(words[3] or "TRUE").upper() == "TRUE"
+    return Step(True, str(int(words[1] or words[2] or 0)), is_on)

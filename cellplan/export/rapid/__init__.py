@@ -1,0 +1,1 @@
+"""RAPID of ABB controllers: writer, targets and reader."""

@@ -1,0 +1,1 @@
+"""Joint trajectories of ROS 2: writer and reader."""

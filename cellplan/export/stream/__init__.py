@@ -1,0 +1,1 @@
+"""Setpoints at the cycle of a controller: writer and record."""

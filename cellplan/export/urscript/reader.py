@@ -1,0 +1,245 @@
+"""Reader of URScript programs: statements of our own subset, one on each line, and the handshakes among them."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cellplan.export.joints import ARM, Angle, from_numbers
+from cellplan.export.timed_rows import (
+    cycle_of,
+    file_path,
+    found_error,
+    line_error,
+    lines_of,
+    require_paths,
+    truncated_error,
+)
+from cellplan.export.urscript.rows import move_acceleration
+from cellplan.export.urscript.text import (
+    ENDING,
+    approach_call,
+    decimals_of_urscript,
+    function_names,
+    handshake_lines,
+    lowering,
+    require_length,
+    require_turns,
+    servo_call,
+    stop_call,
+)
+from cellplan.export.zones import tool_shares
+from cellplan.model.cell import Robot
+from cellplan.model.exported import ExportFrame, ProgramRows, Promise, RobotRows
+
+_GAP: Final = re.compile(r"\s*([()\[\],=:])\s*")
+_SPEED: Final = r"(?!0\.0+(?![0-9]))(?:0|[1-9][0-9]{0,3})\.[0-9]{3}"
+_RADIUS: Final = r"(?!0\.0+(?![0-9]))[0-9]\.[0-9]{4}"
+
+
+class Statement(NamedTuple):
+    """One instruction: its line, from 1, its text without comment and spare spaces, and the line as it stands."""
+
+    line: int
+    text: str
+    shown: str
+
+
+class _Statements:
+    """Instructions of a file, taken one after the other."""
+
+    def __init__(self, text: str, file: str) -> None:
+        """Find all instructions."""
+        self.file, self.place = file, 0
+        lines = lines_of(text, file)
+        self.all = [
+            Statement(number, plain, content)
+            for number, line in enumerate(lines, start=1)
+            if (content := line.partition("#")[0].strip()) and (plain := compact(content))
+        ]
+        self.last = len(lines)
+
+    def peek(self) -> Statement:
+        """The next instruction.
+
+        Raises:
+            InputError: There is none.
+        """
+        if self.place == len(self.all):
+            raise truncated_error(self.file, self.last, "an instruction")
+        return self.all[self.place]
+
+    def take(self, expected: str) -> None:
+        """Go past an instruction that has to be a given one.
+
+        Raises:
+            InputError: It is another one.
+        """
+        found = self.peek()
+        if found.text != compact(expected):
+            raise line_error(self.file, found.line, expected.strip(), found.shown)
+        self.place += 1
+
+    def end(self) -> None:
+        """Make sure that nothing follows.
+
+        Raises:
+            InputError: Something does.
+        """
+        if self.place < len(self.all):
+            found = self.all[self.place]
+            raise line_error(self.file, found.line, "the end of the file", found.shown)
+
+
+def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back, strictly; spaces, comments and empty lines may be others.
+
+    Args:
+        frame: What is exported.
+        files: Text by path.
+
+    Raises:
+        InputError: With file and line, when a text is not such a file.
+    """
+    keys = [(program, robot) for program in frame.programs for robot in frame.robots]
+    paths = {key: file_path(key[0], f"{key[1]}{ENDING}") for key in keys}
+    require_paths(files, tuple(paths.values()))
+    names, found = function_names(frame), []
+    for program in frame.programs:
+        robots = {}
+        for robot in frame.robots:
+            path = paths[program, robot]
+            statements = _Statements(files[path], path)
+            statements.take(f"def {names[program, robot]}():")
+            read = _timed if frame.promise is Promise.TIMED else _sequence
+            robots[robot] = read(frame, frame.robot(robot), statements)
+            statements.take("end")
+            statements.end()
+        found.append(ProgramRows(name=program, robots=robots))
+    return tuple(found)
+
+
+def compact(text: str) -> str:
+    """An instruction with single spaces between words, and none beside brackets and signs."""
+    return _GAP.sub(r"\1", " ".join(text.split()))
+
+
+class _Points:
+    """Joint positions of rows as they are found.
+
+    Attributes:
+        lines: Line of each row.
+        numbers: Its positions in [rad].
+    """
+
+    def __init__(self, frame: ExportFrame, robot: Robot, file: str) -> None:
+        """Begin with no row."""
+        self.frame, self.robot, self.file = frame, robot, file
+        self.lines: list[int] = []
+        self.numbers: list[list[float]] = []
+        decimals = decimals_of_urscript(frame, robot)
+        number = rf"(?!-0\.0+(?![0-9]))-?(?:0|[1-9][0-9]{{0,2}})\.[0-9]{{{decimals}}}"
+        self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
+        self.expected = f"{ARM} positions with {decimals} decimals"
+
+    def add(self, found: Statement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+        """Take in the row of an instruction.
+
+        Raises:
+            InputError: It is another instruction.
+        """
+        match = pattern.fullmatch(found.text)
+        if match is None:
+            raise line_error(self.file, found.line, f"{what} with {self.expected}", found.shown)
+        self.lines.append(found.line)
+        self.numbers.append([float(text) for text in match[1].split(",")])
+        return match
+
+    def rows(self, *, times: bool, marks: tuple[int, ...] = ()) -> RobotRows:
+        """All rows.
+
+        Raises:
+            InputError: A position is beyond two turns, or there are too many rows.
+        """
+        where = [f"{self.file}:{line}" for line in self.lines]
+        require_length(self.frame, len(self.lines), where=where[-1])
+        numbers = np.array(self.numbers)
+        require_turns(self.robot.model.joint_names, numbers, row_of=where)
+        cycle_ms = round(1000.0 * cycle_of(self.robot))
+        return RobotRows(
+            robot=self.robot.name,
+            q=from_numbers(self.robot, numbers, angle=Angle.RADIANS),
+            times=np.arange(len(numbers)) * cycle_ms / 1000.0 if times else None,
+            marks=marks,
+        )
+
+
+def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+    """Rows of a program that follows them at the cycle of its controller."""
+    points = _Points(frame, robot, statements.file)
+    servo = re.compile(rf"servoj\({points.pattern},{re.escape(compact(servo_call(frame, robot)))}\)")
+    _approach(points, statements)
+    while statements.peek().text.startswith("servoj"):
+        points.add(statements.peek(), servo, f"servoj([…], {servo_call(frame, robot)})")
+        statements.place += 1
+    if len(points.lines) < 2:
+        raise line_error(statements.file, statements.peek().line, "servoj", statements.peek().shown)
+    statements.take(stop_call(robot))
+    return points.rows(times=True)
+
+
+def _approach(points: _Points, statements: _Statements) -> None:
+    """The move to the first row."""
+    pattern = re.compile(rf"movej\({points.pattern},{re.escape(compact(approach_call()))}\)")
+    points.add(statements.peek(), pattern, f"movej([…], {approach_call()})")
+    statements.place += 1
+
+
+def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+    """Rows and marks of a program that moves from row to row."""
+    points, marks, radii = _Points(frame, robot, statements.file), list[int](), [0.0]
+    acceleration = re.escape(f"{move_acceleration(robot):.3f}")
+    move = re.compile(rf"movej\({points.pattern},a={acceleration},v=({_SPEED})(?:,r=({_RADIUS}))?\)")
+    first = statements.peek()
+    is_met = not first.text.startswith("movej")
+    if is_met:
+        statements.take(lowering(frame, robot.name) if handshake_lines(frame, robot.name) else "movej")
+    _approach(points, statements)
+    is_blended, at = False, statements.all[statements.place - 1]
+    while (found := statements.peek()).text != "end":
+        if found.text.startswith("movej"):
+            match = points.add(found, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
+            _require_speed(robot, float(match[2]), found, statements.file)
+            is_blended, at = match[3] is not None, found
+            radii.append(float(match[3] or 0.0))
+            statements.place += 1
+            continue
+        if is_blended or not is_met:
+            raise line_error(statements.file, found.line, "movej, or end", found.shown)
+        _meet(frame, robot, statements)
+        marks.append(len(points.lines) - 1)
+    if is_blended:
+        raise line_error(statements.file, at.line, "a stop at the last row, without r", at.shown)
+    if is_met and not marks:
+        raise found_error(statements.file, first.line, "a handshake at a row, as its output is lowered", "none")
+    rows = points.rows(times=False, marks=tuple(marks))
+    return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
+
+
+def _require_speed(robot: Robot, speed: float, found: Statement, file: str) -> None:
+    """Make sure that a speed is none beyond those of all joints."""
+    largest = max(joint.velocity for joint in robot.model.joints)
+    if speed > largest:
+        raise line_error(file, found.line, f"a speed of {largest:.3f} rad/s at most", found.shown)
+
+
+def _meet(frame: ExportFrame, robot: Robot, statements: _Statements) -> None:
+    """The handshake of a robot at a mark."""
+    lines = handshake_lines(frame, robot.name)
+    if not lines:
+        found = statements.peek()
+        raise line_error(statements.file, found.line, "movej, or end", found.shown)
+    for line in lines:
+        statements.take(line)

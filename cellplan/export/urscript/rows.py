@@ -1,0 +1,108 @@
+"""What a URScript row states besides its joints: speed and acceleration of a move, and how far it may be rounded."""
+
+from typing import Final
+
+import numpy as np
+
+from cellplan.export.corners import may_round
+from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.acceleration import full_speed_in
+from cellplan.model.cell import Robot
+from cellplan.model.exported import ProgramRows, Promise, RobotRows
+
+APPROACH_SPEED: Final = 0.25  # [rad/s] of the leading joint towards the first row, from wherever the robot stands
+APPROACH_ACCELERATION: Final = 0.5  # [rad/s^2] likewise
+SLOWEST: Final = 0.01  # [rad/s] a move is stated no slower
+TICK: Final = 1e-3  # [rad/s], [rad/s^2] speeds and accelerations are rounded down to it
+BLEND_TICK: Final = 1e-4  # [m] radii are rounded down to it
+SMALLEST_BLEND: Final = 5e-4  # [m] a smaller radius saves no time
+BLEND_ROOM: Final = 0.99  # [-] neighbouring blends may not touch
+
+
+def move_speeds(robot: Robot, rows: RobotRows) -> Array:
+    """Speed of the leading joint in the move to each row in [rad/s], shape (N,): that of the plan, within all limits.
+
+    The leading joint of a move is the one that travels farthest. Where rows have no times, or none travels, the speed
+    is that of the approach.
+
+    Args:
+        robot: The robot.
+        rows: Its rows.
+    """
+    found = np.full(len(rows), APPROACH_SPEED)
+    if len(rows) < 2:
+        return found
+    travel = np.abs(np.diff(rows.q, axis=0))
+    farthest = travel.max(axis=1)
+    moves = np.flatnonzero(farthest > 0.0)
+    planned = np.full(len(rows) - 1, APPROACH_SPEED) if rows.times is None else farthest / np.diff(rows.times)
+    share = travel[moves] / farthest[moves, None]
+    limits = np.array([joint.velocity for joint in robot.model.joints])
+    allowed = (limits / np.maximum(share, 1e-12)).min(axis=1)
+    own = np.minimum(np.maximum(planned[moves], SLOWEST), allowed)
+    found[1 + moves] = np.maximum(np.floor(own / TICK + 1e-6), 1.0) * TICK
+    return found
+
+
+def move_acceleration(robot: Robot) -> float:
+    """Acceleration of the leading joint in [rad/s^2] that no joint exceeds; that of the approach if none is known."""
+    own = []
+    for place, joint in enumerate(robot.model.joints):
+        seconds = full_speed_in(robot.acceleration, place)
+        assumed = None if seconds is None else joint.top_speed / seconds
+        own.append(assumed if joint.acceleration is None else joint.acceleration)
+    stated = [limit for limit in own if limit is not None]
+    smallest = min(stated, default=APPROACH_ACCELERATION)
+    return float(max(np.floor(smallest / TICK + 1e-6), 1.0) * TICK)
+
+
+def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
+    """Distance in [m] from each row within which its move may be rounded, shape (N,); zero for a stop.
+
+    It is that of the tool tip after its share ``blend`` of the shorter neighbouring segment. Which
+    rows are stops: ``corners.may_round``.
+
+    Args:
+        robot: The robot.
+        rows: Its rows.
+        blend: Share of a segment, 0 to 0.5, of all rows or of each, shape (N,).
+    """
+    radii, share = np.zeros(len(rows)), np.broadcast_to(blend, len(rows))[1:-1, None]
+    if not np.any(share > 0.0):
+        return radii
+    at = tool_tips(robot, rows.q)
+    radii[1:-1] = np.minimum(
+        _distances(at[1:-1], tool_tips(robot, rows.q[1:-1] + share * (rows.q[:-2] - rows.q[1:-1]))),
+        _distances(at[1:-1], tool_tips(robot, rows.q[1:-1] + share * (rows.q[2:] - rows.q[1:-1]))),
+    )
+    radii = np.floor(BLEND_ROOM * radii / BLEND_TICK) * BLEND_TICK
+    radii[
+        ~may_round(ProgramRows(name=None, robots={robot.name: rows}), Promise.SEQUENCE_ONLY)[robot.name]
+        | (radii < SMALLEST_BLEND)
+    ] = 0.0
+    return radii
+
+
+def tool_tips(robot: Robot, q: Array) -> Array:
+    """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
+
+    Args:
+        robot: The robot.
+        q: Positions of the model in [rad] or [m], shape (N, n).
+    """
+    model = robot.model
+    p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
+    for link in reversed(model.links_to_flange):
+        axis, drive = model.axes[link], model.drive(link)
+        position = drive.ratio * q[:, drive.joint] + drive.offset
+        if axis.is_revolute:
+            R = rotation_about(axis.axis_B, position)
+            p = axis.point_B + np.einsum("nij,nj->ni", R, p - axis.point_B)
+        else:
+            p = p + position[:, None] * axis.axis_B
+    return p
+
+
+def _distances(a: Array, b: Array) -> Array:
+    """Distances between points, shape (N,)."""
+    return np.linalg.norm(a - b, axis=1)

@@ -1,0 +1,110 @@
+"""URScript: a program per robot, in radians.
+
+``timed``: the first row by ``movej``, each further one by ``servoj`` at the cycle of the controller, ``stopj`` at the
+end. ``servoj`` follows its rows with a lag, its lookahead time, which the cell states as the latency of the controller.
+``sequence only``: one ``movej`` per row, and at marks a handshake by standard digital signals.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.corners import chosen_shares
+from cellplan.export.dialect import Dialect
+from cellplan.export.head import head_notes
+from cellplan.export.joints import Angle, to_numbers
+from cellplan.export.text import comment, joined
+from cellplan.export.timed_rows import cycle_of, file_path, times_of
+from cellplan.export.urscript.reader import read_urscript
+from cellplan.export.urscript.rows import blend_radii, move_acceleration, move_speeds
+from cellplan.export.urscript.text import (
+    DECIMALS,
+    ENDING,
+    MOST_ROWS,
+    OFF_CYCLE,
+    approach_call,
+    decimals_of_urscript,
+    function_names,
+    handshake_lines,
+    lowering,
+    require_length,
+    require_turns,
+    servo_call,
+    stop_call,
+)
+from cellplan.model.cell import Robot
+from cellplan.model.controllers import ControllerKind
+from cellplan.model.exported import ExportJob, Promise, RobotRows
+
+
+def render_urscript(job: ExportJob) -> dict[str, str]:
+    """Text of every file, by its path in the folder of the export: ``<robot>.script``, in a folder of each task.
+
+    Args:
+        job: What is written.
+
+    Raises:
+        InputError: A robot has other joints than six, a position beyond two turns, too many rows, or lacks something
+            that its program needs.
+    """
+    names, found = function_names(job.frame), {}
+    for program in job.programs:
+        for name in job.frame.robots:
+            robot, rows = job.frame.robot(name), program.robots[name]
+            path = file_path(program.name, f"{name}{ENDING}")
+            require_length(job.frame, len(rows), where=f"robot '{name}'")
+            points = _points(robot, rows, decimals_of_urscript(job.frame, robot))
+            is_timed = job.frame.promise is Promise.TIMED
+            body = _timed(job, robot, rows, points) if is_timed else _sequence(job, robot, rows, points)
+            head = [line for note in head_notes(job, name) for line in comment(note, "#")]
+            found[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
+    return found
+
+
+def _points(robot: Robot, rows: RobotRows, decimals: int) -> list[str]:
+    """Positions of all rows as they are written: ``[0.1, …]``."""
+    numbers = to_numbers(robot, rows.q, decimals=decimals, angle=Angle.RADIANS)
+    where = [f"robot '{robot.name}', row {row}" for row in range(len(rows))]
+    require_turns(robot.model.joint_names, numbers, row_of=where)
+    point = "[" + ", ".join([f"%.{decimals}f"] * numbers.shape[1]) + "]"
+    return [point % tuple(row) for row in numbers.tolist()]
+
+
+def _timed(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[str]:
+    """Instructions that follow the rows at the cycle of the controller."""
+    cycle, times, servo = cycle_of(robot), times_of(rows), servo_call(job.frame, robot)
+    if np.any(np.abs(times - np.arange(len(times)) * cycle) > OFF_CYCLE + np.spacing(times)):
+        raise InputError(f"robot '{robot.name}': expected rows every {1000.0 * cycle:g} ms, got others")
+    first, *others = points
+    return [f"movej({first}, {approach_call()})", *(f"servoj({point}, {servo})" for point in others), stop_call(robot)]
+
+
+def _sequence(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[str]:
+    """Instructions that move from row to row, and wait at marks."""
+    meeting = handshake_lines(job.frame, robot.name) if rows.marks else []
+    lines = [lowering(job.frame, robot.name)] if meeting else []
+    speeds, radii = move_speeds(robot, rows), blend_radii(robot, rows, chosen_shares(job, rows))
+    acceleration = f"a={move_acceleration(robot):.3f}"
+    for row, point in enumerate(points):
+        call = approach_call() if row == 0 else f"{acceleration}, v={speeds[row]:.3f}"
+        call += f", r={radii[row]:.4f}" if radii[row] > 0.0 else ""
+        lines += [f"movej({point}, {call})", *(meeting * rows.marks.count(row))]
+    return lines
+
+
+URSCRIPT: Final[Dialect] = Dialect(
+    name="urscript",
+    title="URScript programs: servoj at the cycle, or movej from row to row",
+    render=render_urscript,
+    read=read_urscript,
+    decimals=DECIMALS,
+    promises=(Promise.TIMED, Promise.SEQUENCE_ONLY),
+    kinds=frozenset({ControllerKind.UR}),
+    at_cycle=True,
+    is_thinned=True,
+    is_rounded=True,
+    lags=True,
+    split=MOST_ROWS,
+)

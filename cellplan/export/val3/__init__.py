@@ -1,0 +1,1 @@
+"""VAL3 of Stäubli controllers: writer and reader."""

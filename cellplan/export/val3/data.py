@@ -1,0 +1,118 @@
+"""Data of VAL3 projects: arrays of values, refused with file and line where they are others."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from cellplan.errors import InputError
+from cellplan.export.val3.names import BASE, FLANGE, NAME, TOOL_NAME
+from cellplan.export.val3.xml import DATA_SPACE, TYPE, Element, parse
+
+_JOINTS: Final = tuple(f"j{axis}" for axis in range(1, 7))
+_POSE: Final = ("x", "y", "z", "rx", "ry", "rz")
+_SHARES: Final = ("accel", "vel", "decel", "tmax", "rmax", "leave", "reach")
+_NUMBERS: Final = {"jointRx": _JOINTS, "tool": _POSE, "frame": _POSE, "mdesc": _SHARES, "dio": (), "num": ("value",)}
+_TEXTS: Final = {
+    "jointRx": (),
+    "tool": ("fatherId", "ioLink"),
+    "frame": ("fatherId",),
+    "mdesc": ("blend",),
+    "dio": ("link",),
+    "num": (),
+}
+_NEEDED: Final = {
+    "jointRx": (),
+    "tool": ("fatherId",),
+    "frame": ("fatherId",),
+    "mdesc": (),
+    "dio": ("link",),
+    "num": (),
+}
+_FATHERS: Final = {"tool": FLANGE, "frame": BASE}
+_BLENDS: Final = ("off", "joint", "Cartesian")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Data:
+    """An array of values.
+
+    Attributes:
+        element: Where it is declared.
+        kind: Type of its values.
+        values: Attributes of each value; one that is missing has its default.
+    """
+
+    element: Element
+    kind: str
+    values: Sequence[Mapping[str, str]]
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(self.values)
+
+    def error(self, expected: str, got: str) -> InputError:
+        """An error at its declaration."""
+        return self.element.error(expected, got)
+
+
+def read_data(text: str, file: str) -> dict[str, Data]:
+    """Data of a project by name.
+
+    Args:
+        text: The text of its file.
+        file: Name of the file in messages.
+
+    Raises:
+        InputError: With file and line.
+    """
+    database = parse(text, file, "Database", DATA_SPACE)
+    database.require()
+    database.only("Datas", space=DATA_SPACE)
+    found: dict[str, Data] = {}
+    for element in database.one("Datas", space=DATA_SPACE).only("Data", space=DATA_SPACE):
+        name, data = _data(element)
+        if name in found:
+            raise element.error("names that differ", name)
+        found[name] = data
+    return found
+
+
+def _data(element: Element) -> tuple[str, Data]:
+    """One array."""
+    element.require(needed=("name", TYPE, "type", "size"), allowed=("access",))
+    own = element.attributes
+    name, kind, size = own["name"], own["type"], own["size"]
+    longest = TOOL_NAME if kind == "tool" else NAME
+    if kind not in _NUMBERS or own[TYPE] != "array" or own.get("access", "public") not in {"public", "private"}:
+        raise element.error(f"a public or private array of one of {', '.join(_NUMBERS)}", f"{own[TYPE]} of {kind}")
+    if not re.fullmatch(rf"[A-Za-z]\w{{0,{longest - 1}}}", name, re.ASCII):
+        raise element.error(f"a name of at most {longest} letters and digits", name)
+    if not re.fullmatch(r"[1-9][0-9]{0,6}", size):
+        raise element.error("a size of 1 or more", size)
+    values = element.only("Value", space=DATA_SPACE)
+    if len(values) != int(size) and (values or kind not in {"num", "mdesc"}):
+        raise element.error(f"{size} values as its size says", str(len(values)))
+    read = [_value(value, key, kind) for key, value in enumerate(values)]
+    return name, Data(element=element, kind=kind, values=read or [{}] * int(size))
+
+
+def _value(value: Element, key: int, kind: str) -> Mapping[str, str]:
+    """Attributes of one value."""
+    value.require(needed=("key", *_NEEDED[kind]), allowed=(*_NUMBERS[kind], *_TEXTS[kind]))
+    value.only(space=DATA_SPACE)
+    own = value.attributes
+    if own["key"] != str(key):
+        raise value.error(f'key="{key}"', own["key"])
+    for name in _NUMBERS[kind]:
+        if name in own and not re.fullmatch(r"-?[0-9]{1,7}(?:\.[0-9]{1,12})?", own[name]):
+            raise value.error(f"a plain decimal number as {name}", own[name])
+    if kind in _FATHERS and own["fatherId"] != _FATHERS[kind]:
+        raise value.error(f'fatherId="{_FATHERS[kind]}"', own["fatherId"])
+    if kind == "mdesc":
+        if not 0.0 < float(own.get("vel", "100")) <= 100.0:
+            raise value.error("a speed above 0 and up to 100", own["vel"])
+        if own.get("blend", "off") not in _BLENDS:
+            raise value.error(f"one of {', '.join(_BLENDS)}", own["blend"])
+    return own

@@ -1,0 +1,340 @@
+"""Strict reader of VAL3 projects: the written subset and harmless variants of it, nothing else."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.joints import from_numbers
+from cellplan.export.val3.code import Call, Loop, Move, Node, Reset, SetOutput, StandStill, WaitFor, read_code
+from cellplan.export.val3.data import Data, read_data
+from cellplan.export.val3.names import START, STOP, input_link, output_link
+from cellplan.export.val3.xml import PARAMETER_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE, Element, parse
+from cellplan.export.zones import tool_shares
+from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
+from cellplan.model.units import MM
+
+MOST_STEPS: Final = 1_000_000  # statements that loops may unroll to
+
+
+def read_val3(
+    frame: ExportFrame, files: Mapping[str, str], paths: Mapping[tuple[str | None, str], str]
+) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back, strictly: positions, marks, zones; they state neither times nor process.
+
+    Args:
+        frame: Which robots and programs.
+        files: Text by path.
+        paths: Folder of each project, by program and robot.
+
+    Raises:
+        InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
+    """
+    found: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
+    left = dict(files)
+    for (program, robot), path in paths.items():
+        player = _Player(frame=frame, robot=robot, project=_project(left, path))
+        player.play_all()
+        placed = frame.robot(robot)
+        q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
+        rounding = tool_shares(placed, q, np.array(player.zones) / MM)
+        found[program][robot] = RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
+        if len({len(rows.marks) for rows in found[program].values()}) > 1:
+            raise InputError(f"{path}: expected as many marks as the programs of the other robots have")
+    if left:
+        raise InputError(f"{min(left)}: expected no such file in this export")
+    return tuple(ProgramRows(name=program, robots=robots) for program, robots in found.items())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Program:
+    """A program of a project.
+
+    Attributes:
+        file: Its file.
+        code: Its statements.
+        end: Line of its ``end``.
+    """
+
+    file: str
+    code: Sequence[Node]
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Project:
+    """What the files of a project hold.
+
+    Attributes:
+        path: Its folder.
+        data: Its data by name.
+        programs: Its programs by name.
+    """
+
+    path: str
+    data: Mapping[str, Data]
+    programs: Mapping[str, _Program]
+
+
+def _project(left: dict[str, str], path: str) -> _Project:
+    """Read a project; takes its files out of those that are left."""
+    file = f"{path}/{path.rpartition('/')[2]}.pjx"
+    listed, data_file = _listed(parse(_taken(left, file), file, "Project", PROJECT_SPACE), path)
+    data = read_data(_taken(left, data_file), data_file)
+    programs = {name: _program(left, f"{path}/{name}.pgx", name, data) for name in listed}
+    return _Project(path=path, data=data, programs=programs)
+
+
+def _taken(left: dict[str, str], file: str) -> str:
+    """Text of a file that was not read yet."""
+    if file not in left:
+        raise InputError(f"{file}: expected a file, got none")
+    return left.pop(file)
+
+
+def _listed(project: Element, path: str) -> tuple[list[str], str]:
+    """Names of the programs that a project lists, and path of its data."""
+    project.require()
+    project.only("Parameters", "Programs", "Database", "Libraries", "Types", space=PROJECT_SPACE)
+    parameters = project.one("Parameters", space=PROJECT_SPACE)
+    parameters.require(needed=("version", "stackSize", "millimeterUnit"))
+    if parameters.attributes["millimeterUnit"] != "true":
+        raise parameters.error("millimetres", parameters.attributes["millimeterUnit"])
+    for empty in project.children:
+        if empty.name.endswith((" Libraries", " Types")):
+            empty.require()
+            empty.only(space=PROJECT_SPACE)
+    listed = project.one("Programs", space=PROJECT_SPACE)
+    names = [_file_name(entry, ".pgx") for entry in listed.only("Program", space=PROJECT_SPACE)]
+    for name in (START, STOP, *names):
+        if names.count(name) != 1:
+            raise listed.error(f"{name}.pgx once", f"{names.count(name)} of them")
+    database = project.one("Database", space=PROJECT_SPACE)
+    entries = database.only("Data", space=PROJECT_SPACE)
+    own = path.rpartition("/")[2]
+    if [_file_name(entry, ".dtx") for entry in entries] != [own]:
+        raise database.error(f"{own}.dtx alone", f"{len(entries)} of them")
+    return names, f"{path}/{own}.dtx"
+
+
+def _file_name(entry: Element, ending: str) -> str:
+    """Name of a listed file without its ending."""
+    entry.require(needed=("file",))
+    match = re.fullmatch(r"([A-Za-z]\w{0,14})" + re.escape(ending), entry.attributes["file"], re.ASCII)
+    if match is None:
+        raise entry.error(f"a name of less than 16 characters that ends in {ending}", entry.attributes["file"])
+    return match[1]
+
+
+def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data]) -> _Program:
+    """Read a program."""
+    root = parse(_taken(left, file), file, "Programs", PROGRAM_SPACE)
+    root.require()
+    root.only("Program", space=PROGRAM_SPACE)
+    program = root.one("Program", space=PROGRAM_SPACE)
+    program.require(needed=("name",), allowed=("access",))
+    if program.attributes["name"] != name or program.attributes.get("access") not in {None, "public", "private"}:
+        raise program.error(f"the program {name}, public or private", " ".join(program.attributes.values()))
+    counters = {each for each, own in data.items() if own.kind == "num"}
+    for child in program.children:
+        if child.name == f"{PARAMETER_SPACE} Parameters":
+            child.require()
+            child.only(space=PARAMETER_SPACE)
+        elif child.name == f"{PROGRAM_SPACE} Locals":
+            counters |= {_local(each) for each in child.only("Local", space=PROGRAM_SPACE)}
+        elif child.name != f"{PROGRAM_SPACE} Code":
+            raise child.error("Parameters, Locals or Code", child.name.rpartition(" ")[2])
+    code = program.one("Code", space=PROGRAM_SPACE)
+    code.require()
+    if code.children or program.text.strip():
+        raise code.error("text alone", "an element")
+    statements, end = read_code(code, counters)
+    return _Program(file=file, code=statements, end=end)
+
+
+def _local(local: Element) -> str:
+    """Name of a local number, which counts a loop."""
+    local.require(needed=("name", "type", TYPE, "size"))
+    if local.attributes["type"] != "num" or local.attributes[TYPE] != "array" or local.attributes["size"] != "1":
+        raise local.error("one number", local.attributes["type"])
+    return local.attributes["name"]
+
+
+@dataclass(slots=True, kw_only=True)
+class _Player:
+    """Follows the programs of a project statement by statement.
+
+    Attributes:
+        frame: Which robots.
+        robot: The robot.
+        project: Its project.
+        rows: Joint positions of the controller in each row.
+        zones: Distance of the tool in [mm] within which each row is rounded; 0 for a stop.
+        marks: Rows with a handshake.
+        calls: Programs that were called.
+        used: Number of values that were moved to, by the name of their data.
+        stands: Whether the robot has come to a stop after its last motion.
+        is_exact: Whether the last motion ends in its row.
+        step: Number of instructions of a handshake that were met.
+        lowered: Line of ``start`` at which its output was lowered before the first motion, 0 if it was not.
+        steps: Number of statements that were done.
+    """
+
+    frame: ExportFrame
+    robot: str
+    project: _Project
+    rows: list[Sequence[float]] = field(default_factory=list)
+    zones: list[float] = field(default_factory=list)
+    marks: list[int] = field(default_factory=list)
+    calls: list[str] = field(default_factory=list)
+    used: dict[str, int] = field(default_factory=dict)
+    stands: bool = True
+    is_exact: bool = True
+    step: int = 0
+    lowered: int = 0
+    steps: int = 0
+
+    def play_all(self) -> None:
+        """Follow ``start`` and what it calls, and make sure that all that the project holds was used.
+
+        Raises:
+            InputError: With file and line.
+        """
+        start, stop = (self.project.programs[name] for name in (START, STOP))
+        for node in stop.code:
+            if not isinstance(node, Reset):
+                raise _error(stop.file, node.line, "resetMotion() alone in stop", node.text)
+        self._play(start, start.code, {})
+        if not self.rows or not self.stands or self.step:
+            missing = "at least one motion" if not self.rows else "the rest of the handshake"
+            raise _error(start.file, start.end, "waitEndMove()" if not self.stands else missing, "the end")
+        if self.lowered and not self.marks:
+            raise _error(start.file, self.lowered, "a handshake at a row, as its output is lowered", "none")
+        for name in self.project.programs:
+            if name not in {START, STOP, *self.calls}:
+                raise InputError(f"{self.project.path}/{name}.pgx: expected a program that start calls, got another")
+        for name, data in self.project.data.items():
+            if data.kind == "jointRx" and self.used.get(name, 0) != data.size:
+                raise data.error("motions to all of its values", f"{self.used.get(name, 0)} of {data.size}")
+
+    def _play(self, program: _Program, nodes: Sequence[Node], counters: Mapping[str, int]) -> None:
+        """Follow statements."""
+        for node in nodes:
+            self.steps += 1
+            if self.steps > MOST_STEPS:
+                raise _error(program.file, node.line, f"at most {MOST_STEPS} statements to be done", node.text)
+            if self.step and not isinstance(node, (SetOutput, WaitFor)):
+                raise _error(program.file, node.line, f"the rest of the handshake ({self._expected()})", node.text)
+            if isinstance(node, Move):
+                self._move(program, node, counters)
+            elif isinstance(node, StandStill):
+                self._stand(program, node)
+            elif isinstance(node, Call):
+                self._call(program, node)
+            elif isinstance(node, Loop):
+                for value in node.values:
+                    self._play(program, node.body, {**counters, node.counter: value})
+            elif isinstance(node, Reset):
+                raise _error(program.file, node.line, "resetMotion() in stop alone", node.text)
+            else:
+                self._signal(program, node)
+
+    def _stand(self, program: _Program, node: StandStill) -> None:
+        """A wait for the end of all motions."""
+        if not self.is_exact:
+            raise _error(program.file, node.line, "an exact stop before it (blend off)", node.text)
+        self.stands = True
+
+    def _call(self, program: _Program, node: Call) -> None:
+        """A call of a page."""
+        if program.file != self.project.programs[START].file or node.name in {START, STOP, *self.calls}:
+            raise _error(program.file, node.line, "each page called once by start", node.text)
+        if node.name not in self.project.programs:
+            raise _error(program.file, node.line, "a program of the project", node.text)
+        if self.rows and not self.calls:
+            raise _error(program.file, node.line, "no call in a program with motions of its own", node.text)
+        self.calls.append(node.name)
+        page = self.project.programs[node.name]
+        before = len(self.rows)
+        self._play(page, page.code, {})
+        if len(self.rows) == before or self.step or not self.is_exact:
+            raise _error(page.file, page.end, "motions, the last of which ends in an exact stop", "the end")
+
+    def _move(self, program: _Program, node: Move, counters: Mapping[str, int]) -> None:
+        """A motion to the next value of its data."""
+        if self.calls and program.file == self.project.programs[START].file:
+            raise _error(program.file, node.line, "no motion in a program that calls pages", node.text)
+        joints = self._value(program, node, counters, 0, "jointRx")
+        self._value(program, node, counters, 1, "tool")
+        descriptor = self._value(program, node, counters, 2, "mdesc")
+        name, index = node.names[0], _index(node, counters, 0)
+        if index != self.used.get(name, 0):
+            raise _error(program.file, node.line, f"{name}[{self.used.get(name, 0)}]: all values in order", node.text)
+        self.used[name] = index + 1
+        self.rows.append([float(joints.get(f"j{axis}", "0")) for axis in range(1, 7)])
+        zone = max(float(descriptor.get(side, "0")) for side in ("leave", "reach"))
+        self.is_exact = descriptor.get("blend", "off") == "off"
+        if not self.is_exact and (descriptor["blend"] != "joint" or not zone > 0.0):
+            raise _error(program.file, node.line, "a blend of joints with leave or reach, or off", node.text)
+        self.zones.append(0.0 if self.is_exact else zone)
+        self.stands = False
+
+    def _value(
+        self, program: _Program, node: Move, counters: Mapping[str, int], place: int, kind: str
+    ) -> Mapping[str, str]:
+        """The value that an argument of a motion names."""
+        name, index = node.names[place], _index(node, counters, place)
+        data = self.project.data.get(name)
+        if data is None or data.kind != kind:
+            raise _error(program.file, node.line, f"data of the type {kind}", name)
+        if index is None or not 0 <= index < data.size:
+            raise _error(program.file, node.line, f"an index of {name} from 0 to {data.size - 1}", node.text)
+        return data.values[index]
+
+    def _signal(self, program: _Program, node: SetOutput | WaitFor) -> None:
+        """An instruction of a handshake."""
+        expected, row = handshake_steps(self.frame, self.robot), len(self.rows) - 1
+        is_first = bool(expected) and not self.lowered and row < 0 and not self.calls
+        if not is_first and (not expected or row < 0 or not self.stands or row in self.marks):
+            raise _error(program.file, node.line, "signals only once after waitEndMove() at a mark", node.text)
+        data = self.project.data.get(node.name)
+        if data is None or data.kind != "dio":
+            raise _error(program.file, node.line, "data of the type dio", node.name)
+        if not is_first and not self.lowered:
+            first = lowering_step(self.frame, self.robot).signal
+            raise _error(program.file, node.line, f"{first}=false before the first motion", node.text)
+        step = lowering_step(self.frame, self.robot) if is_first else expected[self.step]
+        link = input_link(step.signal) if step.waits else output_link(step.signal)
+        if (isinstance(node, WaitFor), node.is_on, data.values[0].get("link")) != (step.waits, step.is_on, link):
+            raise _error(program.file, node.line, f"the handshake of the cell ({_shown(step)})", node.text)
+        if is_first:
+            self.lowered = node.line
+            return
+        self.step = (self.step + 1) % len(expected)
+        if self.step == 0:
+            self.marks.append(row)
+
+    def _expected(self) -> str:
+        """The next instruction of a handshake."""
+        return _shown(handshake_steps(self.frame, self.robot)[self.step])
+
+
+def _shown(step: Step) -> str:
+    """An instruction of a handshake in messages."""
+    state = "true" if step.is_on else "false"
+    return f"wait for {step.signal}=={state}" if step.waits else f"{step.signal}={state}"
+
+
+def _index(node: Move, counters: Mapping[str, int], place: int) -> int | None:
+    """Value of the index of an argument; None for a name that no loop counts."""
+    index = node.indices[place]
+    return index if isinstance(index, int) else counters.get(index)
+
+
+def _error(file: str, line: int, expected: str, got: str) -> InputError:
+    """One located line."""
+    return InputError(f"{file}:{line}: expected {expected}, got {got[:60]!r}")

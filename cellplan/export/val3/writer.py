@@ -1,0 +1,315 @@
+"""VAL3 of Staubli: a project for each robot, whose data hold the rows and whose programs move from one to the next."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cellplan.export.corners import row_shares
+from cellplan.export.dialect import Dialect
+from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.head import head_notes
+from cellplan.export.joints import from_numbers, to_numbers
+from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes
+from cellplan.export.text import comment, fixed, joined
+from cellplan.export.val3.names import (
+    BASE,
+    FLANGE,
+    JOINTS,
+    MOVE,
+    START,
+    STOP,
+    TOOL,
+    WORLD,
+    input_link,
+    output_link,
+    project_paths,
+    require_links,
+    signal_names,
+)
+from cellplan.export.val3.reader import read_val3
+from cellplan.export.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE_SPACE
+from cellplan.export.zones import tool_zones
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell import Robot
+from cellplan.model.controllers import ControllerKind
+from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.units import DEG, MM
+
+DECIMALS: Final = 5
+POSE_DECIMALS: Final = 3
+PAGE: Final = 1000  # rows
+ZONES: Final = tuple(round(10.0 ** (1.7 + place / 10.0)) for place in range(37))  # [um] of a row, 0.05 to 200 mm
+VERSION: Final = "s7.10.2"  # of the language, as public projects state it
+NO_LIMIT: Final = "99999"  # [mm/s] and [deg/s] of the tool: the axes are what limits
+XML: Final = '<?xml version="1.0" encoding="utf-8"?>'
+
+
+class _Move(NamedTuple):
+    """How a row is approached and passed.
+
+    Attributes:
+        speed: Share of the top speed in [%].
+        zone: Distance of the tool from the row in [um] within which it is rounded, 0 for a stop.
+    """
+
+    speed: int
+    zone: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Project:
+    """What is written of one robot in one program.
+
+    Attributes:
+        path: Folder of the project; its last part is its name.
+        notes: Notes for the heads of its files.
+        rows: The rows.
+        numbers: Joint positions of the arm, shape (N, 6).
+        decimals: Of these.
+        moves: How each row is approached and passed.
+        steps: Instructions at a mark.
+        first: Instructions before the first motion.
+        pages: Rows of each page.
+        tool: Tool in the flange frame, shape (4, 4).
+    """
+
+    path: str
+    notes: Sequence[str]
+    rows: RobotRows
+    numbers: Array
+    decimals: int
+    moves: Sequence[_Move]
+    steps: Sequence[Step]
+    first: Sequence[Step]
+    pages: Sequence[range]
+    tool: Array
+
+    @property
+    def name(self) -> str:
+        """Name of the project."""
+        return self.path.rpartition("/")[2]
+
+    @property
+    def descriptors(self) -> dict[_Move, int]:
+        """Places of the motion descriptors, in the order of their first use."""
+        return {move: place for place, move in enumerate(dict.fromkeys(self.moves))}
+
+    @property
+    def signals(self) -> dict[tuple[bool, str], str]:
+        """Names of the data of signals, by whether it is an input, and by the signal."""
+        return signal_names(self.steps)
+
+    @property
+    def endings(self) -> list[str]:
+        """What the names of the pages end in; nothing for a single one."""
+        return [f"_{page:03d}" for page in range(1, len(self.pages) + 1)] if len(self.pages) > 1 else [""]
+
+
+def render_val3(job: ExportJob) -> dict[str, str]:
+    """Text of every file, by its path: ``<robot>/<robot>.pjx`` and so on, or ``<robot>/<program>/<program>.pjx``.
+
+    Args:
+        job: What is written.
+
+    Raises:
+        InputError: A robot cannot be written: it has no Staubli controller, is no arm of six axes alone, lacks a
+            signal, or a position cannot be written with the decimals.
+    """
+    paths = project_paths(job.frame, VAL3)
+    robots = list(dict.fromkeys(robot for _, robot in paths))
+    for robot in robots:
+        require_links(job.frame, robot)
+        require_six_axes(job.frame.robot(robot), external=0, what="VAL3")
+    files: dict[str, str] = {}
+    for program in job.programs:
+        for robot, rows in program_rows(job, robots, program).items():
+            files |= _files(_project(job, program, rows, paths[program.name, robot]))
+    return files
+
+
+def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Project:
+    """All that the project of one robot in one program is made of."""
+    placed = job.frame.robot(rows.robot)
+    own = None if placed.control is None else placed.control.decimals
+    decimals = DECIMALS if own is None else own
+    numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, VAL3)
+    shares = row_shares(job, program)[rows.robot] * is_rounded(job, program, rows.robot, numbers, pages)
+    zones = _zones(placed, from_numbers(placed, numbers), shares)
+    steps = handshake_steps(job.frame, rows.robot) if rows.marks else ()
+    return _Project(
+        path=path,
+        notes=head_notes(job, rows.robot),
+        rows=rows,
+        numbers=numbers,
+        decimals=decimals,
+        moves=[_Move(*each) for each in zip(percentages(placed, rows), zones, strict=True)],
+        steps=steps,
+        first=[lowering_step(job.frame, rows.robot)] if steps else [],
+        pages=pages,
+        tool=placed.tool.X_FT,
+    )
+
+
+def _zones(robot: Robot, q: Array, shares: Array) -> list[int]:
+    """Distance of the tool in [um] within which each row is rounded, on the scale, 0 for a stop, shape (N,)."""
+    scale = np.array([0, *ZONES])
+    exact = 1000.0 * MM * tool_zones(robot, q, shares)
+    zones: list[int] = scale[np.searchsorted(scale, exact, side="right") - 1].tolist()
+    return zones
+
+
+def _files(project: _Project) -> dict[str, str]:
+    """All files of a project."""
+    pages = [f"{project.name}{ending}" for ending in project.endings]
+    programs = {STOP: _program(STOP, ["resetMotion()"])}
+    moves = [_moves(project, page, ending) for page, ending in zip(project.pages, project.endings, strict=True)]
+    if len(pages) == 1:
+        code = moves[0]
+    else:
+        code = [f"call {page}()" for page in pages]
+        programs |= {page: _program(page, own) for page, own in zip(pages, moves, strict=True)}
+    heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
+    first = [_instruction(step, project.signals) for step in project.first]
+    programs[START] = _program(START, [*heads, *first, *code, "waitEndMove()"])
+    files = {f"{program}.pgx": text for program, text in sorted(programs.items())}
+    files = {f"{project.name}.pjx": _index(project, files), f"{project.name}.dtx": _data(project), **files}
+    return {f"{project.path}/{file}": text for file, text in files.items()}
+
+
+def _index(project: _Project, programs: Iterable[str]) -> str:
+    """The file that lists programs and data."""
+    return joined(
+        [
+            XML,
+            f'<Project xmlns="{PROJECT_SPACE}">',
+            *_xml_comments(project.notes),
+            f'  <Parameters version="{VERSION}" stackSize="5000" millimeterUnit="true"/>',
+            "  <Programs>",
+            *(f'    <Program file="{program}"/>' for program in programs),
+            "  </Programs>",
+            "  <Database>",
+            f'    <Data file="{project.name}.dtx"/>',
+            "  </Database>",
+            "  <Libraries/>",
+            "  <Types/>",
+            "</Project>",
+        ]
+    )
+
+
+def _data(project: _Project) -> str:
+    """The data: signals, rows, motion descriptors, tool and world frame."""
+    lines = [
+        XML,
+        f'<Database xmlns:xsi="{TYPE_SPACE}" xmlns="{DATA_SPACE}">',
+        *_xml_comments(project.notes),
+        "  <Datas>",
+    ]
+    lines += _array(WORLD, "frame", [{"fatherId": BASE}])
+    for (is_input, signal), name in project.signals.items():
+        lines += _array(name, "dio", [{"link": input_link(signal) if is_input else output_link(signal)}])
+    for page, ending in zip(project.pages, project.endings, strict=True):
+        lines += _array(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
+    lines += _array(MOVE, "mdesc", [_descriptor(move) for move in project.descriptors])
+    lines += _array(TOOL, "tool", [_tool(project.tool)])
+    return joined([*lines, "  </Datas>", "</Database>"])
+
+
+def _array(name: str, kind: str, values: Sequence[Mapping[str, str]]) -> list[str]:
+    """One array of data, its size that of its values."""
+    rows = [
+        f'      <Value key="{key}" {" ".join(f"{item}={_quoted(text)}" for item, text in value.items())}/>'
+        for key, value in enumerate(values)
+    ]
+    head = f'    <Data name="{name}" access="public" xsi:type="array" type="{kind}" size="{len(values)}">'
+    return [head, *rows, "    </Data>"]
+
+
+def _joints(project: _Project, row: int) -> dict[str, str]:
+    """A row as the attributes of a jointRx."""
+    values = project.numbers[row].tolist()
+    return {f"j{axis}": fixed(value, project.decimals) for axis, value in enumerate(values, start=1)}
+
+
+def _descriptor(move: _Move) -> dict[str, str]:
+    """A motion at a share of the top speed that ends in a stop, or is left and reached at one distance from its row."""
+    shares = {"accel": "100", "vel": str(move.speed), "decel": "100"}
+    size = fixed(move.zone / 1000.0, 3) if move.zone else "0"
+    blend = {"blend": "joint" if move.zone else "off", "leave": size, "reach": size}
+    return {**shares, "tmax": NO_LIMIT, "rmax": NO_LIMIT, **blend}
+
+
+def _tool(X_FT: Array) -> dict[str, str]:
+    """The tool of the cell on the flange: millimetres, and degrees of turns about x, y and z of the turned frame."""
+    R = X_FT[:3, :3]
+    ry = np.arcsin(np.clip(R[0, 2], -1.0, 1.0))
+    if np.hypot(R[0, 0], R[0, 1]) > 1e-9:  # else the turns about x and z are one: all of it is given to z
+        rx, rz = np.arctan2(-R[1, 2], R[2, 2]), np.arctan2(-R[0, 1], R[0, 0])
+    else:
+        rx, rz = 0.0, np.arctan2(R[1, 0], R[1, 1])
+    values = [*(MM * X_FT[:3, 3]), DEG * rx, DEG * ry, DEG * rz]
+    named = zip(("x", "y", "z", "rx", "ry", "rz"), values, strict=True)
+    return {**{item: fixed(float(value), POSE_DECIMALS) for item, value in named}, "fatherId": FLANGE}
+
+
+def _moves(project: _Project, page: range, ending: str) -> list[str]:
+    """The motions of a page, and the handshakes after those to its marks."""
+    lines, marks, descriptors = list[str](), set(project.rows.marks), project.descriptors
+    handshake = [_instruction(step, project.signals) for step in project.steps]
+    for place, row in enumerate(page):
+        lines.append(f"movej({JOINTS}{ending}[{place}],{TOOL}[0],{MOVE}[{descriptors[project.moves[row]]}])")
+        if row in marks and handshake:
+            lines += ["waitEndMove()", *handshake]
+    return lines
+
+
+def _instruction(step: Step, signals: Mapping[tuple[bool, str], str]) -> str:
+    """One step of a handshake."""
+    name, state = signals[step.waits, step.signal], "true" if step.is_on else "false"
+    return f"wait({name}=={state})" if step.waits else f"{name}={state}"
+
+
+def _program(name: str, code: Sequence[str]) -> str:
+    """A program."""
+    return joined(
+        [
+            XML,
+            f'<Programs xmlns:xsi="{TYPE_SPACE}" xmlns="{PROGRAM_SPACE}">',
+            f'  <Program name="{name}" access="public">',
+            "    <Code><![CDATA[begin",
+            *(f"  {line}" for line in code),
+            "end]]></Code>",
+            "  </Program>",
+            "</Programs>",
+        ]
+    )
+
+
+def _xml_comments(notes: Iterable[str]) -> list[str]:
+    """Comments of the notes, which two hyphens would end."""
+    apart = (re.sub(r"-(?=-)", "- ", note) for note in notes)
+    return [f"  <!--{line} -->" for note in apart for line in comment(note, "")]
+
+
+def _quoted(text: str) -> str:
+    """Text as the value of an attribute."""
+    for letter, name in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
+        text = text.replace(letter, name)
+    return f'"{text}"'
+
+
+VAL3: Final[Dialect] = Dialect(
+    name="val3",
+    title="Staubli VAL3: a project of .pjx, .dtx and .pgx files for each robot",
+    render=render_val3,
+    read=lambda frame, files: read_val3(frame, files, project_paths(frame, VAL3)),
+    decimals=DECIMALS,
+    promises=(Promise.SEQUENCE_ONLY,),
+    kinds=frozenset({ControllerKind.STAUBLI}),
+    is_thinned=True,
+    is_rounded=True,
+    split=PAGE,
+)

@@ -1,0 +1,1 @@
+"""One wide table of all robots: writer and columns."""
