@@ -78,7 +78,34 @@ def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:
     return axes
 
 
-def page_names(names: Iterable[str], *, longest: int, reserved: Iterable[str], taken: str) -> dict[str, str]:
+def program_paths(
+    frame: ExportFrame, dialect: Dialect, *, longest: int, reserved: Iterable[str], taken: str
+) -> dict[tuple[str | None, str], str]:
+    """Path of each program by its name and robot, without an ending: ``alpha``, or ``alpha/weld`` of several programs.
+
+    The last part may become longer by the ending of a page.
+
+    Args:
+        frame: What is exported.
+        dialect: The format.
+        longest: Most characters of a name.
+        reserved: Words of the language.
+        taken: Pattern of the names that points and other data have.
+
+    Raises:
+        InputError: A robot has no controller, or none that plays the format.
+    """
+    robots = robots_of(frame, dialect)
+    if len(frame.programs) == 1:
+        names = _page_names(robots, longest=longest, reserved=reserved, taken=taken)
+        return {(frame.programs[0], robot): names[robot] for robot in robots}
+    folders = safe_names(robots, longest=longest)
+    named = [name or "" for name in frame.programs]
+    programs = _page_names(named, longest=longest, reserved=reserved, taken=taken)
+    return {(name, robot): f"{folders[robot]}/{programs[name or '']}" for name in frame.programs for robot in robots}
+
+
+def _page_names(names: Iterable[str], *, longest: int, reserved: Iterable[str], taken: str) -> dict[str, str]:
     """Names of programs by the names in the cell: with the ending of a page still unique and short enough.
 
     No name ends like one of a page, so that ``weld_001`` is the first page of ``weld`` and nothing else.

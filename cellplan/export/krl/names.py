@@ -6,8 +6,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import signals_by_key
-from cellplan.export.pages import page_names, robots_of
-from cellplan.export.text import safe_names
+from cellplan.export.pages import program_paths
 from cellplan.model.exported import ExportFrame
 
 NAME: Final = 24  # most characters of a name
@@ -31,24 +30,12 @@ WORDS: Final = frozenset(_WORDS.split())
 
 
 def module_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None, str], str]:
-    """Path of the main module without its ending, by program and robot: ``alpha``, or ``alpha/weld`` of several.
-
-    The last part is the name of the module. It may become longer by the ending of a page.
+    """Path of the main module without its ending, by program and robot; its last part is the name of the module.
 
     Raises:
         InputError: A robot has no controller, or none that plays the format.
     """
-    robots = robots_of(frame, dialect)
-    if len(frame.programs) == 1:
-        names = page_names(robots, longest=NAME, reserved=WORDS, taken=POINT_NAME)
-        return {(frame.programs[0], robot): names[robot] for robot in robots}
-    folders = safe_names(robots, longest=NAME)
-    programs = page_names([name or "" for name in frame.programs], longest=NAME, reserved=WORDS, taken=POINT_NAME)
-    return {
-        (program, robot): f"{folders[robot]}/{programs[program or '']}"
-        for program in frame.programs
-        for robot in robots
-    }
+    return program_paths(frame, dialect, longest=NAME, reserved=WORDS, taken=POINT_NAME)
 
 
 def require_numbers(frame: ExportFrame, robot: str) -> None:
