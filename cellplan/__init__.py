@@ -57,8 +57,8 @@ if TYPE_CHECKING:
     from cellplan.pipeline.export.choice import Choice
     from cellplan.pipeline.export.program import export_program
     from cellplan.pipeline.export.several import Exported, export_programs
+    from cellplan.pipeline.fastest.result import write_fastest
     from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
-    from cellplan.pipeline.fastest.write import write_fastest
     from cellplan.pipeline.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.layout.request import LayoutRequest
@@ -135,7 +135,7 @@ _HOME: Final = {
     "verify": "pipeline.verify",
     "view": "pipeline.view.write",
     "write_base_map": "pipeline.base_map.judged",
-    "write_fastest": "pipeline.fastest.write",
+    "write_fastest": "pipeline.fastest.result",
     "write_floor_plan": "pipeline.floor_plan_file",
     "write_repair": "pipeline.repair.write",
     "write_recovery": "pipeline.recover.write",

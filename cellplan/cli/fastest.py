@@ -83,10 +83,9 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.cell.load import load_cell
         from cellplan.io.run.folder import refuse_unless_replaceable
         from cellplan.pipeline.fastest.demand import read_demand
+        from cellplan.pipeline.fastest.result import fastest_lines, fastest_record, write_fastest
         from cellplan.pipeline.fastest.shortest import fastest as shortest
-        from cellplan.pipeline.fastest.write import fastest_record, write_fastest
         from cellplan.pipeline.overrides import require_task, with_overrides
-        from cellplan.report.text.fastest import fastest_lines
 
         per_hour = None if demand is None else read_demand(demand)
         given = load_cell(cell, allow_dirs=allow_dir or ())

@@ -8,12 +8,10 @@ from typing import Final
 from cellplan.io.run.manifest import own_inputs
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import PASSED_BY_TIME
 from cellplan.pipeline.synchronous import is_searchable
 
 OPTIONS: Final = {"motion.duration_s": "--duration", "checks.clearance_mm": "--clearance"}  # of layout, by address
-OF_SPEED: Final = frozenset(
-    {"joint_velocity", "joint_acceleration", "joint_acceleration_assumed", "joint_acceleration_between_phases"}
-)  # checks that a longer cycle passes
 
 
 def after_check(cell: Path, checked: Cell, *, passed: bool, allow_dirs: Sequence[Path] = ()) -> list[str]:
@@ -44,7 +42,7 @@ def after_solve(cell: Path, solved: Cell, failed: Iterable[str], *, run: Path, a
     if not names:
         return [export_line(run, cell, allow_dirs)]
     lines = list(_repair(cell, solved, allow_dirs))
-    if names <= OF_SPEED:
+    if names <= PASSED_BY_TIME:
         lines.insert(0, _line("fastest", str(cell), *_settings(solved.origin.changes), *_folders(allow_dirs)))
     return lines
 

@@ -59,7 +59,7 @@ def sweep(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.cell.load import load_cell
         from cellplan.pipeline.sweep import SweepJob
         from cellplan.pipeline.sweep import sweep as run_sweep
-        from cellplan.report.text.study import study_lines
+        from cellplan.pipeline.sweep_result import study_lines
         from cellplan.study.variants import read_axis
 
         axes = [read_axis(text) for text in vary]

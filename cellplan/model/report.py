@@ -7,6 +7,7 @@ from enum import StrEnum
 from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import UNKNOWN_ACCELERATIONS, MotionAccelerations
 from cellplan.model.between_rows import BetweenRows
+from cellplan.model.check_kinds import CHECK_KINDS, CheckKind
 from cellplan.model.left_out import LeftOut
 from cellplan.model.payload import LoadUse
 from cellplan.model.phase import Phase
@@ -43,7 +44,7 @@ class Check:
     """One verified statement.
 
     Attributes:
-        name: What was checked (``joint_position``, ``joint_velocity``, ``position_error``, ``clearance`` …).
+        name: What was checked, one of ``CHECK_KINDS``.
         subject: Robot and joint, task, or pair of bodies.
         passed: The verdict.
         value: The worst value, in ``unit``.
@@ -61,6 +62,21 @@ class Check:
     unit: str
     at_s: float | None
     message: str
+
+    def __post_init__(self) -> None:
+        """A name that is not in the catalogue does not exist."""
+        if self.name not in CHECK_KINDS:
+            raise ValueError(f"check: expected one of {', '.join(CHECK_KINDS)}, got '{self.name}'")
+
+    @property
+    def kind(self) -> CheckKind:
+        """What a check of this name is."""
+        return CHECK_KINDS[self.name]
+
+    @property
+    def severity(self) -> float:
+        """Grows with its excess over others of its kind."""
+        return self.kind.severity(self.value, self.limit)
 
     def __repr__(self) -> str:
         """One line without arrays."""

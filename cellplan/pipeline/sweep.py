@@ -5,6 +5,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import Any
 
 from cellplan.errors import InputError
 from cellplan.io.cell.changes import plain_values, read_setting
@@ -14,11 +15,10 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.overrides import require_task, with_overrides
 from cellplan.pipeline.solution import Solution
+from cellplan.pipeline.sweep_result import study_files, study_record
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.study import study_files
 from cellplan.report.plots.rendering import require_formats
-from cellplan.report.record.key_figures import KeyFigures, key_figures
-from cellplan.report.record.study import StudyRecord, study_record
+from cellplan.report.record.figures import KEY, figures_of
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
 from cellplan.study.trial import Outcome, Variant
@@ -54,7 +54,7 @@ def sweep(
     workers: int | Executor = 1,
     resume: bool = False,
     progress: Progress = silent,
-) -> StudyRecord:
+) -> dict[str, Any]:
     """Solve a cell with every combination of values and write the study into a folder.
 
     The folder holds ``study.jsonl``, a line for each variant that grows while the study runs, and at the end
@@ -110,9 +110,9 @@ def evaluate_variant(job: SweepJob, variant: Variant) -> Outcome:
     )
 
 
-def _figures(solution: Solution) -> KeyFigures:
+def _figures(solution: Solution) -> dict[str, Any]:
     """Key figures of a solved variant."""
-    return key_figures([run.report for run in solution.runs])
+    return figures_of([run.report for run in solution.runs]).record(KEY)
 
 
 @lru_cache(maxsize=1)

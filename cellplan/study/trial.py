@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Self
+from typing import Any, Final, Self
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +28,11 @@ class TrialStatus(StrEnum):
     NO_SOLUTION = "no_solution"
     BAD_INPUT = "bad_input"
     CRASHED = "crashed"
+
+
+STATUS_TEXTS: Final = {
+    status: f"{'✓' if status is TrialStatus.PASSED else '✗'} {status.replace('_', ' ')}" for status in TrialStatus
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

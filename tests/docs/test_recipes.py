@@ -169,6 +169,11 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "from cellplan.checks.joints.travel import check_travel\n",
     )
     insert(copy / "checks" / "verify.py", "        checks=tuple(checks", ") + tuple(check_travel(q, limit=10.0)")
+    insert(
+        copy / "model" / "check_kinds.py",
+        "# the gravest first\n",
+        '    CheckKind("travel", "travel small", "Too far"),\n',
+    )
     (copy / "export" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
     dialects = copy / "pipeline" / "export" / "dialects.py"
     insert(dialects, "from typing import Final\n", "\nfrom cellplan.export.semicolons import SEMICOLONS\n")

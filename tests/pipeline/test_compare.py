@@ -21,8 +21,8 @@ from cellplan.io.input.files import digest
 from cellplan.model.cell import Mode
 from cellplan.pipeline.compare import evaluate_subject
 from cellplan.report.page.comparison import comparison_files
-from cellplan.report.record.key_figures import key_figures
-from cellplan.report.record.study import STATUSES
+from cellplan.report.record.comparison import STATUSES
+from cellplan.report.record.figures import KEY, figures_of
 from cellplan.study.trial import Variant
 
 pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
@@ -92,7 +92,7 @@ def test_figures_from_records_are_those_from_reports(place: Path, modes: dict[st
     """A second derivation of the key figures that a sweep has."""
     values = dict(map(read_setting, COARSE)) | {"motion.mode": mode}
     solution = solve(load_cell(place / "pair.yaml").with_values(values))
-    expected = key_figures([each.report for each in solution.runs])
+    expected = figures_of([each.report for each in solution.runs]).record(KEY)
     found = figures(modes, mode)
     assert {key: found[key] for key in expected} == expected
     for kind in ("velocity", "acceleration"):  # every phase works on a task

@@ -19,11 +19,11 @@ from cellplan import Cell, load_cell, solve
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.io.run.joint_tables import table_body
 from cellplan.pipeline.fastest.demand import calmest, read_demand, refuse_unless_possible
+from cellplan.pipeline.fastest.result import fastest_record, write_fastest
 from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
-from cellplan.pipeline.fastest.write import fastest_record, write_fastest
-from cellplan.report.record.load_figures import energy_proxy
+from cellplan.report.record.figures import LOAD, energy_proxy
 
 STEP = 0.01
 
@@ -211,14 +211,14 @@ def test_the_command_refuses_another_demand_at_once(cell: Cell, tmp_path: Path) 
 def test_the_tools_are_slow_enough_for_a_first_run(found: ShortestCycles) -> None:
     """The circle of 628 mm takes at least 2.51 s at 250 mm/s."""
     program = found.programs["reduced_speed"]
-    figures = program.figures
+    figures = program.figures.record(LOAD)
 
     assert program.law is Law.REDUCED_SPEED
     assert program.cycle > 0.2 * np.pi / 0.25
     assert 245.0 < figures["max_tool_speed_mm_s"] <= 250.0
     assert figures["share_above_250_mm_s"] == 0.0
     assert program.bindings[0].kind == "tool speed"
-    assert found.by_common_speed.figures["share_above_250_mm_s"] > 0.5
+    assert found.by_common_speed.figures.recorded("share_above_250_mm_s") > 0.5
 
 
 def test_the_folder_holds_the_record_the_page_the_curve_and_every_program(found: ShortestCycles, folder: Path) -> None:

@@ -11,7 +11,7 @@ from cellplan.cli.main import run
 from cellplan.errors import InputError
 from cellplan.io.cell.changes import read_setting
 from cellplan.pipeline.sweep import SweepJob, sweep
-from cellplan.report.record.key_figures import key_figures
+from cellplan.report.record.figures import KEY, figures_of
 from cellplan.study.variants import read_axis
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"
@@ -34,7 +34,7 @@ def test_figures_are_those_of_a_plain_solve(study: Path) -> None:
     record = json.loads((study / "study.json").read_text())
     cell = load_cell(CELL).with_values(dict(map(read_setting, (*SLOW, "motion.duration_s=2"))))
     solution = solve(cell)
-    assert record["trials"][1]["figures"] == key_figures([run.report for run in solution.runs])
+    assert record["trials"][1]["figures"] == figures_of([run.report for run in solution.runs]).record(KEY)
     assert record["trials"][1]["figures"]["cycle_time_s"] == 2.0
 
 

@@ -24,7 +24,7 @@ from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.base_map import map_files
 from cellplan.report.record.common import Record, number
-from cellplan.report.record.key_figures import KeyFigures, key_figures
+from cellplan.report.record.figures import KEY, figures_of
 from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, best_first
 
 BEST: Final = 10  # [-] places that are listed with their settings
@@ -126,6 +126,6 @@ def place_settings(asked: MapJob, found: PlaceVerdict, place: int) -> dict[str, 
     return values
 
 
-def _figures(solution: Solution) -> KeyFigures:
+def _figures(solution: Solution) -> dict[str, Any]:
     """Key figures of a certified place."""
-    return key_figures([run.report for run in solution.runs])
+    return figures_of([run.report for run in solution.runs]).record(KEY)

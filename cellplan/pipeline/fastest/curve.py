@@ -11,6 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.fastest.scaling import scaled_values, steps_within, whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.report.record.figures import LOAD
 from cellplan.study.run import outcomes
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
@@ -24,7 +25,7 @@ class CurvePoint:
     Attributes:
         law: What decides when the joints are where.
         values: What is set in the cell for it, by address.
-        figures: Its load, see ``LoadFigures``; empty where there is no program.
+        figures: Its load, ``LOAD`` of it; empty where there is no program.
         reason: Why there is none.
     """
 
@@ -60,7 +61,7 @@ def production_curve(
     sought = [(program.law, _values(base, program, factor)) for program, factor in product(shortest, factors)]
     variants = [Variant(number, values) for number, (_, values) in enumerate(sought)]
     found: dict[Law, list[CurvePoint]] = {
-        program.law: [CurvePoint(law=program.law, values=program.values, figures=dict(program.figures))]
+        program.law: [CurvePoint(law=program.law, values=program.values, figures=program.figures.record(LOAD))]
         for program in shortest
     }
     laws = tuple(law for law, _ in sought)
@@ -88,4 +89,4 @@ def _outcome(base: Cell, laws: Sequence[Law], task: str | None, variant: Variant
         program = TimedProgram.solved(base, laws[variant.number], variant.values, task=task, progress=silent)
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
-    return Outcome(status=TrialStatus.PASSED, reason="", figures=dict(program.figures))
+    return Outcome(status=TrialStatus.PASSED, reason="", figures=program.figures.record(LOAD))

@@ -15,7 +15,7 @@ from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.plan.retiming import RowLimits, row_limits
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.pipeline.solve import certified, solve_motion
-from cellplan.report.record.load_figures import LoadFigures, load_figures
+from cellplan.report.record.figures import Figures, figures_of
 from cellplan.scene.scene import Scene
 
 TASK_LIMITS: Final = ("feed", "tolerance between rows")
@@ -121,9 +121,9 @@ class TimedProgram:
         return replace(self, solution=certified(self.solution, self.scene, progress=progress, early=early))
 
     @property
-    def figures(self) -> LoadFigures:
-        """Its key figures; the clearance is among them once it is certified."""
-        return load_figures([run.report for run in self.solution.runs], cycle=self.cycle, load=self.load)
+    def figures(self) -> Figures:
+        """Its figures; the clearance is among them once it is certified."""
+        return figures_of([run.report for run in self.solution.runs], cycle=self.cycle, load=self.load)
 
     @property
     def cycle(self) -> float:

@@ -12,15 +12,6 @@ from cellplan.search.programs.objective import Objective, Timing
 
 DURATIONS: Final = 4  # [-] durations tried until the limits hold
 UNUSED: Final = 0.002  # [-] share of its time that a motion may leave unused
-SLOWED: Final = {
-    "position_error_between_rows": 0.5,
-    "orientation_error_between_rows": 0.5,
-    "closure_position_error_between_rows": 0.5,
-    "closure_orientation_error_between_rows": 0.5,
-    "joint_jerk": 1.0 / 3.0,
-    "part_acceleration": 0.5,
-    "tool_speed": 1.0,
-}  # checks that pass when the motion is slow enough: how the time that they ask for grows with their value
 
 
 def is_scaled(ready: Prepared) -> bool:
@@ -80,7 +71,8 @@ def scaled(cell: Cell, factor: float, progress: Progress) -> TimedProgram:
 def load_of(program: TimedProgram) -> float:
     """Share of its time in which the limits of speed and acceleration of the joints would allow the same motion."""
     figures = program.figures
-    return max(figures["max_velocity_ratio"] or 0.0, (figures["max_acceleration_ratio"] or 0.0) ** 0.5)
+    velocity, acceleration = (figures.recorded(f"max_{it}_ratio") or 0.0 for it in ("velocity", "acceleration"))
+    return max(velocity, acceleration**0.5)
 
 
 def time_of(program: TimedProgram) -> float:
@@ -89,7 +81,6 @@ def time_of(program: TimedProgram) -> float:
 
 
 def time_asked(program: TimedProgram) -> float:
-    """How many times as long the motion must last for what is no limit of a joint but gets less when it is slower."""
+    """How many times as long the motion must last for failed checks that a slower one passes."""
     checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
-    asked = [(check.value / check.limit) ** SLOWED[check.name] for check in checks if check.name in SLOWED]
-    return max(asked, default=1.0)
+    return max((check.kind.more_time(check.value, check.limit) for check in checks), default=1.0)

@@ -13,14 +13,15 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Report
 from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.present.kinds import KINDS as RESULT_KINDS
 from cellplan.pipeline.present.pictures import record_pictures, run_pictures
 from cellplan.pipeline.present.result_tables import NOWHERE, record_at, record_of, run_records, tables_of
 from cellplan.pipeline.solution import Solution
 from cellplan.planning.layout_screening import Screening
 from cellplan.report.page.figures import figure, key_figures
-from cellplan.report.page.filters import fixed, small
 from cellplan.report.page.notebook import Card, Grid
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import fixed, small
 from cellplan.report.record.rows import format_of, run_tables
 from cellplan.report.record.summary import summary_record
 
@@ -36,26 +37,20 @@ TASK_COLUMNS: Final = (
     "end_s",
 )
 SHOWN: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
-    "study": {
-        "trials": ("status", "cycle_time_s", "min_margin_deg", "max_velocity_ratio", "min_clearance_mm", "reason")
-    },
     "comparison": {"variants": ("name", "status", "cycle_time_s", "min_margin_deg", "min_clearance_mm", "load_s")},
     "layout": {
         "top": ("trial", "status", "cycle_s", "margin_deg", "clearance_mm", "change"),
         "variables": ("name", "unit", "given", "best", "lower", "upper"),
     },
     "advice": {"remedies": ("text", "kind", "cost", "cycle_s", "smallest_margin_deg", "smallest_clearance_mm")},
-    "fastest": {"cycles": ("name", "status", "cycle_s", "share_of_written", "smallest_clearance_mm")},
     "map": {"places": ("x_mm", "y_mm", "yaw_deg", "verdict", "cycle_s", "reason")},
     "rehearsal": {"tasks": ("task", "robot", "before.max_position_error_mm", "after.max_position_error_mm")},
     "report": {"tasks": TASK_COLUMNS},
 }  # by kind of record: tables and their columns
 KINDS: Final[Mapping[str, str]] = {
-    "study": "Sweep",
     "comparison": "Comparison",
     "layout": "Layout search",
     "advice": "Repair",
-    "fastest": "Shortest cycles",
     "map": "Map of a base",
     "rehearsal": "Rehearsal",
     "report": "Run",
@@ -201,9 +196,10 @@ def _record_card(record: Record) -> Card:
     """A record: its verdict, its pictures and the tables that are shown of its kind."""
     tables = tables_of(record)
     kind = format_of(record)
+    known = RESULT_KINDS.get(kind)
+    shown = SHOWN.get(kind, {}) if known is None else known.shown
     grids = [
-        _grid(name.capitalize(), tables[name](), (*_varied(record), *columns), name)
-        for name, columns in SHOWN.get(kind, {}).items()
+        _grid(name.capitalize(), tables[name](), (*_varied(record), *columns), name) for name, columns in shown.items()
     ]
     status = str(record.get("status", ""))
     counts = {name: count for name, count in record.get("counts", {}).items() if count}
@@ -211,7 +207,7 @@ def _record_card(record: Record) -> Card:
         f"{count} {name.replace('_', ' ')}" for name, count in counts.items()
     )
     return Card(
-        kind=KINDS.get(kind, kind),
+        kind=KINDS.get(kind, kind) if known is None else known.title,
         name=record["cell"],
         verdict=verdict,
         passed=status in GOOD if status else None,

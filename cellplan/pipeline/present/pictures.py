@@ -5,12 +5,11 @@ from typing import Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import Report
+from cellplan.pipeline.present.kinds import KINDS
 from cellplan.report.plots.base_map import map_figure
-from cellplan.report.plots.fastest import curve_figures
 from cellplan.report.plots.figure import Figure
 from cellplan.report.plots.layout import floor_plan, front_figure
 from cellplan.report.plots.run import run_figures
-from cellplan.report.plots.study import study_figures
 from cellplan.report.plots.svg import svg_text
 from cellplan.report.record.common import Record
 from cellplan.report.record.rows import format_of
@@ -38,7 +37,8 @@ def record_pictures(record: Record) -> Pictures:
         record: Content of its JSON file.
     """
     kind = format_of(record)
-    figures = FIGURES[kind](record) if kind in FIGURES else {}
+    draw = KINDS[kind].pictures if kind in KINDS else FIGURES.get(kind)
+    figures = {} if draw is None else draw(record)
     return _drawn({name: figure for name, figure in figures.items() if figure is not None}, record["cell"])
 
 
@@ -47,17 +47,10 @@ def _drawn(figures: Mapping[str, Figure], cell: str) -> Pictures:
     return {f"{cell}: {name.replace('_', ' ')}": svg_text(figure) for name, figure in figures.items()}
 
 
-def _shares(record: Record) -> dict[str, Figure]:
-    """Of the figures of a production curve that of the speeds alone."""
-    return {name: figure for name, figure in curve_figures(record).items() if name == "max_velocity_ratio"}
-
-
 FIGURES: Final[Mapping[str, Callable[[Record], Mapping[str, Figure | None]]]] = {
-    "study": study_figures,
     "layout": lambda record: {
         "floor plan": floor_plan(record),
         "front": front_figure(record) if len(record["front"]) > 1 else None,
     },
     "map": lambda record: {"map": map_figure(record)},
-    "fastest": _shares,
 }

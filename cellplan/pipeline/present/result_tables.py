@@ -19,9 +19,10 @@ from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Report
 from cellplan.model.units import DEG, MM
 from cellplan.model.verified_run import VerifiedRun
+from cellplan.pipeline.fastest.result import fastest_record
 from cellplan.pipeline.fastest.shortest import ShortestCycles
-from cellplan.pipeline.fastest.write import fastest_record
 from cellplan.pipeline.present.cell_tables import cell_tables
+from cellplan.pipeline.present.kinds import record_tables
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.wide_table import solution_rows, verified_rows
 from cellplan.planning.layout_screening import Screening
@@ -34,7 +35,7 @@ from cellplan.report.record.clearance import (
 from cellplan.report.record.common import Provenance, Record, check_record, number
 from cellplan.report.record.joints import joints_record
 from cellplan.report.record.rehearsal import rehearsal_record
-from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables, tables_of_record
+from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series
 from cellplan.report.record.world_motion import speed_record
@@ -74,13 +75,13 @@ def tables_of(result: object) -> Tables:
     """
     record = record_of(result)
     if record is not None:
-        return tables_of_record(record)
+        return record_tables(record)
     raise InputError(f"to_frame: expected a result, a record or a path, got {type(result).__name__}")
 
 
 @tables_of.register
 def _(result: Mapping) -> Tables:  # type: ignore[type-arg]
-    tables = tables_of_record(result)
+    tables = record_tables(result)
     if not tables:
         raise InputError(f"to_frame: expected a record of cellplan, got one with schema {result.get('schema')!r}")
     return tables

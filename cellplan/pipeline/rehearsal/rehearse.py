@@ -15,6 +15,7 @@ from cellplan.io.run.joint_tables import parse_table
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import CellErrors
+from cellplan.model.check_kinds import TOOL_ERRORS
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
@@ -30,9 +31,6 @@ MEASUREMENT_STREAM: Final = 1  # stream of random numbers of the measurements of
 IN_PASS_STREAM: Final = 2
 MAX_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
 DEFAULT_ROUNDS: Final = 20
-TOOL_ERRORS: Final = frozenset(
-    {"position_error", "orientation_error", "position_error_between_rows", "orientation_error_between_rows"}
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

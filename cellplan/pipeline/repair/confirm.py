@@ -9,11 +9,12 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_TIME
 from cellplan.model.report import Check
 from cellplan.model.units import MM
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.neat import changed_values, neat
-from cellplan.pipeline.repair.solved import DISTANCES, LIMITS, TIMED, Solved, demanded_margin
+from cellplan.pipeline.repair.solved import Solved, demanded_margin
 from cellplan.pipeline.solve import solve
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.measures import rooms
@@ -111,7 +112,7 @@ def _tightened(solved: Solved, demands: Demands, effort: Effort) -> tuple[Demand
     """Demands that ask for what the verified motion lacks; None where it lacks something else."""
     failed = solved.failed
     names = {check.name for check in failed}
-    if not names <= {*LIMITS, *TIMED, *DISTANCES}:
+    if not names <= JOINT_LIMITS | PASSED_BY_TIME | DISTANCES:
         return None
     lacks = solved.lacks
     margin = demands.margin + np.where(lacks > 0.0, lacks + MORE_ANGLE, 0.0)
@@ -130,7 +131,7 @@ def _missing(near: Sequence[Check]) -> float:
 
 def _late(failed: Sequence[Check]) -> float:
     """Share of the time to ask for beyond what is asked for already."""
-    shares = [(check.value / check.limit) ** TIMED[check.name] - 1.0 for check in failed if check.name in TIMED]
+    shares = [check.kind.more_time(check.value, check.limit) - 1.0 for check in failed if check.name in PASSED_BY_TIME]
     return max(shares) + MORE_TIME if shares else 0.0
 
 

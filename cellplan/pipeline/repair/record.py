@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from cellplan.io.yaml.writer import flow_text
+from cellplan.model.check_kinds import JOINT_LIMITS, PASSED_BY_TIME
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind
-from cellplan.pipeline.repair.solved import LIMITS, TIMED
 from cellplan.pipeline.repair.wording import change_text, effects
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.advice import SCHEMA, AdviceRecord, AttemptRecord, RemedyRecord
@@ -120,11 +120,11 @@ def _failures(case: Case) -> Iterator[AttemptRecord]:
 
 def _left_out(case: Case) -> Iterator[AttemptRecord]:
     """What cannot help as the cell fails, and was not tried."""
-    other = next((check for check in case.failed if check["name"] not in TIMED), None)
+    other = next((check for check in case.failed if check["name"] not in PASSED_BY_TIME), None)
     if other is not None:
         reason = f"not tried, as a slower motion does not help: {other['message']}"
         yield {"kind": str(RemedyKind.DURATION), "text": "longer cycle", "robots": [], "reason": reason}
-    near = next((check for check in case.failed if check["name"] not in LIMITS), None)
+    near = next((check for check in case.failed if check["name"] not in JOINT_LIMITS), None)
     if near is not None:
         reason = f"not tried, as more than limits of joints is broken: {near['message']}"
         text = "joint weights, another method"

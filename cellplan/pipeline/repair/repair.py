@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any, Final
 
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_STEP, PASSED_BY_TIME
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import standing_of
@@ -25,7 +26,7 @@ from cellplan.pipeline.repair.attempts import (
 )
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture
 from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_values
-from cellplan.pipeline.repair.solved import BETWEEN, DISTANCES, LIMITS, TIMED, step_asked, time_asked
+from cellplan.pipeline.repair.solved import step_asked, time_asked
 from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.report.record.advice import AdviceRecord
 from cellplan.report.record.layout import LimitRecord
@@ -119,7 +120,7 @@ class _Work:
             if self.given.status is TrialStatus.PASSED:
                 return
         names = {check["name"] for check in _failed(self.given)}
-        can_help = not seems_sound or bool(names & {*LIMITS, *DISTANCES})  # a search knows of nothing else
+        can_help = not seems_sound or bool(names & (JOINT_LIMITS | DISTANCES))  # a search knows of nothing else
         self._run([*([] if seems_sound else [None]), *(_first(ready) if can_help else [])])
         sizes = range(2, len(owners(ready.cell, ready.variables.settings)) + 1) if can_help else ()
         for size in sizes:
@@ -172,14 +173,14 @@ def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
     checks, step = _failed(given), ready.cell.motion.step
     failed = {check["name"] for check in checks}
     found: list[Attempt] = []
-    if failed and failed <= LIMITS:
+    if failed and failed <= JOINT_LIMITS:
         found += of_weights(ready.cell, ready.variables.settings)
         if ready.cell.solver.method != WITH_LIMITS:
             found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
-    if failed and failed <= BETWEEN and ready.cell.motion.grid is None:
+    if failed and failed <= PASSED_BY_STEP and ready.cell.motion.grid is None:
         values = {"motion.step_s": step_asked(checks, step)}
         found.append(Attempt(kind=RemedyKind.STEP, robots=(), values=values))
-    if failed and failed <= TIMED.keys():
+    if failed and failed <= PASSED_BY_TIME:
         found.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: time_asked(checks)}))
     return found
 

@@ -9,25 +9,15 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import CHECK_KINDS, PASSED_BY_STEP
 from cellplan.model.report import Check
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.layout.cycles import SLOWED
 from cellplan.pipeline.solution import Solution
 from cellplan.report.record.common import check_record, number
 
 MORE_ERROR: Final = 1.1  # [-] times the error that a shorter step is to mend
 ROUNDING: Final = 1e-9  # [rad] or [m] by which a margin may be missed
 MARGIN: Final = "joint_margin"  # a demanded margin among the checks
-OF_JOINTS: Final[Mapping[str, float]] = {
-    "joint_velocity": 1.0,
-    "joint_acceleration": 1.0 / 2.0,
-    "joint_acceleration_assumed": 1.0 / 2.0,
-    "joint_jerk": 1.0 / 3.0,
-}  # limits of joints that a slower motion keeps: how the time that they ask for grows with their share
-TIMED: Final[Mapping[str, float]] = {**SLOWED, **OF_JOINTS}  # all checks that a slower motion passes
-BETWEEN: Final = frozenset(name for name in SLOWED if name.endswith("_between_rows"))  # what shorter steps keep
-LIMITS: Final = frozenset({"joint_position", MARGIN, *OF_JOINTS})  # checks of limits of joints
-DISTANCES: Final = frozenset({"clearance", "collision", "tool_depth"})  # checks of what is too near
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,11 +116,11 @@ def demanded_margin(cell: Cell) -> Array:
 
 def time_asked(failed: Iterable[Mapping[str, Any]]) -> float:
     """How many times as long the motion must last for failed checks, as records, that a slower motion passes."""
-    shares = [(each["value"] / each["limit"], TIMED[each["name"]]) for each in failed if each["name"] in TIMED]
-    return max((share**order for share, order in shares), default=1.0)
+    asked = (CHECK_KINDS[each["name"]].more_time(each["value"], each["limit"]) for each in failed)
+    return max(asked, default=1.0)
 
 
 def step_asked(failed: Iterable[Mapping[str, Any]], step: float) -> float:
     """Time between rows in [s], halved until failed checks, as records, pass: an error grows with its square."""
-    asked = max((each["value"] / each["limit"] for each in failed if each["name"] in BETWEEN), default=1.0)
+    asked = max((each["value"] / each["limit"] for each in failed if each["name"] in PASSED_BY_STEP), default=1.0)
     return step / 2.0 ** math.ceil(0.5 * math.log2(max(1.0, MORE_ERROR * asked)))

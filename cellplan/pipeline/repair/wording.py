@@ -4,9 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import PASSED_BY_TIME
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind, listed_names
 from cellplan.pipeline.repair.neat import written_at
-from cellplan.pipeline.repair.solved import MARGIN, TIMED
+from cellplan.pipeline.repair.solved import MARGIN
 from cellplan.report.record.advice import EffectRecord
 from cellplan.report.record.common import number
 
@@ -137,7 +138,7 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
         name, unit, old = _short_name(check["name"]), check["unit"], check["value"]
         if name == "collision":
             found.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
-        elif now is not None and check["name"] in TIMED:
+        elif now is not None and check["name"] in PASSED_BY_TIME:
             shares = [100.0 * each["value"] / each["limit"] for each in (check, now)]
             text = f"{subject.replace('/', ' ')} {name} {shares[0]:.4g} % -> {shares[1]:.4g} % of its limit"
             found.append(_effect(check, shares[0], shares[1], "%", text))

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.model.cell import Cell
+from cellplan.model.check_kinds import GRAVITY
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
-from cellplan.report.record.failures import FAILURES
 
 NOTE_WIDTH: Final = 74  # [characters] of a line below the title, in a wide type
 MOST_NOTES: Final = 2
@@ -85,15 +85,7 @@ def graver(instant: Instant) -> tuple[float, ...]:
 
 def _gravity(check: Check) -> tuple[float, float]:
     """Order of failed checks, the gravest first: by kind, then by the excess over the limit."""
-    kinds = list(FAILURES)
-    kind = kinds.index(check.name) if check.name in FAILURES else len(kinds)
-    if check.name == "collision":
-        excess = check.value  # time in contact
-    elif check.name in {"clearance", "joint_position"}:
-        excess = abs(check.value - check.limit)
-    else:
-        excess = abs(check.value / check.limit) if check.limit else abs(check.value)
-    return float(kind), -excess
+    return GRAVITY[check.name], -check.severity
 
 
 def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
@@ -120,7 +112,7 @@ def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
     """Title and the lines below it."""
     at = f"at {instant.at_s:.3f} s" + (f" of {report.phase}" if report.phase else "")
     if instant.check is not None and instant.is_failure:
-        title = f"{FAILURES.get(instant.check.name, 'Failed')} {at}"
+        title = f"{instant.check.kind.fails} {at}"
         return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:
         distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0

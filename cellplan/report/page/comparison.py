@@ -4,15 +4,14 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from cellplan.model.report import CAUTION
-from cellplan.report.page.filters import fixed, floored, small
 from cellplan.report.page.render import template
-from cellplan.report.page.study import STATUS_TEXTS
 from cellplan.report.plots.comparison import MAX_ROBOTS, comparison_figures, drawn_robots
 from cellplan.report.plots.palette import ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Record, as_json
-from cellplan.report.record.comparison import comparison_table, robot_names
+from cellplan.report.record.comparison import STATUSES, comparison_table, robot_names
+from cellplan.report.record.numbers import fixed, floored, small
 from cellplan.report.text.comparison import short_value
 
 PLOT_TITLES: Final = {
@@ -63,7 +62,7 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
         titles=PLOT_TITLES,
         legend=list(zip(ROBOTS, solved, strict=False)) if plots else [],
         drawn=drawn_robots(record) if len(robots) > MAX_ROBOTS else [],
-        statuses=STATUS_TEXTS,
+        statuses={status: f"{'✓' if status == 'passed' else '✗'} {status.replace('_', ' ')}" for status in STATUSES},
         short=short_value,
         fixed=fixed,
         floored=floored,

@@ -2,10 +2,10 @@
 
 from typing import Any, Final
 
-from cellplan.report.page.filters import against, fixed, floored, percent, small, stated
 from cellplan.report.page.first_screen import clearance_shift
 from cellplan.report.page.times import Shifts
 from cellplan.report.record.common import Entries, Record
+from cellplan.report.record.numbers import against, fixed, floored, percent, small, stated
 from cellplan.report.text.notes import accuracy_note, clock_note
 
 BETWEEN: Final = "_between_rows"  # part of the keys of errors there

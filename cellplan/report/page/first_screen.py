@@ -8,9 +8,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.left_out import TITLES, LeftOutKind, left_out_lines
 from cellplan.model.units import MM
 from cellplan.report.page.checks import failure_groups
-from cellplan.report.page.filters import floored, small
 from cellplan.report.page.times import Shifts, phase_begins
 from cellplan.report.record.common import Entries, Record
+from cellplan.report.record.numbers import floored, small
 
 BY_NAME: Final = frozenset({LeftOutKind.EXCLUDED, LeftOutKind.SRDF})  # excluded by someone, not by their nature
 MAX_SPEEDS: Final = 4  # tasks on the first screen; all of them have a line in the table of process speeds

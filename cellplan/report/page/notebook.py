@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from cellplan.report.page.filters import fixed
 from cellplan.report.page.render import template
 from cellplan.report.record.common import Entries, Record
+from cellplan.report.record.numbers import fixed
 
 MOST_ROWS: Final = 10  # [-] of a table
 DIGITS: Final = 4  # [-] significant, of numbers in tables

@@ -11,7 +11,6 @@ from cellplan.model.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
-from cellplan.report.page.filters import against, fixed, floored, percent, power, range_bar, small, stated, worst
 from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
 from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
@@ -20,6 +19,7 @@ from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begi
 from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
+from cellplan.report.record.numbers import against, fixed, floored, percent, power, range_bar, small, stated, worst
 from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.method import method_lines
 from cellplan.report.text.notes import grip_notes, left_out_notes, open_surface_notes

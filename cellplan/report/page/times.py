@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import Final
 
-from cellplan.report.page.filters import fixed
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import fixed
 
 DIGITS: Final = 4  # decimals of an instant in an address, in [s]
 

@@ -1,19 +1,18 @@
 """``study.json`` of a comparison: modes of one cell, or several cells and runs."""
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Final, TypedDict
 
+from cellplan.report.record.columns import csv_text
 from cellplan.report.record.common import Record
-from cellplan.report.record.key_figures import KeyFigures
-from cellplan.report.record.study import SCHEMA, STATUSES
-from cellplan.report.record.variant_figures import VariantFigures
+from cellplan.report.record.figures import KEY
 from cellplan.report.record.which_pays import sentences
 
 WORK: Final = tuple(f"work_{kind}_{part}" for kind in ("velocity", "acceleration") for part in ("ratio", "joint"))
 LOADS: Final = ("positioner_load_s", "positioner_phase_load_s", "operator_load_s", "operator_work_load_s", "load_s")
-SINGLE: Final = (*KeyFigures.__annotations__, *WORK, "mean_velocity_ratio", *LOADS)
+SCHEMA: Final = "cellplan.study/1"
+STATUSES: Final = ("passed", "failed", "no_solution", "bad_input", "crashed")
+SINGLE: Final = (*KEY, *WORK, "mean_velocity_ratio", *LOADS)
 
 
 class ComparedRecord(TypedDict):
@@ -24,7 +23,7 @@ class ComparedRecord(TypedDict):
     values: Annotated[dict[str, Any], "by address: the values that make a mode; else `cell` or `run` and where it is"]
     status: Annotated[str, "`passed`, `failed` (a check), `no_solution`, `bad_input` or `crashed`"]
     reason: Annotated[str, "first failed check, or why there is no motion; empty if passed"]
-    figures: Annotated[VariantFigures | dict[str, Any], "figures; empty if there is no motion"]
+    figures: Annotated[dict[str, Any], "figures; empty if there is no motion"]
 
 
 class DifferenceRecord(TypedDict):
@@ -81,16 +80,17 @@ def comparison_record(
 def comparison_table(record: Record) -> str:
     """The comparison as CSV: a row for each variant, with its status, its figures and the load of every robot."""
     robots = robot_names(record)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["name", "status", *SINGLE, *(f"load_s {robot}" for robot in robots), "not_in_program", "reason"])
+    rows: list[list[Any]] = [
+        ["name", "status", *SINGLE, *(f"load_s {robot}" for robot in robots), "not_in_program", "reason"]
+    ]
     for variant in record["variants"]:
         figures = variant["figures"]
         loads = [figures["robots"].get(robot, {}).get("load_s") if figures else None for robot in robots]
         left_out = "; ".join(figures.get("not_in_program", []))
-        own = [figures.get(name) for name in SINGLE]
-        writer.writerow([variant["name"], variant["status"], *own, *loads, left_out, variant["reason"]])
-    return text.getvalue()
+        rows.append(
+            [variant["name"], variant["status"], *map(figures.get, SINGLE), *loads, left_out, variant["reason"]]
+        )
+    return csv_text(rows)
 
 
 def robot_names(record: Record) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any, Final, get_type_hints
 from cellplan.model.phase import ALL_TASKS
 from cellplan.report.record.clearance import ClosestPair, Contact, LeftOutRecord
 from cellplan.report.record.common import CheckRecord, Record
-from cellplan.report.record.key_figures import KeyFigures
+from cellplan.report.record.figures import KEY
 from cellplan.report.record.layout import (
     CandidateRecord,
     ChoiceRecord,
@@ -163,15 +163,9 @@ def _listed(record: Record, key: str, form: Any = None, names: Iterable[str] = (
     return lambda: columns_of(map(flat, record.get(key) or ()), known)
 
 
-def _study_tables(record: Record) -> Tables:
-    """The tables of a sweep: a row for each variant."""
-    names = ["trial", *record["vary"], "status", *KeyFigures.__annotations__, "reason"]
-    return {"trials": _listed(record, "trials", names=names)}
-
-
 def _comparison_tables(record: Record) -> Tables:
     """The tables of a comparison: a row for each mode, cell or run."""
-    names = ["name", "trial", "status", *KeyFigures.__annotations__]
+    names = ["name", "trial", "status", *KEY]
     return {
         "variants": _listed(record, "variants", names=names),
         "differences": _listed(record, "differences", names=("key", "values")),
@@ -214,14 +208,6 @@ def _advice_tables(record: Record) -> Tables:
     }
 
 
-def _fastest_tables(record: Record) -> Tables:
-    """The tables of the shortest cycles: the production curve, and the programs that were solved."""
-    return {
-        "curve": _listed(record, "curve", names=("law",)),
-        "cycles": lambda: columns_of(by_name(record["cycles"], "name")),
-    }
-
-
 def _map_tables(record: Record) -> Tables:
     """The tables of a map: a row for each place."""
     return {"places": _listed(record, "places"), "best": _listed(record, "best")}
@@ -238,11 +224,9 @@ def _rehearsal_tables(record: Record) -> Tables:
 FORMATS: Final[Mapping[str, Callable[[Record], Tables]]] = {
     "report": lambda record: run_tables([record]),
     "series": lambda record: {"curves": lambda: curve_columns(record)},
-    "study": _study_tables,
     "comparison": _comparison_tables,
     "layout": _layout_tables,
     "advice": _advice_tables,
-    "fastest": _fastest_tables,
     "map": _map_tables,
     "rehearsal": _rehearsal_tables,
 }

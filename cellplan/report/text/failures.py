@@ -3,21 +3,10 @@
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from cellplan.model.check_kinds import CHECK_KINDS
 from cellplan.report.record.common import Record
 
 MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted
-TITLES: Final = {
-    "position_error": "tool errors",
-    "orientation_error": "tool errors",
-    "position_error_between_rows": "tool errors",
-    "orientation_error_between_rows": "tool errors",
-    "joint_position": "joint limits",
-    "joint_velocity": "joint speeds",
-    "joint_acceleration": "joint accelerations",
-    "joint_acceleration_assumed": "joint accelerations",
-    "start_collision": "collisions at the start",
-    "collision": "collisions",
-}  # by name of the check; other names are shown as they are
 
 
 def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
@@ -31,7 +20,7 @@ def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
     for check in checks:
         if not check["passed"]:
             run = f"{check['run']}: " if check.get("run") else ""
-            groups.setdefault(_title(check), []).append(f"{run}{check['message']}")
+            groups.setdefault(CHECK_KINDS[check["name"]].heading, []).append(f"{run}{check['message']}")
     for title, messages in groups.items():
         yield f"  {title}: {len(messages)} failed"
         yield from (f"    FAILED {message}" for message in messages[:MOST_OF_A_GROUP])
@@ -46,9 +35,3 @@ def count_text(checks: Iterable[Record]) -> str:
     if failed:
         return f"{failed} of {len(outcomes)} checks failed"
     return f"{len(outcomes)} checks passed" if len(outcomes) != 1 else "1 check passed"
-
-
-def _title(check: Record) -> str:
-    """Heading of a failed check."""
-    name = str(check.get("name", "checks"))
-    return TITLES.get(name, name.replace("_", " "))

@@ -17,10 +17,10 @@ from cellplan.cli.main import run as run_cli
 from cellplan.errors import ExitStatus, InputError, MissingPackageError
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.pipeline.screen import screen
+from cellplan.pipeline.sweep_result import study_record, study_table
 from cellplan.pipeline.wide_table import render_wide_tables
 from cellplan.planning.layout_screening import Candidates, Screening
-from cellplan.report.record.key_figures import key_figures
-from cellplan.report.record.study import study_record, study_table
+from cellplan.report.record.figures import KEY, figures_of
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 
@@ -170,7 +170,7 @@ def test_a_program_in_turns_names_its_phases(sound: Path) -> None:
 def test_a_sweep_is_its_table(report: Report) -> None:
     header = {"kind": "sweep", "cell": "small-pair", "settings": {}, "task": None}
     header |= {"vary": {"motion.duration_s": [1, 2]}, "inputs": {}, "versions": {}}
-    figures = key_figures([report])
+    figures = figures_of([report]).record(KEY)
     trials = [
         {"trial": 0, "values": {"motion.duration_s": 1}, "status": "passed", "reason": "", "figures": figures},
         {"trial": 1, "values": {"motion.duration_s": 2}, "status": "bad_input", "reason": "no, it's", "figures": {}},

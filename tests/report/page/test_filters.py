@@ -3,7 +3,7 @@
 import pytest
 
 from cellplan.report.page.figures import _acceleration_figures
-from cellplan.report.page.filters import against, small, stated
+from cellplan.report.record.numbers import against, small, stated
 
 
 @pytest.mark.parametrize("limit", [1e-7, 0.1, 5.0, 624.0, 1229.0, 12345.678])

@@ -5,13 +5,13 @@ from typing import Any
 
 import pytest
 
+from cellplan.model.check_kinds import CHECK_KINDS
 from cellplan.model.report import Check
 from cellplan.model.task import Process
 from cellplan.report.page.checks import MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
 from cellplan.report.page.render import report_page
 from cellplan.report.page.times import TimeLinks, page_begin
-from cellplan.report.record.failures import FAILURES
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
@@ -34,14 +34,12 @@ def test_failures_are_grouped_most_severe_first_and_none_is_lost(passed_run: Any
         check("joint_position", "kuka/B2", 36.0, 35.0),
         check("joint_position", "staubli/C4", -158.0, -150.0),
         *(check("collision", f"a - b{k}", value) for k, value in enumerate((0.2, 1.5, 0.4, 0.1))),
-        check("of its own", "cell", 1.0),
     ]
 
     groups = failure_groups(record_of(passed_run, *failed))
 
     assert [group["title"] for group in groups] == [
-        *(FAILURES[name] for name in ("collision", "joint_position", "position_error")),
-        "Of its own",
+        CHECK_KINDS[name].fails for name in ("collision", "joint_position", "position_error")
     ]
     assert [row["where"] for row in groups[0]["rows"]] == ["a – b1", "a – b2", "a – b0", "a – b3"]
     assert [row["when"] for row in (groups[0]["rows"][0], groups[1]["rows"][0])] == ["from", "at"]

@@ -193,7 +193,7 @@ def hostile(run: Any) -> Any:
     renamed = {"reis": HOSTILE}
     report = run.report
     check = Check(
-        name=HOSTILE, subject=HOSTILE, passed=False, value=1.0, limit=0.0, unit="mm", at_s=None, message=HOSTILE
+        name="payload", subject=HOSTILE, passed=False, value=1.0, limit=0.0, unit="mm", at_s=None, message=HOSTILE
     )
     report = replace(
         report,

@@ -1,0 +1,247 @@
+"""Figures of a program: what each phase measures as one table, the worst of it, and how that is called and shown."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.model.report import Report
+from cellplan.model.units import DEG, MM
+from cellplan.report.record.common import Number, Record, number
+from cellplan.report.record.joints import velocity_ratio
+from cellplan.report.record.numbers import fixed, floored, percent, small
+
+SECONDS_PER_HOUR: Final = 3600.0
+REDUCED: Final = 250.0  # [mm/s]
+Fold = Callable[..., Any]  # max, min or sum
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity of a program.
+
+    Attributes:
+        key: Of its worst value, in records and tables.
+        over_phases: The value of one subject over several phases.
+        worst: The value over all subjects.
+        scale: From SI to the unit of the record.
+        subject: Key of the subject that is worst; empty where that is not recorded.
+        absent: The worst value where there is none.
+        meaning: What it is.
+    """
+
+    key: str
+    over_phases: Fold
+    worst: Fold
+    scale: float
+    subject: str
+    absent: Number
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How the worst value of a quantity is shown.
+
+    Attributes:
+        heading: Of a column of a page, its unit in a line of its own.
+        page: Its text there.
+        column: Heading of a column on the terminal.
+        form: Format of its text there, after the scale of ``percent``.
+        percent: 100 for a share, else 1: also the scale of its plot.
+        plot: Title of its plot.
+        limit: A limit there, and its name.
+        limit_name: Empty for a limit without a name.
+    """
+
+    heading: str
+    page: Callable[[Number], str]
+    column: str
+    form: str
+    percent: float
+    plot: str
+    limit: float | None = None
+    limit_name: str = ""
+
+    def text(self, value: Number) -> str:
+        """Its text on the terminal."""
+        return "-" if value is None else format(self.percent * value, self.form)
+
+
+# fmt: off
+_LISTED: Final = (
+    Quantity("cycle_time_s", sum, sum, 1.0, "", None, "duration of the program"),
+    Quantity("parts_per_h", max, max, 1.0, "", None, "programs in an hour, one after the other"),
+    Quantity("load_ratio", max, max, 1.0, "", None, "share of the cycle in which the limits would allow the same motion; 1: the shortest"),
+    Quantity("failed_checks", sum, sum, 1.0, "", None, "checks that failed"),
+    Quantity("max_position_error_mm", max, max, MM, "", 0.0, "largest position error of a tool, at the rows or between them"),
+    Quantity("max_orientation_error_deg", max, max, DEG, "", 0.0, "largest orientation error of a tool, likewise"),
+    Quantity("min_margin_deg", min, min, DEG, "min_margin_joint", None, "smallest distance of a revolute joint from a position limit"),
+    Quantity("max_velocity_ratio", max, max, 1.0, "max_velocity_joint", None, "largest joint velocity as a share of its limit"),
+    Quantity("max_acceleration_ratio", max, max, 1.0, "max_acceleration_joint", None, "largest joint acceleration as a share of its limit, where one counts"),
+    Quantity("min_clearance_mm", min, min, MM, "min_clearance_pair", None, "smallest certified distance of two bodies; null if it was not certified"),
+    Quantity("max_tool_speed_mm_s", max, max, MM, "max_tool_speed_robot", 0.0, "largest speed of a tool tip in the world"),
+    Quantity("max_axis_speed_mm_s", max, max, MM, "max_axis_speed_joint", None, "largest speed of a point on a joint axis: shoulder, elbow or wrist"),
+    Quantity("share_above_250_mm_s", sum, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
+    Quantity("load_s", sum, sum, 1.0, "", None, "for all joints added up, the time that a joint needs for its travel at top speed"),
+    Quantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
+)
+SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
+    "cycle_time_s": Shown("cycle time<br>s", partial(fixed, digits=3), "cycle s", "g", 1.0, "cycle time, in s"),
+    "parts_per_h": Shown("parts<br>per hour", fixed, "parts/h", ".1f", 1.0, "parts per hour"),
+    "max_velocity_ratio": Shown("velocity<br>of limit", partial(percent, digits=1), "velocity %", ".1f", 100.0, "highest joint velocity, in % of its limit", 100.0),
+    "max_acceleration_ratio": Shown("acceleration<br>of limit", partial(percent, digits=1), "acceleration %", ".1f", 100.0, "highest joint acceleration, in % of its limit", 100.0),
+    "max_tool_speed_mm_s": Shown("tool speed<br>mm/s", partial(fixed, digits=0), "tool mm/s", ".0f", 1.0, "fastest tool tip in the world, in mm/s", REDUCED, "reduced speed"),
+    "energy_proxy_s": Shown("energy proxy<br>s", small, "energy proxy s", ".3g", 1.0, "energy proxy, in s"),
+    "min_margin_deg": Shown("margin<br>deg", floored, "margin deg", ".2f", 1.0, "smallest joint margin, in deg"),
+    "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", ".2f", 1.0, "smallest certified clearance, in mm"),
+})
+# fmt: on
+QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.key: each for each in _LISTED})
+SUBJECTS: Final[Mapping[str, Quantity]] = MappingProxyType({each.subject: each for each in _LISTED if each.subject})
+
+# fmt: off
+KEY: Final = (
+    "cycle_time_s", "failed_checks", "max_position_error_mm", "max_orientation_error_deg", "min_margin_deg",
+    "min_margin_joint", "max_velocity_ratio", "max_velocity_joint", "max_acceleration_ratio",
+    "max_acceleration_joint", "min_clearance_mm", "min_clearance_pair", "max_tool_speed_mm_s",
+)  # of every variant of a cell
+# fmt: on
+# fmt: off
+LOAD: Final = (
+    "cycle_time_s", "parts_per_h", "load_ratio", "max_velocity_ratio", "max_velocity_joint", "max_acceleration_ratio",
+    "max_acceleration_joint", "max_tool_speed_mm_s", "max_tool_speed_robot", "max_axis_speed_mm_s",
+    "max_axis_speed_joint", "share_above_250_mm_s", "share_above_250_robot", "energy_proxy_s", "min_margin_deg",
+    "min_margin_joint", "min_clearance_mm", "min_clearance_pair", "failed_checks",
+)  # how hard joints and tools work at a cycle time
+# fmt: on
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """What a program measures: by quantity and subject the value over all phases, in SI."""
+
+    rows: Mapping[str, Mapping[str, float]]
+
+    def of(self, key: str) -> Mapping[str, float]:
+        """The values of all subjects."""
+        return self.rows.get(key, {})
+
+    def recorded(self, key: str) -> Any:
+        """The worst value in the unit of the record, or the subject that has it."""
+        if key in SUBJECTS:
+            rows = self.of(SUBJECTS[key].key)
+            return (SUBJECTS[key].worst(rows, key=rows.__getitem__) or None) if rows else None
+        quantity, values = QUANTITIES[key], self.of(key).values()
+        if not values:
+            return quantity.absent
+        value = quantity.worst(values)
+        return value if isinstance(value, int) else number(quantity.scale * value)  # a count stays one
+
+    def record(self, keys: Sequence[str]) -> dict[str, Any]:
+        """Worst values by key."""
+        return {key: self.recorded(key) for key in keys}
+
+
+def figures_of(reports: Sequence[Report], *, cycle: float | None = None, load: float | None = None) -> Figures:
+    """The figures of a program.
+
+    Args:
+        reports: The report of each phase.
+        cycle: Time from the first row of the program to the last one in [s], where that is asked for.
+        load: Share of its time in which the limits would allow the same motion, likewise.
+    """
+    rows = _folded(map(_measured, reports))
+    if cycle is not None:
+        rows |= {"cycle_time_s": {"": cycle}, "parts_per_h": {"": SECONDS_PER_HOUR / cycle}}
+        rows["share_above_250_mm_s"] = {it: time / cycle for it, time in rows["share_above_250_mm_s"].items()}
+    if load is not None:
+        rows["load_ratio"] = {"": load}
+    return Figures(rows)
+
+
+def figures_of_records(phases: Iterable[Record]) -> Figures:
+    """The figures of a program from the ``report.json`` of each of its phases; tool errors once settled."""
+    return Figures(_folded(map(_recorded, phases)))
+
+
+def _folded(phases: Iterable[Iterable[tuple[str, str, float]]]) -> dict[str, dict[str, float]]:
+    """By key and subject the value over all phases."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for key, subject, value in chain.from_iterable(phases):
+        found.setdefault(key, {}).setdefault(subject, []).append(value)
+    return {key: {it: QUANTITIES[key].over_phases(every) for it, every in own.items()} for key, own in found.items()}
+
+
+def _measured(report: Report) -> Iterator[tuple[str, str, float]]:
+    """Key, subject and value of everything that one phase measures."""
+    yield "cycle_time_s", "", report.cycle_time
+    yield "failed_checks", "", sum(not check.passed for check in report.checks)
+    yield "energy_proxy_s", "", energy_proxy(report)
+    for use in report.joints:
+        if use.is_revolute and np.isfinite(use.margin):
+            yield "min_margin_deg", f"{use.robot}/{use.joint}", use.margin
+        yield "max_velocity_ratio", f"{use.robot}/{use.joint}", velocity_ratio(use)
+    for hard in report.accelerations.joints:
+        if hard.ratio is not None:
+            yield "max_acceleration_ratio", f"{hard.robot}/{hard.joint}", hard.ratio
+    for near in report.clearance.minima.values():
+        if near.minimum is not None:
+            yield "min_clearance_mm", " - ".join(near.pair or ()), near.minimum
+    for task in report.accuracy:
+        position, orientation = (np.linalg.norm(e, axis=1).max() for e in (task.position_error, task.orientation_error))
+        between = task.between
+        yield "max_position_error_mm", task.task, max(position, between.position.largest if between else 0.0)
+        yield "max_orientation_error_deg", task.task, max(orientation, between.orientation.largest if between else 0.0)
+    for robot, speed in report.speeds.items():
+        yield "max_tool_speed_mm_s", robot, speed.tool_peak
+        yield "max_axis_speed_mm_s", f"{robot}/{speed.axis}", speed.axis_peak
+        yield "share_above_250_mm_s", robot, speed.share_above_reduced * report.cycle_time  # [s] until it is divided
+
+
+def _recorded(record: Record) -> Iterator[tuple[str, str, float]]:
+    """The same of the record of one phase."""
+    yield "cycle_time_s", "", record["cycle_time_s"]
+    yield "failed_checks", "", sum(not check["passed"] for check in record["checks"])
+    for robot, joints in record["joints"].items():
+        for name, use in joints.items():
+            joint, ratio = f"{robot}/{name}", use["velocity_ratio"]
+            if use["unit"] == "deg" and use["margin"] is not None:
+                yield "min_margin_deg", joint, use["margin"] / DEG
+            yield "max_velocity_ratio", joint, math.inf if ratio is None else ratio
+            yield "load_s", joint, use["travel"] / use["velocity_limit"] if use["velocity_limit"] else 0.0
+            if use.get("acceleration_ratio") is not None:
+                yield "max_acceleration_ratio", joint, use["acceleration_ratio"]
+    whole = record["clearance"]["whole"]
+    if whole["minimum_mm"] is not None:
+        yield "min_clearance_mm", " - ".join(whole["pair"] or ()), whole["minimum_mm"] / MM
+    for task, errors in record["tasks"].items():
+        for key, unit in (("position_error_mm", MM), ("orientation_error_deg", DEG)):
+            found = [errors[f"max_{key}"], errors.get(f"max_{key.replace('error', 'error_between_rows')}")]
+            yield f"max_{key}", task, max((value for value in found if value is not None), default=0.0) / unit
+    for robot, speed in record["speeds"].items():
+        yield "max_tool_speed_mm_s", robot, (speed["tool_peak_mm_s"] or 0.0) / MM
+
+
+def energy_proxy(report: Report) -> float:
+    r"""A figure that grows with the losses of all drives, in [s]; it is no energy in joules.
+
+    .. math:: E = \sum_j \int_0^T \left( \dot q_j / \dot q_{j,\max} \right)^2 dt
+
+    Along the same path it is inversely proportional to the cycle time. Masses and motors are not in it: it compares
+    programs of one cell, not cells.
+
+    Args:
+        report: The report of one phase.
+    """
+    found, steps = 0.0, np.diff(report.times)
+    for robot, speeds in report.qd.items():
+        limits = np.array([use.velocity_limit for use in report.joints if use.robot == robot])
+        turns = limits > 0.0
+        found += float(steps @ np.sum((speeds[:, turns] / limits[turns]) ** 2, axis=1))
+    return found
