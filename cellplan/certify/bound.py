@@ -21,32 +21,22 @@ class PairBound:
     """What is known of one pair over a motion; times are counted in samples, with fractions between them.
 
     Attributes:
-        row: Index of the pair in ``Scene.pairs``.
-        pair: The pair.
         low: No distance is below this in a block of the motion, in [m], shape (K,); zero where the bodies touch; inf
             where all of a tool lies inside its contact zone. Negative where nothing is proved.
-        lowest: Smallest one of them.
-        distance: Smallest distance measured in [m], never above the truth; inf where none was.
-        at: Its time.
-        touches: Times at which the bodies touch.
-        unproved: Times at which steps begin in which the necessary distance could not be proved.
-        demand: Distance in [m] that is demanded; where only contact is forbidden, more than rounding.
-        needed: Distance in [m] that had to be proved: less than the demand once a smaller distance was measured.
-        cuts: Number of steps that were searched in finer steps.
         at_surface: First and last sample at which a tool at work is at the surface of the part; None if it never is.
     """
 
-    row: int
+    row: int  # index of the pair in ``Scene.pairs``
     pair: ScenePair
     low: Array
-    lowest: float
-    distance: float
-    at: float
-    touches: tuple[float, ...]
-    unproved: tuple[float, ...]
-    demand: float
-    needed: float
-    cuts: int
+    lowest: float  # smallest one of them
+    distance: float  # smallest distance measured in [m], never above the truth; inf where none was
+    at: float  # its time
+    touches: tuple[float, ...]  # times at which the bodies touch
+    unproved: tuple[float, ...]  # times at which steps begin in which the necessary distance could not be proved
+    demand: float  # distance in [m] that is demanded; where only contact is forbidden, more than rounding
+    needed: float  # distance in [m] that had to be proved: less than the demand once a smaller distance was measured
+    cuts: int  # number of steps that were searched in finer steps
     at_surface: tuple[int, int] | None = None
 
     @classmethod
@@ -99,21 +89,13 @@ class PairBound:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bound:
-    """What is proved of all pairs over a motion.
-
-    Attributes:
-        scene: The scene.
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
-        low: ``PairBound.low`` of all pairs, shape (pairs, K).
-        pairs: All pairs, in the order of the scene.
-    """
+    """What is proved of all pairs over a motion."""
 
     scene: Scene
-    q: Array
-    edges: Indices
-    low: Array
-    pairs: tuple[PairBound, ...]
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    edges: Indices  # samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,)
+    low: Array  # ``PairBound.low`` of all pairs, shape (pairs, K)
+    pairs: tuple[PairBound, ...]  # all pairs, in the order of the scene
 
     @property
     def is_kept(self) -> bool:

@@ -17,17 +17,11 @@ MAX_ROWS: Final = 61  # [-] configurations of a motion at which two solids that 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FoundDepth:
-    """Depth of one pair.
-
-    Attributes:
-        pair: The pair.
-        depth: Greatest depth in [m]; zero where the two do not overlap.
-        row: The configuration of the motion at which it is greatest.
-    """
+    """Depth of one pair."""
 
     pair: MountedPair
-    depth: float
-    row: int
+    depth: float  # greatest depth in [m]; zero where the two do not overlap
+    row: int  # the configuration of the motion at which it is greatest
 
 
 def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tuple[FoundDepth, ...]:

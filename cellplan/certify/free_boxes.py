@@ -29,25 +29,15 @@ SLOW_COUNT: Final = 3000  # distances of surfaces, of one search; hulls say less
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxes:
-    """Some boxes.
+    """Some boxes."""
 
-    Attributes:
-        pair: Pair of each among those of the search, shape (M,).
-        rows: Stretch of the first program and of the second, as (from, to, from, to), shape (M, 4).
-        low: No distance in the box is below this in [m], shape (M,).
-        gap: Lower bound of the distance in its middle in [m], shape (M,).
-        reach: How far each of both bodies gets from its place in the middle in [m], shape (M, 2).
-        n: Direction in the world that proves the gap, shape (M, 3); zero without one.
-        is_read: Whether the engine was asked in its middle, shape (M,).
-    """
-
-    pair: Indices
-    rows: Array
-    low: Array
-    gap: Array
-    reach: Array
-    n: Array
-    is_read: Flags
+    pair: Indices  # pair of each among those of the search, shape (M,)
+    rows: Array  # stretch of the first program and of the second, as (from, to, from, to), shape (M, 4)
+    low: Array  # no distance in the box is below this in [m], shape (M,)
+    gap: Array  # lower bound of the distance in its middle in [m], shape (M,)
+    reach: Array  # how far each of both bodies gets from its place in the middle in [m], shape (M, 2)
+    n: Array  # direction in the world that proves the gap, shape (M, 3); zero without one
+    is_read: Flags  # whether the engine was asked in its middle, shape (M,)
 
     def __len__(self) -> int:
         """How many there are."""

@@ -37,14 +37,12 @@ class ClockRegion:
     """Places of the programs of two robots that may meet.
 
     Attributes:
-        first: The one robot.
-        second: The other one.
         rectangles: Rows of the first robot from a0 to a1 with those of the second from b0 to b1, as (a0, a1, b0, b1),
             fractions between rows allowed, shape (R, 4).
     """
 
-    first: str
-    second: str
+    first: str  # the one robot
+    second: str  # the other one
     rectangles: Array
 
 
@@ -53,23 +51,20 @@ class RegionBound:
     """What is proved of all pairs of bodies of two robots in a region.
 
     Attributes:
-        first: The one robot.
-        second: The other one.
         bodies: The pair that does not keep what is demanded of it, or else the nearest; None when neither is known.
         distance: Smallest distance measured in [m], that of these two, never above the truth; zero where they touch;
             inf where none was measured.
         proved: Distance in [m] that all pairs with the rule ``clearance`` are proved to keep; inf without such pairs.
         at: Row of the first robot and of the second where the two were found; None where nothing was.
-        is_kept: Whether every pair is proved to keep its demand, and not to touch where no more is demanded.
     """
 
-    first: str
-    second: str
+    first: str  # the one robot
+    second: str  # the other one
     bodies: tuple[str, str] | None
     distance: float
     proved: float
     at: tuple[float, float] | None
-    is_kept: bool
+    is_kept: bool  # whether every pair is proved to keep its demand, and not to touch where no more is demanded
 
 
 def certify_regions(
@@ -140,19 +135,12 @@ def band(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WatchedPairs:
-    """The pairs of the bodies of two robots.
+    """The pairs of the bodies of two robots."""
 
-    Attributes:
-        rows: Their places in ``Scene.pairs``, shape (P,).
-        ends: The engine's body of the first robot and that of the second, shape (P, 2).
-        demands: What is to be proved in [m], shape (P,).
-        keeps: Whether the clearance is demanded, not only that nothing touches, shape (P,).
-    """
-
-    rows: Indices
-    ends: Indices
-    demands: Array
-    keeps: Flags
+    rows: Indices  # their places in ``Scene.pairs``, shape (P,)
+    ends: Indices  # the engine's body of the first robot and that of the second, shape (P, 2)
+    demands: Array  # what is to be proved in [m], shape (P,)
+    keeps: Flags  # whether the clearance is demanded, not only that nothing touches, shape (P,)
 
 
 def watched_pairs(scene: Scene, first: str, second: str) -> WatchedPairs:

@@ -42,17 +42,11 @@ HALVINGS: Final = 24  # of a shift that is searched by halving
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShiftBound:
-    """What is proved of two robots when the one is shifted against the other.
+    """What is proved of two robots when the one is shifted against the other."""
 
-    Attributes:
-        shift: In [s]; all pairs of bodies keep their demand whenever the times of both differ by no more than this.
-        bodies: The pair that limits it; None where nothing does up to the largest shift.
-        at: Row of each where it does.
-    """
-
-    shift: float
-    bodies: tuple[str, str] | None = None
-    at: tuple[float, float] | None = None
+    shift: float  # in [s]; all pairs of bodies keep their demand whenever the times of both differ by no more than this
+    bodies: tuple[str, str] | None = None  # the pair that limits it; None where nothing does up to the largest shift
+    at: tuple[float, float] | None = None  # row of each where it does
 
 
 def free_shift(motion: FreeMotion, times: Array, first: str, second: str, *, most: float) -> ShiftBound:

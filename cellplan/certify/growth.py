@@ -50,19 +50,14 @@ class ComingApart:
     """A pair that begins nearer than is demanded.
 
     Attributes:
-        names: Its bodies.
-        begin: Signed distance at the beginning in [m]: negative by the depth where the bodies overlap.
-        end: Likewise at the end.
-        demand: Distance in [m] that is demanded of it.
-        row: The first row from which on the demand is kept; None where it never is.
         room: How far in [m] the distance may fall below the largest one before it: what the measurement leaves open.
     """
 
-    names: tuple[str, str]
-    begin: float
-    end: float
-    demand: float
-    row: int | None
+    names: tuple[str, str]  # its bodies
+    begin: float  # signed distance at the beginning in [m]: negative by the depth where the bodies overlap
+    end: float  # likewise at the end
+    demand: float  # distance in [m] that is demanded of it
+    row: int | None  # the first row from which on the demand is kept; None where it never is
     room: float
 
 
@@ -71,13 +66,11 @@ class Growth:
     """What is proved of a motion away from a stopped state.
 
     Attributes:
-        kept: What is proved of the pairs that begin with the distance demanded of them.
-        apart: The pairs that do not.
         faults: What is not as it must be, in one line each: names of the bodies, and what is wrong.
     """
 
-    kept: Bound
-    apart: tuple[ComingApart, ...]
+    kept: Bound  # what is proved of the pairs that begin with the distance demanded of them
+    apart: tuple[ComingApart, ...]  # the pairs that do not
     faults: tuple[tuple[tuple[str, str], str], ...]
 
     @classmethod

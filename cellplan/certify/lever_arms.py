@@ -31,15 +31,13 @@ class Chain:
     """The joints between two bodies, the nearest to the first one first.
 
     Attributes:
-        axes: Their places among all axes of the scene, shape (m,).
         levers: Lever arm of each to the points of the second body, in [m] for joints that turn, 1 for those that
             slide, shape (m,).
-        turns: 1 for joints that turn, 0 for those that slide, shape (m,).
     """
 
-    axes: np.ndarray
+    axes: np.ndarray  # their places among all axes of the scene, shape (m,)
     levers: Array
-    turns: Array
+    turns: Array  # 1 for joints that turn, 0 for those that slide, shape (m,)
 
     def bend(self, steps: Array) -> Array:
         r"""Largest second derivative of a point of the second body seen from the first in each step, shape (n - 1,).
@@ -159,25 +157,15 @@ class _Held:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _PlacedAxis:
-    """One axis at the reference configuration in the world, and the stacked joint that moves it.
+    """One axis at the reference configuration in the world, and the stacked joint that moves it."""
 
-    Attributes:
-        column: The stacked joint.
-        ratio: Its motion per motion of that joint.
-        offset: Its position when that joint reads zero.
-        is_revolute: Whether it turns.
-        parent: Index in its robot of the axis that carries it.
-        point_W: A point on it in [m].
-        axis_W: Its unit direction.
-    """
-
-    column: int
-    ratio: float
-    offset: float
-    is_revolute: bool
-    parent: int
-    point_W: Array
-    axis_W: Array
+    column: int  # the stacked joint
+    ratio: float  # its motion per motion of that joint
+    offset: float  # its position when that joint reads zero
+    is_revolute: bool  # whether it turns
+    parent: int  # index in its robot of the axis that carries it
+    point_W: Array  # A point on it in [m]
+    axis_W: Array  # its unit direction
 
     def foot(self, points: Array) -> Array:
         """The points of the axis that are nearest to some points, shape (..., 3)."""

@@ -17,23 +17,17 @@ class StraightMotion:
     """A stretch of a program; see ``collision.continuous.motion_bound.Motion``.
 
     Attributes:
-        scene: The scene.
-        arms: The lever arms of the whole program.
-        q: Stacked joint positions in [rad] or [m], shape (n, nq).
-        steps: By how much each axis moves in each step, without its sign, in [rad] or [m], shape (n - 1, axes).
-        poses: Where the bodies are at the samples.
         bend: Largest second derivative of any point of an engine's body in each step, seen from the world, with the
             step as the unit of time, in [m], shape (n - 1,), by the body.
-        centres: Centres of the bounding spheres in the world in [m], shape (n, 3), by the body.
     """
 
     scene: Scene
-    arms: LeverArms
-    q: Array
-    steps: Array
-    poses: BodyPoses
+    arms: LeverArms  # the lever arms of the whole program
+    q: Array  # stacked joint positions in [rad] or [m], shape (n, nq)
+    steps: Array  # by how much each axis moves in each step, without its sign, in [rad] or [m], shape (n - 1, axes)
+    poses: BodyPoses  # where the bodies are at the samples
     bend: Mapping[int, Array]
-    centres: Mapping[int, Array]
+    centres: Mapping[int, Array]  # centres of the bounding spheres in the world in [m], shape (n, 3), by the body
 
     @classmethod
     def of_cell(cls, scene: Scene, arms: LeverArms, q: Array) -> "StraightMotion":

@@ -20,29 +20,22 @@ class PairState:
 
     Attributes:
         distance: Smallest distance measured in [m], never above the truth and within 0.05 mm of it; inf where none was.
-        at: Its time.
-        touches: Times at which the bodies touch.
         unproved: Times at which steps begin of which the necessary distance could not be proved.
-        demand: Distance in [m] that is to be proved before the smallest one is searched for.
-        cuts: Number of steps that have been cut.
-        max_cuts: Number that may be cut for the necessary distance.
         is_verdict_only: Whether nothing is asked but whether the demand is kept: the first reading below it is enough.
         is_verdict_open: Whether the search is still after the necessary distance, not yet after the smallest one.
-        spare_cuts: Number of the cuts that were made for the smallest distance.
-        spare_readings: Number of readings likewise.
     """
 
     distance: float = np.inf
-    at: float = 0.0
-    touches: list[float] = field(default_factory=list)
+    at: float = 0.0  # its time
+    touches: list[float] = field(default_factory=list)  # times at which the bodies touch
     unproved: list[float] = field(default_factory=list)
-    demand: float = APART_TOL
-    cuts: int = 0
-    max_cuts: int = MAX_CUTS
+    demand: float = APART_TOL  # distance in [m] that is to be proved before the smallest one is searched for
+    cuts: int = 0  # number of steps that have been cut
+    max_cuts: int = MAX_CUTS  # number that may be cut for the necessary distance
     is_verdict_only: bool = False
     is_verdict_open: bool = True
-    spare_cuts: int = 0
-    spare_readings: int = 0
+    spare_cuts: int = 0  # number of the cuts that were made for the smallest distance
+    spare_readings: int = 0  # number of readings likewise
 
     @property
     def needed(self) -> float:

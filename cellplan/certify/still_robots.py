@@ -22,15 +22,10 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunSamples:
-    """Some samples of one run.
+    """Some samples of one run."""
 
-    Attributes:
-        scene: The scene of the run, with those pairs only that the configuration of the robot matters to.
-        q: Stacked joint positions in [rad] or [m], shape (K, nq).
-    """
-
-    scene: Scene
-    q: Array
+    scene: Scene  # the scene of the run, with those pairs only that the configuration of the robot matters to
+    q: Array  # stacked joint positions in [rad] or [m], shape (K, nq)
 
 
 class HomeTrials:

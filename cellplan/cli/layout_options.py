@@ -25,17 +25,11 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 class Work(NamedTuple):
-    """How much is searched, by how many.
+    """How much is searched, by how many."""
 
-    Attributes:
-        stop: Where the search ends; None for what is usual.
-        workers: Number of processes, or the address of a scheduler.
-        resume: Whether an earlier search in the folder goes on.
-    """
-
-    stop: Stop | None
-    workers: int | str
-    resume: bool
+    stop: Stop | None  # where the search ends; None for what is usual
+    workers: int | str  # number of processes, or the address of a scheduler
+    resume: bool  # whether an earlier search in the folder goes on
 
 
 def read_request(

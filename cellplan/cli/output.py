@@ -15,19 +15,12 @@ from cellplan.errors import ExitStatus
 
 
 class Result(NamedTuple):
-    """What came of a command.
+    """What came of a command."""
 
-    Attributes:
-        status: Exit status of the program.
-        lines: For people: the verdict, and what stands below it.
-        record: For machines.
-        folder: The run folder that was written; None if there is none.
-    """
-
-    status: ExitStatus
-    lines: Sequence[str]
-    record: Mapping[str, object]
-    folder: Path | None = None
+    status: ExitStatus  # exit status of the program
+    lines: Sequence[str]  # for people: the verdict, and what stands below it
+    record: Mapping[str, object]  # for machines
+    folder: Path | None = None  # the run folder that was written; None if there is none
 
 
 def show(lines: Sequence[str], *, passed: bool | None = None) -> None:

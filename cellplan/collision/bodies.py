@@ -26,33 +26,19 @@ FLAT_PADDING: Final = 1e-6  # [m] thickness given to the box round a flat surfac
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CollisionBody:
-    """One solid and the simpler shapes that stand for it.
+    """One solid and the simpler shapes that stand for it."""
 
-    Attributes:
-        name: Name in reports.
-        shape: The solid itself.
-        hull: A convex solid that holds it: the solid itself, or the convex hull of its mesh.
-        looseness: What points of the solid may stick out of the hull in [m], by rounding.
-        is_convex: Whether ``hull`` is the solid and not only a bound.
-        inflation: By how much in [m] the solid reaches beyond ``core``.
-        centre: Centre of a sphere that holds the solid, in its own frame in [m], shape (3,).
-        radius: Radius of that sphere in [m].
-        ends: Ends of a line in [m], shape (2, 3); the solid is within ``girth`` of the line.
-        girth: In [m].
-        witnesses: One point of each connected piece of the solid, shape (C, 3).
-    """
-
-    name: str
-    shape: Solid
-    hull: Solid
-    looseness: float
-    is_convex: bool
-    inflation: float
-    centre: Array
-    radius: float
-    ends: Array
-    girth: float
-    witnesses: Array
+    name: str  # name in reports
+    shape: Solid  # the solid itself
+    hull: Solid  # A convex solid that holds it: the solid itself, or the convex hull of its mesh
+    looseness: float  # what points of the solid may stick out of the hull in [m], by rounding
+    is_convex: bool  # whether ``hull`` is the solid and not only a bound
+    inflation: float  # by how much in [m] the solid reaches beyond ``core``
+    centre: Array  # centre of a sphere that holds the solid, in its own frame in [m], shape (3,)
+    radius: float  # radius of that sphere in [m]
+    ends: Array  # ends of a line in [m], shape (2, 3); the solid is within ``girth`` of the line
+    girth: float  # in [m]
+    witnesses: Array  # one point of each connected piece of the solid, shape (C, 3)
 
     @cached_property
     def core(self) -> Mesh:
@@ -65,15 +51,10 @@ class CollisionBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPoses:
-    """Where bodies are at each of n samples; of poses that were checked (``checked_poses``, ``require_rigid``) only.
+    """Where bodies are at each of n samples; of poses that were checked (``checked_poses``, ``require_rigid``) only."""
 
-    Attributes:
-        R: Rotations in the world, shape (B, n, 3, 3).
-        p: Positions in the world in [m], shape (B, n, 3).
-    """
-
-    R: Array
-    p: Array
+    R: Array  # rotations in the world, shape (B, n, 3, 3)
+    p: Array  # positions in the world in [m], shape (B, n, 3)
 
 
 def prepare(name: str, shape: Solid) -> CollisionBody:

@@ -18,16 +18,13 @@ class Reading:
     """Distance reading of two bodies at one sample.
 
     Attributes:
-        touches: Whether they touch.
-        bound: Proved distance in [m], never above the truth; zero when they touch or nothing is proved.
-        is_exact: Whether the truth is above the bound by no more than ``2 TIGHT_TOL``.
         direction: Direction from first to second in the world, shape (3,), that proves ``bound`` on the hulls; None
             where no direction does.
     """
 
-    touches: bool
-    bound: float
-    is_exact: bool
+    touches: bool  # whether they touch
+    bound: float  # proved distance in [m], never above the truth; zero when they touch or nothing is proved
+    is_exact: bool  # whether the truth is above the bound by no more than ``2 TIGHT_TOL``
     direction: Array | None
 
 

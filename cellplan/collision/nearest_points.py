@@ -15,19 +15,12 @@ from cellplan.geometry.transforms import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NearestPoints:
-    """Where two bodies are nearest.
+    """Where two bodies are nearest."""
 
-    Attributes:
-        distance: In [m]; zero when they touch.
-        first: Point of the first body in the world, shape (3,).
-        second: Point of the second body in the world, shape (3,).
-        normal: Unit direction from the first to the second, shape (3,).
-    """
-
-    distance: float
-    first: Array
-    second: Array
-    normal: Array
+    distance: float  # in [m]; zero when they touch
+    first: Array  # point of the first body in the world, shape (3,)
+    second: Array  # point of the second body in the world, shape (3,)
+    normal: Array  # unit direction from the first to the second, shape (3,)
 
 
 def nearest_points(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> NearestPoints:

@@ -14,17 +14,11 @@ from cellplan.model.exported import ExportFrame
 
 
 class Step(NamedTuple):
-    """One instruction of a handshake.
+    """One instruction of a handshake."""
 
-    Attributes:
-        waits: Whether it waits for an input, or else sets the output.
-        signal: The input or output as the controller names it.
-        is_on: The state to wait for, or to set.
-    """
-
-    waits: bool
-    signal: str
-    is_on: bool
+    waits: bool  # whether it waits for an input, or else sets the output
+    signal: str  # the input or output as the controller names it
+    is_on: bool  # the state to wait for, or to set
 
 
 def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:

@@ -31,11 +31,10 @@ class Axes:
 
     Attributes:
         arm: Places of the axes of the arm among the joints of the model; empty for a positioner without an arm.
-        external: Places of all others: a rail before the arm, or the axes of a positioner.
     """
 
     arm: tuple[int, ...]
-    external: tuple[int, ...]
+    external: tuple[int, ...]  # places of all others: a rail before the arm, or the axes of a positioner
 
     @classmethod
     def of(cls, robot: Robot) -> "Axes":

@@ -30,16 +30,13 @@ class Value:
     """A value of a file.
 
     Attributes:
-        file: Name of the file in messages.
-        text: Content of the file.
-        at: Where the value begins there.
         content: A ``Raw`` number, a text, a flag or None; the texts of an array of numbers; or values of an array, or
             of an object by key.
     """
 
-    file: str
-    text: str
-    at: int
+    file: str  # name of the file in messages
+    text: str  # content of the file
+    at: int  # where the value begins there
     content: "Raw | str | bool | tuple[Raw, ...] | list[Value] | dict[str, Value] | None"
 
     @property

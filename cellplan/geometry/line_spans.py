@@ -16,17 +16,11 @@ Ends = tuple[
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Spans:
-    """Stretches of lines inside a solid, shape (K,) each, sorted by line and along it.
+    """Stretches of lines inside a solid, shape (K,) each, sorted by line and along it."""
 
-    Attributes:
-        line: Which line.
-        enter: Way from the line's point to where it enters, in [m] along its direction.
-        leave: Way to where it leaves, in [m].
-    """
-
-    line: NDArray[np.intp]
-    enter: Array
-    leave: Array
+    line: NDArray[np.intp]  # which line
+    enter: Array  # way from the line's point to where it enters, in [m] along its direction
+    leave: Array  # way to where it leaves, in [m]
 
 
 def line_spans(shape: Solid, points: Array, directions: Array) -> Spans:

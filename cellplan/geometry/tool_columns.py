@@ -37,18 +37,14 @@ class Columns:
     """Columns of a tool along its z axis, in the tool frame.
 
     Attributes:
-        points: Places of the lines across the axis in [m], shape (L, 2).
         guards: For each line those beside it that must be about as deep for its depth to count, shape (L, G).
-        line: The line of each column, shape (C,).
-        back: Where the column begins along z in [m], shape (C,).
-        front: Where it ends, shape (C,).
     """
 
-    points: Array
+    points: Array  # places of the lines across the axis in [m], shape (L, 2)
     guards: NDArray[np.intp]
-    line: NDArray[np.intp]
-    back: Array
-    front: Array
+    line: NDArray[np.intp]  # the line of each column, shape (C,)
+    back: Array  # where the column begins along z in [m], shape (C,)
+    front: Array  # where it ends, shape (C,)
 
     @property
     def reach(self) -> float:

@@ -23,21 +23,13 @@ EXIT_TIMEOUT_S: Final = 0.5  # [s] an idle process ends at once when its pipe is
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Guard:
-    """Name and limits of guarded work.
+    """Name and limits of guarded work."""
 
-    Attributes:
-        file: The file at fault when it goes wrong, as messages name it.
-        worker: Name of the worker in messages, such as "the mesh reader".
-        seconds: Longest time of the processor.
-        patience: Longest time of the clock, as a multiple of it.
-        megabytes: Largest address space of the child, what Python and its libraries take included.
-    """
-
-    file: str
-    worker: str
-    seconds: float = 60.0
-    patience: float = 1.0
-    megabytes: int = 1500
+    file: str  # the file at fault when it goes wrong, as messages name it
+    worker: str  # name of the worker in messages, such as "the mesh reader"
+    seconds: float = 60.0  # longest time of the processor
+    patience: float = 1.0  # longest time of the clock, as a multiple of it
+    megabytes: int = 1500  # largest address space of the child, what Python and its libraries take included
 
 
 class ChildProcess:

@@ -19,19 +19,12 @@ CACHE_BLOCK: Final = 512  # entries of a batch whose arrays stay in the processo
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Base poses and tool tips of robots; the last axis is the batch, or of length 1 where all of it shares them.
+    """Base poses and tool tips of robots; the last axis is the batch, or of length 1 where all of it shares them."""
 
-    Attributes:
-        R_WB: Base orientations, shape (3, 3, robots, batch or 1).
-        p_WB: Base positions in [m], shape (3, robots, batch or 1).
-        R_LT: Tool orientations seen from the last link, shape (3, 3, robots, batch or 1).
-        p_LT: Tool tips seen from the last link in [m], shape (3, robots, batch or 1).
-    """
-
-    R_WB: Array
-    p_WB: Array
-    R_LT: Array
-    p_LT: Array
+    R_WB: Array  # base orientations, shape (3, 3, robots, batch or 1)
+    p_WB: Array  # base positions in [m], shape (3, robots, batch or 1)
+    R_LT: Array  # tool orientations seen from the last link, shape (3, 3, robots, batch or 1)
+    p_LT: Array  # tool tips seen from the last link in [m], shape (3, robots, batch or 1)
 
     def of(self, entries: NDArray[np.intp]) -> "Placement":
         """That of some entries of the batch only."""
@@ -51,19 +44,12 @@ class Placement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BatchState:
-    """All robots over the batch.
+    """All robots over the batch."""
 
-    Attributes:
-        axes: Directions of the axes on the way to the flanges in W, shape (3, levels, robots, batch).
-        points: A point on each, in [m], shape (3, levels, robots, batch).
-        R_WT: Tool orientations, shape (3, 3, robots, batch).
-        p_WT: Tool tips in [m], shape (3, robots, batch).
-    """
-
-    axes: Array
-    points: Array
-    R_WT: Array
-    p_WT: Array
+    axes: Array  # directions of the axes on the way to the flanges in W, shape (3, levels, robots, batch)
+    points: Array  # A point on each, in [m], shape (3, levels, robots, batch)
+    R_WT: Array  # tool orientations, shape (3, 3, robots, batch)
+    p_WT: Array  # tool tips in [m], shape (3, robots, batch)
 
 
 class BatchChains:

@@ -21,13 +21,11 @@ class CellState:
     Attributes:
         screws_W: Twist that unit speed of each joint gives what it carries, taken at the world origin, linear part
             first, shape (6, nq), expressed in W.
-        X_WT: Tool tip of each robot, in the order of the cell, shape (robots, 4, 4).
-        X_WP: Part frame, shape (4, 4).
     """
 
     screws_W: Array
-    X_WT: Array
-    X_WP: Array
+    X_WT: Array  # tool tip of each robot, in the order of the cell, shape (robots, 4, 4)
+    X_WP: Array  # part frame, shape (4, 4)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,25 +29,18 @@ class CheckKind:
     """What a check is.
 
     Attributes:
-        name: In records.
-        holds: Title where it passes.
-        fails: Title where it fails.
-        group: Heading of its failures on the terminal, where it is not the words of the name.
-        excess: What the worst of several is found by.
-        concern: What it is about.
         time_exponent: A motion ``share ** time_exponent`` times as long passes, for a value ``share`` times the limit;
             None where a slower motion does not help.
-        shrinks_with_step: Whether its value shrinks with the square of the time between rows.
     """
 
-    name: str
-    holds: str
-    fails: str
-    group: str = ""
-    excess: Excess = Excess.SHARE
-    concern: Concern = Concern.OTHER
+    name: str  # in records
+    holds: str  # title where it passes
+    fails: str  # title where it fails
+    group: str = ""  # heading of its failures on the terminal, where it is not the words of the name
+    excess: Excess = Excess.SHARE  # what the worst of several is found by
+    concern: Concern = Concern.OTHER  # what it is about
     time_exponent: float | None = None
-    shrinks_with_step: bool = False
+    shrinks_with_step: bool = False  # whether its value shrinks with the square of the time between rows
 
     @property
     def heading(self) -> str:

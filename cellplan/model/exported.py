@@ -38,13 +38,9 @@ class RobotRows:
     """Rows of one robot in a program.
 
     Attributes:
-        robot: Name of the robot.
-        q: Joint positions of the model in [rad] or [m], shape (N, n).
         times: Times of the rows in [s], from 0, shape (N,); None in what was read from a format that states none.
-        qd: Joint speeds in [rad/s] or [m/s], shape (N, n); None where the format has none.
         process: Whether its tool is in process from each row to the next, shape (N,); None where a format states none.
         marks: Rows at which it waits for the other robots, in their order; as many for every robot of a program.
-        stops: Rows at which its tool stops on its path.
         rounding: Share of the shorter neighbouring segment within which the target rounds each row, 0 for a stop, at
             most 0.5, shape (N,). In what is written None stands for the share of the job, in what was read for a format
             that states none.
@@ -55,13 +51,13 @@ class RobotRows:
             counts it; None where none was read.
     """
 
-    robot: str
-    q: Array
+    robot: str  # name of the robot
+    q: Array  # joint positions of the model in [rad] or [m], shape (N, n)
     times: Array | None = None
-    qd: Array | None = None
+    qd: Array | None = None  # joint speeds in [rad/s] or [m/s], shape (N, n); None where the format has none
     process: NDArray[np.bool_] | None = None
     marks: tuple[int, ...] = ()
-    stops: tuple[int, ...] = ()
+    stops: tuple[int, ...] = ()  # rows at which its tool stops on its path
     rounding: Array | None = None
     X_PT: Array | None = None
     configuration: NDArray[np.int_] | None = None
@@ -73,36 +69,22 @@ class RobotRows:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProgramRows:
-    """One program: what is played from begin to end.
+    """One program: what is played from begin to end."""
 
-    Attributes:
-        name: Name of the program among several, that of its task; None for the only one.
-        robots: Rows by robot, in the order of the cell.
-    """
-
-    name: str | None
-    robots: Mapping[str, RobotRows]
+    name: str | None  # name of the program among several, that of its task; None for the only one
+    robots: Mapping[str, RobotRows]  # rows by robot, in the order of the cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExportFrame:
-    """All that a reader of exported files may know besides the files: no row of the program.
+    """All that a reader of exported files may know besides the files: no row of the program."""
 
-    Attributes:
-        cell: The cell, its starts filled in.
-        robots: Names of the robots that are exported, in the order of the cell.
-        programs: Names of the programs, in their order.
-        promise: What is promised.
-        targets: What rows state.
-        split: Most rows of a file or of a routine; None for the limit of the format.
-    """
-
-    cell: Cell
-    robots: tuple[str, ...]
-    programs: tuple[str | None, ...]
-    promise: Promise
-    targets: Targets = Targets.JOINTS
-    split: int | None = None
+    cell: Cell  # the cell, its starts filled in
+    robots: tuple[str, ...]  # names of the robots that are exported, in the order of the cell
+    programs: tuple[str | None, ...]  # names of the programs, in their order
+    promise: Promise  # what is promised
+    targets: Targets = Targets.JOINTS  # what rows state
+    split: int | None = None  # most rows of a file or of a routine; None for the limit of the format
 
     def robot(self, name: str) -> Robot:
         """A robot of the cell."""
@@ -114,15 +96,13 @@ class ExportJob:
     """What a format writes.
 
     Attributes:
-        frame: Which robots and programs.
-        programs: Rows of the programs, in their order.
         notes: Lines for the head of every file: promise, allowed skew, deviations, digest of the run; without the
             sign of a comment, of any characters.
         blend: Largest share of the shorter neighbouring segment, 0 to 0.5, within which a target may round rows; 0 for
             a stop at each row. Which rows these are: ``export.corners``. Rows may state less for each of them.
     """
 
-    frame: ExportFrame
-    programs: tuple[ProgramRows, ...]
+    frame: ExportFrame  # which robots and programs
+    programs: tuple[ProgramRows, ...]  # rows of the programs, in their order
     notes: tuple[str, ...] = ()
     blend: float = 0.0

@@ -12,21 +12,13 @@ from cellplan.model.robot import Joint
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointLimits:
-    """Limits of n joints, in the order of a stacked joint vector.
+    """Limits of n joints, in the order of a stacked joint vector."""
 
-    Attributes:
-        lower: Lowest positions in [rad] or [m], shape (n,); -inf where there is none.
-        upper: Highest positions in [rad] or [m], shape (n,); inf where there is none.
-        velocity: Largest speeds in [rad/s] or [m/s], shape (n,).
-        acceleration: Largest accelerations in [rad/s^2] or [m/s^2], shape (n,); inf where none is known.
-        is_revolute: Whether a joint is revolute rather than prismatic, shape (n,).
-    """
-
-    lower: Array
-    upper: Array
-    velocity: Array
-    acceleration: Array
-    is_revolute: NDArray[np.bool_]
+    lower: Array  # lowest positions in [rad] or [m], shape (n,); -inf where there is none
+    upper: Array  # highest positions in [rad] or [m], shape (n,); inf where there is none
+    velocity: Array  # largest speeds in [rad/s] or [m/s], shape (n,)
+    acceleration: Array  # largest accelerations in [rad/s^2] or [m/s^2], shape (n,); inf where none is known
+    is_revolute: NDArray[np.bool_]  # whether a joint is revolute rather than prismatic, shape (n,)
 
     @classmethod
     def of(cls, joints: Iterable[Joint]) -> "JointLimits":

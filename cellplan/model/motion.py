@@ -240,19 +240,14 @@ class ClockTable:
     """What happens at each row of a program: the content of its written clock.
 
     Attributes:
-        times: Times of the rows in [s], shape (N,).
-        sigma: Nominal time of each row in [s], shape (N,).
-        phases: Name of the phase of each row.
-        lengths: Length of path in [m] behind the tool of each task, shape (N,), by task.
-        process: Whether the tool of each task is on its path, shape (N,), by task.
         gaps: Name of what is not part of the program, by the first row after it.
     """
 
-    times: Array
-    sigma: Array
-    phases: tuple[str, ...]
-    lengths: Mapping[str, Array]
-    process: Mapping[str, NDArray[np.bool_]]
+    times: Array  # times of the rows in [s], shape (N,)
+    sigma: Array  # nominal time of each row in [s], shape (N,)
+    phases: tuple[str, ...]  # name of the phase of each row
+    lengths: Mapping[str, Array]  # length of path in [m] behind the tool of each task, shape (N,), by task
+    process: Mapping[str, NDArray[np.bool_]]  # whether the tool of each task is on its path, shape (N,), by task
     gaps: Mapping[int, str] = field(default_factory=dict)
 
 

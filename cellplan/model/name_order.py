@@ -15,15 +15,10 @@ from cellplan.model.cell import Cell
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NameOrder:
-    """A cell in the order of names, and the way from its stacked joint vector to that of the file and back.
+    """A cell in the order of names, and the way from its stacked joint vector to that of the file and back."""
 
-    Attributes:
-        cell: The cell in the order of names; the first holder stays the first.
-        columns: Place in the joint vector of the file of each joint in the order of names, shape (nq,).
-    """
-
-    cell: Cell
-    columns: NDArray[np.intp]
+    cell: Cell  # the cell in the order of names; the first holder stays the first
+    columns: NDArray[np.intp]  # place in the joint vector of the file of each joint in the order of names, shape (nq,)
 
     @classmethod
     def of(cls, cell: Cell) -> "NameOrder":

@@ -99,17 +99,11 @@ class FollowerJoint:
 
 
 class Drive(NamedTuple):
-    """How a driven joint moves an axis: ``q_axis = ratio q_joint + offset``; a joint drives itself as it is.
+    """How a driven joint moves an axis: ``q_axis = ratio q_joint + offset``; a joint drives itself as it is."""
 
-    Attributes:
-        joint: Index of the driven joint in ``RobotModel.joints``.
-        ratio: Motion of the axis per motion of the joint.
-        offset: Position of the axis in [rad] or [m] when the joint reads zero.
-    """
-
-    joint: int
-    ratio: float = 1.0
-    offset: float = 0.0
+    joint: int  # index of the driven joint in ``RobotModel.joints``
+    ratio: float = 1.0  # motion of the axis per motion of the joint
+    offset: float = 0.0  # position of the axis in [rad] or [m] when the joint reads zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

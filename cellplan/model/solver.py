@@ -25,18 +25,15 @@ class MethodTraits:
     """What a resolution method is and can do.
 
     Attributes:
-        label: Name in reports.
-        has_null_space: Whether goals besides the tasks can be pursued in the null space of the task Jacobian.
         feeds_back: Whether the pose error is fed back with the gain of the solver; searches minimise it directly.
-        takes_euler_steps: Whether a joint step is a joint velocity times the time step.
         steps_because: Why the motion can only be stepped along the clock, as a predicate of the method; empty where it
             can also be resolved by collocation (the integrator ``accurate``).
     """
 
-    label: str
-    has_null_space: bool = True
+    label: str  # name in reports
+    has_null_space: bool = True  # whether goals besides the tasks can be pursued in the null space of the task Jacobian
     feeds_back: bool = True
-    takes_euler_steps: bool = False
+    takes_euler_steps: bool = False  # whether a joint step is a joint velocity times the time step
     steps_because: str = ""
 
     @property

@@ -8,15 +8,10 @@ DEG: Final = math.degrees(1.0)  # [deg/rad]
 
 
 class DisplayUnit(NamedTuple):
-    """Unit in which a quantity is printed.
+    """Unit in which a quantity is printed."""
 
-    Attributes:
-        name: The unit as printed.
-        scale: Printed value per value in SI units.
-    """
-
-    name: str
-    scale: float
+    name: str  # the unit as printed
+    scale: float  # printed value per value in SI units
 
 
 DEGREES: Final = DisplayUnit("deg", DEG)

@@ -27,23 +27,14 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellCheck:
-    """What can be said of a cell before it is solved.
+    """What can be said of a cell before it is solved."""
 
-    Attributes:
-        cell: The cell with every start posture filled in.
-        found: Names of the robots whose start posture was searched for.
-        choice: How the start was chosen, in words; None when all of it was given.
-        path_lengths: Length of each task's path on the surface in [m].
-        checks: The verified statements.
-        left_out: What was not judged in full, but for two links of one robot's file.
-    """
-
-    cell: Cell
-    found: tuple[str, ...]
-    choice: str | None
-    path_lengths: Mapping[str, float]
-    checks: tuple[Check, ...]
-    left_out: tuple[LeftOut, ...]
+    cell: Cell  # the cell with every start posture filled in
+    found: tuple[str, ...]  # names of the robots whose start posture was searched for
+    choice: str | None  # how the start was chosen, in words; None when all of it was given
+    path_lengths: Mapping[str, float]  # length of each task's path on the surface in [m]
+    checks: tuple[Check, ...]  # the verified statements
+    left_out: tuple[LeftOut, ...]  # what was not judged in full, but for two links of one robot's file
 
     @property
     def passed(self) -> bool:

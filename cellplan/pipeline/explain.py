@@ -27,22 +27,18 @@ class MatrixShape:
     """The cooperation Jacobian of one phase, at the start postures of the cell.
 
     Attributes:
-        phase: Tasks and moving robots.
         blocks: Names of the block rows: the tasks of the phase, then the grasps of further holders that move.
-        rows: Constrained components of each block row.
-        columns: Joints of each robot, in the order of the cell, that move and carry a tool or the part.
         signs: Sign of each block for each robot, shape (blocks, robots): -1 the robot that carries the part, +1 the one
             that has the tool, 0 empty.
-        missing: Robots whose start posture is to be found before there is a rank.
         singular_values: Largest first, one for each row or column, whichever are fewer; None where a start is missing.
     """
 
-    phase: Phase
+    phase: Phase  # tasks and moving robots
     blocks: tuple[str, ...]
-    rows: tuple[int, ...]
-    columns: tuple[int, ...]
+    rows: tuple[int, ...]  # constrained components of each block row
+    columns: tuple[int, ...]  # joints of each robot, in the order of the cell, that move and carry a tool or the part
     signs: Array
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # robots whose start posture is to be found before there is a rank
     singular_values: Array | None
 
     @property
@@ -63,18 +59,14 @@ class Structure:
     """The structure of a cell.
 
     Attributes:
-        cell: The cell.
         plane: Plane of the part in which everything moves, with PPR chains; None for space, with PPPS chains.
-        graph: Links and joints, virtual chains included.
-        circuits: The independent ways round, one per chord.
-        matrices: One per phase of the program.
     """
 
     cell: Cell
     plane: PlaneName | None
-    graph: CouplingGraph
-    circuits: tuple[Circuit, ...]
-    matrices: tuple[MatrixShape, ...]
+    graph: CouplingGraph  # links and joints, virtual chains included
+    circuits: tuple[Circuit, ...]  # the independent ways round, one per chord
+    matrices: tuple[MatrixShape, ...]  # one per phase of the program
 
 
 def explain(cell: Cell) -> Structure:

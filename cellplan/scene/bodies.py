@@ -34,20 +34,16 @@ class SceneBody:
     Attributes:
         name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal``, ``<robot>/mount`` or ``<robot>/<attachment>``,
             ``part`` or the name of a thing in the surroundings.
-        kind: What it belongs to.
-        shape: The solid, in its own frame S.
-        robot: The robot that moves it; None when it is fixed in the world.
-        link: The link of that robot it is fixed to.
         X_BS: Its pose at the reference configuration in the robot's base frame; in the world when no robot moves it.
         accuracy: How far the real thing may stick out of it in [m]; None when it is not stated. What the user draws
             (tools, part, attachments, pedestals, surroundings) is taken as exact.
     """
 
     name: str
-    kind: Kind
-    shape: Shape
-    robot: str | None
-    link: int
+    kind: Kind  # what it belongs to
+    shape: Shape  # the solid, in its own frame S
+    robot: str | None  # the robot that moves it; None when it is fixed in the world
+    link: int  # the link of that robot it is fixed to
     X_BS: Array
     accuracy: float | None = 0.0
 

@@ -14,25 +14,15 @@ from cellplan.scene.bodies import SceneBody
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyTable:
-    """Bodies of the engine and the links that carry them.
+    """Bodies of the engine and the links that carry them."""
 
-    Attributes:
-        links: Place in the forest of the link that carries each body, shape (B,).
-        X_LS: Pose on that link as ``SceneBody.X_BS``, shape (B, 4, 4).
-        centres: Centres of the bounding spheres in the bodies' own frames in [m], shape (B, 3).
-        radii: Their radii in [m], shape (B,).
-        ends: Ends of the bounding lines in the bodies' own frames in [m], shape (B, 2, 3).
-        girths: How far the bodies reach from these lines in [m], shape (B,).
-        supports: Farthest points of their hulls.
-    """
-
-    links: Indices
-    X_LS: Array
-    centres: Array
-    radii: Array
-    ends: Array
-    girths: Array
-    supports: HullSupports
+    links: Indices  # place in the forest of the link that carries each body, shape (B,)
+    X_LS: Array  # pose on that link as ``SceneBody.X_BS``, shape (B, 4, 4)
+    centres: Array  # centres of the bounding spheres in the bodies' own frames in [m], shape (B, 3)
+    radii: Array  # their radii in [m], shape (B,)
+    ends: Array  # ends of the bounding lines in the bodies' own frames in [m], shape (B, 2, 3)
+    girths: Array  # how far the bodies reach from these lines in [m], shape (B,)
+    supports: HullSupports  # farthest points of their hulls
 
     @classmethod
     def of(cls, forest: LinkForest, carriers: Sequence[SceneBody], bodies: Sequence[CollisionBody]) -> "BodyTable":

@@ -28,18 +28,14 @@ class CollisionPairs:
     """The pairs of a cell.
 
     Attributes:
-        watched: Pairs that are watched.
-        excluded: Pairs that are not, in the order of their bodies.
-        mounted: Pairs that may touch and of which the depth is judged.
         outside: Surfaces of tools and holders outside their contact zones; the engine has them after its solids.
-        cut_from: The body that each of these is cut from, by its index.
     """
 
-    watched: tuple[ScenePair, ...]
-    excluded: tuple[Excluded, ...]
-    mounted: tuple[MountedPair, ...]
+    watched: tuple[ScenePair, ...]  # pairs that are watched
+    excluded: tuple[Excluded, ...]  # pairs that are not, in the order of their bodies
+    mounted: tuple[MountedPair, ...]  # pairs that may touch and of which the depth is judged
     outside: tuple[CollisionBody, ...]
-    cut_from: tuple[int, ...]
+    cut_from: tuple[int, ...]  # the body that each of these is cut from, by its index
 
     @classmethod
     def of(

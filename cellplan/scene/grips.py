@@ -25,19 +25,12 @@ RIGID: Final = "checked for contact only: rigidly attached to a flange that hold
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GripWatch:
-    """What is demanded of a further holder's body and the part.
+    """What is demanded of a further holder's body and the part."""
 
-    Attributes:
-        rule: What is demanded.
-        reason: Why less than the full distance is.
-        is_whole: Whether the whole body is watched.
-        outside: What of it is watched otherwise; None when nothing is.
-    """
-
-    rule: Rule
-    reason: str
-    is_whole: bool
-    outside: CollisionBody | None
+    rule: Rule  # what is demanded
+    reason: str  # why less than the full distance is
+    is_whole: bool  # whether the whole body is watched
+    outside: CollisionBody | None  # what of it is watched otherwise; None when nothing is
 
 
 def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:

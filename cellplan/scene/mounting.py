@@ -29,23 +29,14 @@ class Mount(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MountedPair:
-    """Two bodies that may touch, and reach into each other by so much.
+    """Two bodies that may touch, and reach into each other by so much."""
 
-    Attributes:
-        first: Index of the one body of the scene.
-        second: Index of the other; a half-space is always the second.
-        mount: Why they may touch.
-        limit: Greatest allowed depth in [m].
-        accuracy: Share of the limit in [m] that makes up for what is stated of the accuracy of a link's body.
-        moves: Whether the one moves against the other, so that every configuration of a motion counts.
-    """
-
-    first: int
-    second: int
-    mount: Mount
-    limit: float
-    accuracy: float = 0.0
-    moves: bool = False
+    first: int  # index of the one body of the scene
+    second: int  # index of the other; a half-space is always the second
+    mount: Mount  # why they may touch
+    limit: float  # greatest allowed depth in [m]
+    accuracy: float = 0.0  # share of the limit in [m] that makes up for what is stated of the accuracy of a link's body
+    moves: bool = False  # whether the one moves against the other, so that every configuration of a motion counts
 
 
 def is_of_own_file(a: SceneBody, b: SceneBody) -> bool:

@@ -25,26 +25,21 @@ class NearPairs:
     """Pairs that come nearer than a distance at some configurations; M of them, ordered by configuration and pair.
 
     Attributes:
-        rows: Their places in ``Scene.pairs``, shape (M,).
-        samples: At which configuration, shape (M,).
         distances: Signed distances in [m], negative where the bodies overlap by so much, shape (M,). Of bodies that are
             not convex it is that of their hulls, never more than the true one, where that keeps what is demanded of the
             pair or the surfaces touch; that of their surfaces otherwise. Of a tool that is cut off before its tip it is
             that of its hull.
         normals: Unit directions from the first body to the second in W: the distance grows when the second moves along
             them, shape (M, 3).
-        first: Points of the first bodies that are so far from the second ones, in W in [m], shape (M, 3).
-        second: Points of the second bodies likewise, shape (M, 3).
-        by_joints: Derivatives of the distances by the stacked joints, in [m/rad] or [m/m], shape (M, nq).
     """
 
-    rows: Indices
-    samples: Indices
+    rows: Indices  # their places in ``Scene.pairs``, shape (M,)
+    samples: Indices  # at which configuration, shape (M,)
     distances: Array
     normals: Array
-    first: Array
-    second: Array
-    by_joints: Array
+    first: Array  # points of the first bodies that are so far from the second ones, in W in [m], shape (M, 3)
+    second: Array  # points of the second bodies likewise, shape (M, 3)
+    by_joints: Array  # derivatives of the distances by the stacked joints, in [m/rad] or [m/m], shape (M, nq)
 
 
 def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:

@@ -20,63 +20,37 @@ CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WatchedPairs:
-    """Pairs of bodies as arrays; P of two solids, then G of a solid and a half-space.
+    """Pairs of bodies as arrays; P of two solids, then G of a solid and a half-space."""
 
-    Attributes:
-        rows: What each pair is called, shape (P + G,).
-        solids: Bodies of the engine of the first ones, shape (P, 2).
-        above: Solids of the others, shape (G,).
-        planes: Poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4).
-        demands: Distances in [m] that are demanded; down to them the hulls of a pair are enough, shape (P + G,).
-        once: Whether a pair is examined in the first configuration only, shape (P + G,).
-    """
-
-    rows: Indices
-    solids: Indices
-    above: Indices
-    planes: Array
-    demands: Array
-    once: Flags
+    rows: Indices  # what each pair is called, shape (P + G,)
+    solids: Indices  # bodies of the engine of the first ones, shape (P, 2)
+    above: Indices  # solids of the others, shape (G,)
+    planes: Array  # poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4)
+    demands: Array  # distances in [m] that are demanded; down to them the hulls of a pair are enough, shape (P + G,)
+    once: Flags  # whether a pair is examined in the first configuration only, shape (P + G,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """Near pairs; M of them, ordered by sample and row.
+    """Near pairs; M of them, ordered by sample and row."""
 
-    Attributes:
-        rows: What each pair is called, shape (M,).
-        samples: At which configuration, shape (M,).
-        distances: Signed distances in [m], shape (M,).
-        normals: Unit directions from the first body to the second, shape (M, 3).
-        first: Points of the first bodies in the world in [m], shape (M, 3).
-        second: Points of the second bodies, shape (M, 3).
-        bodies: The bodies by their places in the engine, -1 for a half-space, shape (M, 2).
-    """
-
-    rows: Indices
-    samples: Indices
-    distances: Array
-    normals: Array
-    first: Array
-    second: Array
-    bodies: Indices
+    rows: Indices  # what each pair is called, shape (M,)
+    samples: Indices  # at which configuration, shape (M,)
+    distances: Array  # signed distances in [m], shape (M,)
+    normals: Array  # unit directions from the first body to the second, shape (M, 3)
+    first: Array  # points of the first bodies in the world in [m], shape (M, 3)
+    second: Array  # points of the second bodies, shape (M, 3)
+    bodies: Indices  # the bodies by their places in the engine, -1 for a half-space, shape (M, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NearTable:
-    """Links, bodies and pairs.
-
-    Attributes:
-        forest: The links.
-        bodies: The bodies of the engine.
-        pairs: The pairs.
-        is_hull: Whether the hull of a body is what counts of it, shape (B,).
-    """
+    """Links, bodies and pairs."""
 
     forest: LinkForest
-    bodies: BodyTable
+    bodies: BodyTable  # the bodies of the engine
     pairs: WatchedPairs
-    is_hull: Flags
+    is_hull: Flags  # whether the hull of a body is what counts of it, shape (B,)
 
     def moved(self, poses: Mapping[int, Array], bodies: Mapping[int, CollisionBody]) -> "NearTable":
         """The same with some bodies elsewhere on their links, and others in place of some; see ``BodyTable``."""

@@ -34,25 +34,18 @@ class ScenePair:
     """Two bodies that are watched.
 
     Attributes:
-        first: Index of the one body of the scene.
-        second: Index of the other; a half-space is always the second.
         solids: The engine's bodies that must not touch: the two bodies themselves, or what lies outside a contact zone
             and the part. None for a half-space, and where all of a tool lies inside its zone.
-        is_ground: Whether the second body is a half-space.
-        clearance_class: Classes of pairs of bodies.
-        rule: What is demanded of them.
-        reason: Why less than the clearance is demanded; empty for the rule ``clearance``.
-        demand: Distance in [m] that a pair with the rule ``clearance`` is to keep.
     """
 
-    first: int
-    second: int
+    first: int  # index of the one body of the scene
+    second: int  # index of the other; a half-space is always the second
     solids: tuple[int, int] | None
-    is_ground: bool
-    clearance_class: ClearanceClass
-    rule: Rule
-    reason: str = ""
-    demand: float = 0.0
+    is_ground: bool  # whether the second body is a half-space
+    clearance_class: ClearanceClass  # classes of pairs of bodies
+    rule: Rule  # what is demanded of them
+    reason: str = ""  # why less than the clearance is demanded; empty for the rule ``clearance``
+    demand: float = 0.0  # distance in [m] that a pair with the rule ``clearance`` is to keep
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,17 +45,11 @@ UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of z
 
 @dataclass(slots=True)
 class Design:
-    """What becomes of pairs that are near each other by design or by their mounting.
+    """What becomes of pairs that are near each other by design or by their mounting."""
 
-    Attributes:
-        kept: Pairs that are watched, some of them for contact only.
-        excluded: Pairs that are not.
-        mounted: Those of them of which the depth is judged.
-    """
-
-    kept: list[ScenePair] = field(default_factory=list)
-    excluded: list[Excluded] = field(default_factory=list)
-    mounted: list[MountedPair] = field(default_factory=list)
+    kept: list[ScenePair] = field(default_factory=list)  # pairs that are watched, some of them for contact only
+    excluded: list[Excluded] = field(default_factory=list)  # pairs that are not
+    mounted: list[MountedPair] = field(default_factory=list)  # those of them of which the depth is judged
 
 
 def apply_design(

@@ -32,32 +32,21 @@ class Scene:
     """A cell made computable; safe to send to another process.
 
     Attributes:
-        cell: The cell.
-        chains: Kinematic chain of each robot, by name.
-        bodies: All solids, half-spaces last.
-        pairs: Pairs that are watched.
-        excluded: Pairs that are not watched.
-        mounted: Pairs that may touch and of which the depth is judged.
         engine: The solid bodies in the order of ``bodies``, then the surfaces of tools outside their contact zones.
-        cut_from: The tool body that each of these last ones is cut from.
-        solid_rows: Indices of the pairs that the engine watches, shape (S,), ascending.
-        solid_pairs: ``ScenePair.solids`` of each of them, shape (S, 2).
-        ground_rows: Indices of the pairs of a solid and a half-space, shape (G,).
-        tables: What ``near_table`` has built of it; empty before it is first asked.
     """
 
     cell: Cell
-    chains: Mapping[str, ScrewChain]
-    bodies: tuple[SceneBody, ...]
-    pairs: tuple[ScenePair, ...]
-    excluded: tuple[Excluded, ...]
-    mounted: tuple[MountedPair, ...]
+    chains: Mapping[str, ScrewChain]  # kinematic chain of each robot, by name
+    bodies: tuple[SceneBody, ...]  # all solids, half-spaces last
+    pairs: tuple[ScenePair, ...]  # pairs that are watched
+    excluded: tuple[Excluded, ...]  # pairs that are not watched
+    mounted: tuple[MountedPair, ...]  # pairs that may touch and of which the depth is judged
     engine: Engine
-    cut_from: tuple[int, ...]
-    solid_rows: Indices = field(init=False)
-    solid_pairs: Indices = field(init=False)
-    ground_rows: Indices = field(init=False)
-    tables: list[NearTable] = field(init=False)
+    cut_from: tuple[int, ...]  # the tool body that each of these last ones is cut from
+    solid_rows: Indices = field(init=False)  # indices of the pairs that the engine watches, shape (S,), ascending
+    solid_pairs: Indices = field(init=False)  # ``ScenePair.solids`` of each of them, shape (S, 2)
+    ground_rows: Indices = field(init=False)  # indices of the pairs of a solid and a half-space, shape (G,)
+    tables: list[NearTable] = field(init=False)  # what ``near_table`` has built of it; empty before it is first asked
 
     def __post_init__(self) -> None:
         """Collect the indices of solids and half-spaces once: whole batches of pairs are bounded by them."""

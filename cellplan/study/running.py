@@ -17,19 +17,12 @@ PAUSE_S: Final = 0.01  # [s] between two of them
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunningState:
-    """What ``--status`` has to know of a study beyond its journal.
+    """What ``--status`` has to know of a study beyond its journal."""
 
-    Attributes:
-        began: When it was begun or continued, in seconds of the system's clock.
-        done_before: Number of trials that were recorded then.
-        trials: Number of trials at which it ends; None where only the budget or the search itself ends it.
-        budget: Seconds after which no round is begun; None for no such limit.
-    """
-
-    began: float
-    done_before: int
-    trials: int | None
-    budget: float | None
+    began: float  # when it was begun or continued, in seconds of the system's clock
+    done_before: int  # number of trials that were recorded then
+    trials: int | None  # number of trials at which it ends; None where only the budget or the search itself ends it
+    budget: float | None  # seconds after which no round is begun; None for no such limit
 
 
 @contextmanager

@@ -19,15 +19,10 @@ HOUR: Final = 3600.0  # [s]
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """What makes a trial that passed better than another.
+    """What makes a trial that passed better than another."""
 
-    Attributes:
-        figure: Name of the figure that is compared.
-        is_largest: Whether the largest value is the best one; else the smallest.
-    """
-
-    figure: str
-    is_largest: bool = False
+    figure: str  # name of the figure that is compared
+    is_largest: bool = False  # whether the largest value is the best one; else the smallest
 
     @classmethod
     def from_header(cls, header: Mapping[str, Any]) -> Self | None:
@@ -67,27 +62,16 @@ class Best:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyStatus:
-    """How far a study is.
+    """How far a study is."""
 
-    Attributes:
-        done: Number of trials whose outcome is recorded.
-        trials: Number at which it ends; None where only its budget or the search itself ends it.
-        best: The best trial so far; None where none passed or trials are not compared.
-        best_value: Its figure.
-        figure: Name of that figure.
-        rate: Trials in a second since it was begun or continued; None where that is not known.
-        seconds_left: Time until it ends at this rate; None where that is not known.
-        is_running: Whether it runs.
-    """
-
-    done: int
-    trials: int | None = None
-    best: Trial | None = None
-    best_value: float | None = None
-    figure: str = ""
-    rate: float | None = None
-    seconds_left: float | None = None
-    is_running: bool = False
+    done: int  # number of trials whose outcome is recorded
+    trials: int | None = None  # number at which it ends; None where only its budget or the search itself ends it
+    best: Trial | None = None  # the best trial so far; None where none passed or trials are not compared
+    best_value: float | None = None  # its figure
+    figure: str = ""  # name of that figure
+    rate: float | None = None  # trials in a second since it was begun or continued; None where that is not known
+    seconds_left: float | None = None  # time until it ends at this rate; None where that is not known
+    is_running: bool = False  # whether it runs
 
     @classmethod
     def of(

@@ -26,13 +26,11 @@ class Finished:
 
     Attributes:
         trials: All trials as plain data, in their order; their number repeats the study byte for byte.
-        rounds: Number of whole rounds.
-        stopped_by: Why it has ended.
     """
 
     trials: list[dict[str, Any]]
-    rounds: int
-    stopped_by: StoppedBy
+    rounds: int  # number of whole rounds
+    stopped_by: StoppedBy  # why it has ended
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,25 +41,21 @@ class Study:
     workers, not on which trial ends first, not on interruptions. A shorter study is a prefix of a longer one.
 
     Attributes:
-        folder: Folder of the study; an earlier study there is replaced, or continued.
         header: What the study is about, as plain data, without what only ends it: an earlier study with another header
             is not continued.
-        size: Number of trials in a round.
         propose: Values of the trials of the next round, plain data, from all trials of the rounds before. Fewer than
             ``size`` make the last round, none end the study.
-        best: What makes one trial better than another; part of the header. None for nothing.
         enough: Whether a trial ends the study; the trials after it do not count. None for never.
-        noun: What a trial is called in texts.
         total: Number of trials where they are given from the start, all in one round; None where rounds are proposed.
     """
 
-    folder: Path
+    folder: Path  # folder of the study; an earlier study there is replaced, or continued
     header: Mapping[str, Any]
-    size: int
+    size: int  # number of trials in a round
     propose: Propose
-    best: Best | None = None
+    best: Best | None = None  # what makes one trial better than another; part of the header. None for nothing
     enough: Callable[[Trial], bool] | None = None
-    noun: str = "trial"
+    noun: str = "trial"  # what a trial is called in texts
     total: int | None = None
 
     @classmethod

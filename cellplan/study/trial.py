@@ -9,15 +9,10 @@ from typing import Any, Final, Self
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One combination of values.
+    """One combination of values."""
 
-    Attributes:
-        number: Its place among all combinations, from 0.
-        values: Value by address.
-    """
-
-    number: int
-    values: Mapping[str, object]
+    number: int  # its place among all combinations, from 0
+    values: Mapping[str, object]  # value by address
 
 
 class TrialStatus(StrEnum):
@@ -37,17 +32,11 @@ STATUS_TEXTS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What came of a variant.
+    """What came of a variant."""
 
-    Attributes:
-        status: Its verdict.
-        reason: The first check that failed or the reason why there is no result; empty where it passed.
-        figures: Key figures by name, with their unit in the name; none where there is no motion.
-    """
-
-    status: TrialStatus
-    reason: str = ""
-    figures: Mapping[str, object]
+    status: TrialStatus  # its verdict
+    reason: str = ""  # the first check that failed or the reason why there is no result; empty where it passed
+    figures: Mapping[str, object]  # key figures by name, with their unit in the name; none where there is no motion
 
     @property
     def record(self) -> dict[str, Any]:

@@ -30,15 +30,10 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of one trial, far above what an honest one needs.
+    """Limits of one trial, far above what an honest one needs."""
 
-    Attributes:
-        seconds: Longest time of the processor; of the clock, four times as long.
-        megabytes: Largest address space of its process, Python and its libraries included.
-    """
-
-    seconds: float = 3600.0
-    megabytes: int = 16_000
+    seconds: float = 3600.0  # longest time of the processor; of the clock, four times as long
+    megabytes: int = 16_000  # largest address space of its process, Python and its libraries included
 
 
 class Lost(NamedTuple):

@@ -150,23 +150,14 @@ def _check(name: str, passed: bool, values: tuple[float, float], of: str, instan
 
 @dataclass(frozen=True, slots=True)
 class _Band:
-    """Places of two robots that meet: rectangles of rows, and a grid of times in [s], shape (M,) each.
+    """Places of two robots that meet: rectangles of rows, and a grid of times in [s], shape (M,) each."""
 
-    Attributes:
-        rectangles: For the certificate, see ``ClockRegion``.
-        samples: Times of the first robot, or of the second, that a search begins with, in [s], shape (I,).
-        low: Least lead of the second robot before the first in [s].
-        high: Greatest one.
-        spread: By how much the samples may move when the search is refined, in [s].
-        of_second: Whether the samples are those of the second robot.
-    """
-
-    rectangles: Array
-    samples: Array
-    low: float
-    high: float
-    spread: float = 0.0
-    of_second: bool = False
+    rectangles: Array  # for the certificate, see ``ClockRegion``
+    samples: Array  # times of the first robot, or of the second, that a search begins with, in [s], shape (I,)
+    low: float  # least lead of the second robot before the first in [s]
+    high: float  # greatest one
+    spread: float = 0.0  # by how much the samples may move when the search is refined, in [s]
+    of_second: bool = False  # whether the samples are those of the second robot
 
     def times(self, samples: Array, leads: Array) -> tuple[Array, Array]:
         """Times of both robots in [s] for all samples with all leads, shape (I L,) each."""

@@ -14,15 +14,10 @@ STANDSTILL_TOL: Final = 1e-9  # [rad] or [m] in a step: a joint that moves less 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RowAccelerations:
-    """Accelerations at the rows.
+    """Accelerations at the rows."""
 
-    Attributes:
-        values: Size of the acceleration of each column, shape (N, n).
-        is_jump: Where it is a jump of speed, shape (N, n).
-    """
-
-    values: Array
-    is_jump: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    values: Array  # size of the acceleration of each column, shape (N, n)
+    is_jump: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]  # where it is a jump of speed, shape (N, n)
 
 
 def point_accelerations(times: Array, points: Array) -> Array:

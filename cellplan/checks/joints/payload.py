@@ -32,19 +32,12 @@ class _Mass:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Carried:
-    """A mass on its way.
+    """A mass on its way."""
 
-    Attributes:
-        mass: In [kg].
-        points: Its centre in the world in [m], shape (N, 3).
-        force: What holds and moves it, expressed in the world in [N], shape (N, 3).
-        inertia: About its centre, expressed in the world in [kg m^2], shape (N, 3, 3).
-    """
-
-    mass: float
-    points: Array
-    force: Array
-    inertia: Array
+    mass: float  # in [kg]
+    points: Array  # its centre in the world in [m], shape (N, 3)
+    force: Array  # what holds and moves it, expressed in the world in [N], shape (N, 3)
+    inertia: Array  # about its centre, expressed in the world in [kg m^2], shape (N, 3, 3)
 
 
 def load_uses(

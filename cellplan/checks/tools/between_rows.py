@@ -46,19 +46,14 @@ class _Tool:
     """A tool that is to be somewhere relative to the part, or to the world.
 
     Attributes:
-        relation: The task or the grasp.
-        at_rows: Position error in [m] and orientation error in [rad] at the rows, shape (N, 2).
-        allowed: Largest errors allowed between the rows.
-        place: Place of its task among those of the schedule; None for a grasp.
-        first: First row from which on it is judged.
         off: By how much it may be off besides at the rows in [m] and [rad], shape (N, 2); None for nothing.
     """
 
-    relation: Relation
-    at_rows: Array
-    allowed: tuple[float, float]
-    place: int | None
-    first: int
+    relation: Relation  # the task or the grasp
+    at_rows: Array  # position error in [m] and orientation error in [rad] at the rows, shape (N, 2)
+    allowed: tuple[float, float]  # largest errors allowed between the rows
+    place: int | None  # place of its task among those of the schedule; None for a grasp
+    first: int  # first row from which on it is judged
     off: Array | None = None
 
     def more(self, k: Indices, s: Array) -> Array:
@@ -286,29 +281,17 @@ class ErrorsBetweenRows:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Found:
-    """What was found of one tool.
-
-    Attributes:
-        tool: The tool.
-        middle: Errors in the middle of all steps, shape (N - 1, 2).
-        bounds: No error in a step is larger, shape (N - 1, 2).
-        chosen: Steps that were subdivided, shape (N - 1,).
-        k: Indices of the times evaluated, shape (M,).
-        s: Shares of these steps, shape (M,).
-        fine: Errors there, shape (M, 2).
-        jump_times: When the tool may change its speed at once, in [s], shape (J,).
-        corners: The largest error that each makes with a step of this length, shape (J, 2).
-    """
+    """What was found of one tool."""
 
     tool: _Tool
-    middle: Array
-    bounds: Array
-    chosen: NDArray[np.bool_]
-    k: Indices
-    s: Array
-    fine: Array
-    jump_times: Array
-    corners: Array
+    middle: Array  # errors in the middle of all steps, shape (N - 1, 2)
+    bounds: Array  # no error in a step is larger, shape (N - 1, 2)
+    chosen: NDArray[np.bool_]  # steps that were subdivided, shape (N - 1,)
+    k: Indices  # indices of the times evaluated, shape (M,)
+    s: Array  # shares of these steps, shape (M,)
+    fine: Array  # errors there, shape (M, 2)
+    jump_times: Array  # when the tool may change its speed at once, in [s], shape (J,)
+    corners: Array  # the largest error that each makes with a step of this length, shape (J, 2)
 
 
 def _lengths(errors: TaskAccuracy | ClosureAccuracy) -> Array:

@@ -30,25 +30,15 @@ ALL_AXES: Final = (0, 1, 2, 3, 4, 5)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Way:
-    """What one error grows by: a bound of it at some times, and what is allowed.
+    """What one error grows by: a bound of it at some times, and what is allowed."""
 
-    Attributes:
-        times: Times in [s], ascending, shape (K,).
-        sums: Bound of the way from the first of them on in [m] or [rad], shape (K,).
-        turns: Angle in [rad] by which the part has turned, where that matters, shape (K,); zero where it does not.
-        whole: Bound of the way in all components, likewise.
-        rows: Times in [s] at which the error is judged, shape (N,).
-        errors: Error in [m] or [rad] there without a skew, shape (N,).
-        limit: Allowed error.
-    """
-
-    times: Array
-    sums: Array
-    turns: Array
-    whole: Array
-    rows: Array
-    errors: Array
-    limit: float
+    times: Array  # times in [s], ascending, shape (K,)
+    sums: Array  # bound of the way from the first of them on in [m] or [rad], shape (K,)
+    turns: Array  # angle in [rad] by which the part has turned, where that matters, shape (K,); zero where it does not
+    whole: Array  # bound of the way in all components, likewise
+    rows: Array  # times in [s] at which the error is judged, shape (N,)
+    errors: Array  # error in [m] or [rad] there without a skew, shape (N,)
+    limit: float  # allowed error
 
     def growth(self, shift: float) -> Array:
         """Bound of what is added to the error at each of the rows by either clock being ahead by so much, (N,)."""
@@ -112,17 +102,11 @@ def _crossing(sums: Array, times: Array, goals: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolWays:
-    """How a tool moves on the part when its clock is shifted.
+    """How a tool moves on the part when its clock is shifted."""
 
-    Attributes:
-        position: In [m].
-        orientation: In [rad].
-        speed: Bound of the largest speed of the tool in the constrained components in [m/s].
-    """
-
-    position: Way
-    orientation: Way
-    speed: float
+    position: Way  # in [m]
+    orientation: Way  # in [rad]
+    speed: float  # bound of the largest speed of the tool in the constrained components in [m/s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,16 +114,13 @@ class Mover:
     """A robot over the rows of a program.
 
     Attributes:
-        chain: Its kinematics.
-        q: Its positions in [rad] or [m], shape (N, n).
         bend: Largest second derivative of its tool tip in each step in [m], shape (N - 1,); see ``lever_arms.Chain``.
-        turn_bend: Likewise of a unit vector that turns with the tool.
     """
 
-    chain: ScrewChain
-    q: Array
+    chain: ScrewChain  # its kinematics
+    q: Array  # its positions in [rad] or [m], shape (N, n)
     bend: Array
-    turn_bend: Array
+    turn_bend: Array  # likewise of a unit vector that turns with the tool
 
     @classmethod
     def of(cls, scene: Scene, arms: LeverArms, robot: str, *, q: Array, steps: Array) -> "Mover":
@@ -167,25 +148,15 @@ class Mover:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShiftedTool:
-    """A tool on a part that another robot carries, at the rows of a program.
+    """A tool on a part that another robot carries, at the rows of a program."""
 
-    Attributes:
-        relation: The task, or the grasp of a further holder.
-        mover: The robot of the tool.
-        carrier: The robot that carries the part.
-        X_CP: The part in the tool frame of that robot.
-        desired: Desired poses on the part at the rows, shape (N, 4, 4).
-        limits: Largest position error in [m] and orientation error in [rad].
-        first: First row at which errors are judged.
-    """
-
-    relation: Relation
-    mover: Mover
-    carrier: Mover
-    X_CP: Array
-    desired: Array
-    limits: tuple[float, float]
-    first: int = 0
+    relation: Relation  # the task, or the grasp of a further holder
+    mover: Mover  # the robot of the tool
+    carrier: Mover  # the robot that carries the part
+    X_CP: Array  # the part in the tool frame of that robot
+    desired: Array  # desired poses on the part at the rows, shape (N, 4, 4)
+    limits: tuple[float, float]  # largest position error in [m] and orientation error in [rad]
+    first: int = 0  # first row at which errors are judged
 
     def ways(self, times: Array) -> ToolWays:
         """What the errors of the tool grow by, at times of the rows in [s], shape (N,)."""

@@ -47,13 +47,11 @@ class Bends:
 
     Attributes:
         second: Largest second derivative of any point of the second body seen from the first, in [m], shape (n - 1,).
-        first: Likewise of the first seen from the second.
-        reach: No point of the one travels farther than this seen from the other, in [m], shape (n - 1,).
     """
 
     second: Array
-    first: Array
-    reach: Array
+    first: Array  # likewise of the first seen from the second
+    reach: Array  # no point of the one travels farther than this seen from the other, in [m], shape (n - 1,)
 
 
 class Motion(Protocol):

@@ -23,25 +23,15 @@ PIECE_COUNT: Final = 4  # [-] pieces that a body is taken apart into at once; th
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PieceMotion:
-    """The motion of one body and of the pieces of another, which move like the body they are pieces of.
+    """The motion of one body and of the pieces of another, which move like the body they are pieces of."""
 
-    Attributes:
-        whole: The motion of the two bodies.
-        pair: The two bodies in that motion.
-        engine: The one body first, then the pieces of the other.
-        is_first_split: Whether it is the first of the pair that was taken apart.
-        poses: Where they are.
-        bend: How much the paths of the two bodies bend.
-        seen: Rotations and positions of the second of the pair seen from the first.
-    """
-
-    whole: Motion
-    pair: Pair
-    engine: Engine
-    is_first_split: bool
-    poses: BodyPoses
-    bend: Bends
-    seen: tuple[Array, Array]
+    whole: Motion  # the motion of the two bodies
+    pair: Pair  # the two bodies in that motion
+    engine: Engine  # the one body first, then the pieces of the other
+    is_first_split: bool  # whether it is the first of the pair that was taken apart
+    poses: BodyPoses  # where they are
+    bend: Bends  # how much the paths of the two bodies bend
+    seen: tuple[Array, Array]  # rotations and positions of the second of the pair seen from the first
 
     @classmethod
     def of(cls, whole: Motion, pair: Pair, engine: Engine, *, is_first_split: bool) -> "PieceMotion":

@@ -11,21 +11,13 @@ from cellplan.geometry.mesh.tessellation import halved
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patches:
-    """Some patches of a surface; one is known by its place in its level of the tree, or as a single triangle.
+    """Some patches of a surface; one is known by its place in its level of the tree, or as a single triangle."""
 
-    Attributes:
-        level: Level of the tree, the same for all; that of single triangles is the number of levels.
-        place: Place of each in that level, shape (K,); of single triangles it has no meaning.
-        triangles: Their corners in [m], shape (K, 3, 3); none above the level of single triangles.
-        centres: A point of the surface in each in [m], shape (K, 3).
-        radii: Radius of a ball round it that holds the patch in [m], shape (K,).
-    """
-
-    level: int
-    place: Indices
-    triangles: Array
-    centres: Array
-    radii: Array
+    level: int  # level of the tree, the same for all; that of single triangles is the number of levels
+    place: Indices  # place of each in that level, shape (K,); of single triangles it has no meaning
+    triangles: Array  # their corners in [m], shape (K, 3, 3); none above the level of single triangles
+    centres: Array  # A point of the surface in each in [m], shape (K, 3)
+    radii: Array  # radius of a ball round it that holds the patch in [m], shape (K,)
 
     def some(self, which: Indices) -> "Patches":
         """Some of them."""
@@ -42,16 +34,13 @@ class SurfaceTree:
     """Binary tree of patches over triangles that are sorted along a space-filling curve.
 
     Attributes:
-        count: Number of triangles F.
-        triangles: The sorted triangles in [m], the last one repeated until there are 2^D, shape (2^D, 3, 3).
         centres: A point of the surface in each patch of each level above the triangles, shapes (2^level, 3).
-        radii: Radii of the balls round them in [m], shapes (2^level,).
     """
 
-    count: int
-    triangles: Array
+    count: int  # number of triangles F
+    triangles: Array  # the sorted triangles in [m], the last one repeated until there are 2^D, shape (2^D, 3, 3)
     centres: tuple[Array, ...]
-    radii: tuple[Array, ...]
+    radii: tuple[Array, ...]  # radii of the balls round them in [m], shapes (2^level,)
 
     @classmethod
     def over(cls, triangles: Array) -> "SurfaceTree":

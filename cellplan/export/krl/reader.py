@@ -95,39 +95,22 @@ def _rows(frame: ExportFrame, robot: str, player: "_Player") -> RobotRows:
 
 @dataclass(slots=True, kw_only=True)
 class _Player:
-    """Follows a program statement by statement.
+    """Follows a program statement by statement."""
 
-    Attributes:
-        frame: Which robots.
-        robot: The robot.
-        path: Path of the main module without its ending.
-        rows: Values of all components of each row.
-        marks: Rows with a handshake.
-        calls: Number of pages that were called.
-        settings: What was set before the first motion.
-        speed: Whether a speed was set.
-        rounded: Whether the last row is rounded.
-        rounding: How far each row is, in [%]; 0 for a stop.
-        share: How far rows are from here on, in [%]; 0 before it is set.
-        step: Number of instructions of a handshake that were met.
-        lowered: Line at which its output was lowered before the first motion, 0 if it was not.
-        names: Points of the module that are still to come.
-    """
-
-    frame: ExportFrame
+    frame: ExportFrame  # which robots
     robot: str
-    path: str
-    rows: list[Sequence[float]] = field(default_factory=list)
-    marks: list[int] = field(default_factory=list)
-    calls: int = 0
-    settings: set[str] = field(default_factory=set)
-    speed: bool = False
-    rounded: bool = False
-    rounding: list[int] = field(default_factory=list)
-    share: int = 0
-    step: int = 0
-    lowered: int = 0
-    names: list[str] | None = None
+    path: str  # path of the main module without its ending
+    rows: list[Sequence[float]] = field(default_factory=list)  # values of all components of each row
+    marks: list[int] = field(default_factory=list)  # rows with a handshake
+    calls: int = 0  # number of pages that were called
+    settings: set[str] = field(default_factory=set)  # what was set before the first motion
+    speed: bool = False  # whether a speed was set
+    rounded: bool = False  # whether the last row is rounded
+    rounding: list[int] = field(default_factory=list)  # how far each row is, in [%]; 0 for a stop
+    share: int = 0  # how far rows are from here on, in [%]; 0 before it is set
+    step: int = 0  # number of instructions of a handshake that were met
+    lowered: int = 0  # line at which its output was lowered before the first motion, 0 if it was not
+    names: list[str] | None = None  # points of the module that are still to come
 
     def play(self, module: Module, statement: Statement) -> None:
         """Follow one statement."""

@@ -33,52 +33,31 @@ _FIRST: Final = re.compile(r"(DEF|DEFDAT)\s+(\w+)\s*(\(\s*\)|)(?:\s+PUBLIC)?", r
 
 
 class _Line(NamedTuple):
-    """A line without its comment.
+    """A line without its comment."""
 
-    Attributes:
-        number: From 1.
-        text: What it says; never empty.
-    """
-
-    number: int
-    text: str
+    number: int  # from 1
+    text: str  # what it says; never empty
 
 
 class Statement(NamedTuple):
-    """A statement of a source file.
+    """A statement of a source file."""
 
-    Attributes:
-        line: Number of its line.
-        kind: One of ``STATEMENTS``.
-        text: The line.
-        words: What its pattern found.
-    """
-
-    line: int
-    kind: str
-    text: str
-    words: tuple[str | None, ...]
+    line: int  # number of its line
+    kind: str  # one of ``STATEMENTS``
+    text: str  # the line
+    words: tuple[str | None, ...]  # what its pattern found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Module:
-    """What both files of a module hold.
+    """What both files of a module hold."""
 
-    Attributes:
-        path: Path without the ending.
-        externals: Lines of the declarations of other modules, by their names.
-        statements: Statements in their order.
-        end: Number of the line of ``END``.
-        points: Values of all components of each point, by name in small letters.
-        lines: Lines of the points.
-    """
-
-    path: str
-    externals: Mapping[str, int]
-    statements: Sequence[Statement]
-    end: int
-    points: Mapping[str, Sequence[float]]
-    lines: Mapping[str, int]
+    path: str  # path without the ending
+    externals: Mapping[str, int]  # lines of the declarations of other modules, by their names
+    statements: Sequence[Statement]  # statements in their order
+    end: int  # number of the line of ``END``
+    points: Mapping[str, Sequence[float]]  # values of all components of each point, by name in small letters
+    lines: Mapping[str, int]  # lines of the points
 
 
 def read_module(left: dict[str, str], path: str) -> Module:

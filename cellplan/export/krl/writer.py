@@ -29,29 +29,17 @@ LINE_END: Final = "\r\n"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Program:
-    """What is written of one robot in one program.
+    """What is written of one robot in one program."""
 
-    Attributes:
-        path: Path of the main module without its ending.
-        head: Comment lines.
-        rows: The rows.
-        numbers: Values of all components of the points, shape (N, 12).
-        decimals: Of these.
-        speeds: Share of the top speed with which each row is approached in [%].
-        rounding: Value of ``$APO.CPTP`` with which each row is rounded in [%], 0 for a stop.
-        steps: Instructions at a mark.
-        pages: Rows of each page.
-    """
-
-    path: str
-    head: Sequence[str]
+    path: str  # path of the main module without its ending
+    head: Sequence[str]  # comment lines
     rows: RobotRows
-    numbers: Array
-    decimals: int
-    speeds: Sequence[int]
-    rounding: Sequence[int]
-    steps: Sequence[Step]
-    pages: Sequence[range]
+    numbers: Array  # values of all components of the points, shape (N, 12)
+    decimals: int  # of these
+    speeds: Sequence[int]  # share of the top speed with which each row is approached in [%]
+    rounding: Sequence[int]  # value of ``$APO.CPTP`` with which each row is rounded in [%], 0 for a stop
+    steps: Sequence[Step]  # instructions at a mark
+    pages: Sequence[range]  # rows of each page
 
 
 def render_krl(job: ExportJob) -> dict[str, str]:

@@ -24,31 +24,19 @@ LARGEST_ID: Final = 2**24  # whole numbers up to it are exact in a num of the co
 
 
 class Place(NamedTuple):
-    """Where a move stands in its program.
+    """Where a move stands in its program."""
 
-    Attributes:
-        is_first: Whether it is the first move.
-        is_between: Whether it stands between ``SyncMoveOn`` and ``SyncMoveOff``.
-        is_synchronised: Whether the program has these.
-    """
-
-    is_first: bool
-    is_between: bool
-    is_synchronised: bool
+    is_first: bool  # whether it is the first move
+    is_between: bool  # whether it stands between ``SyncMoveOn`` and ``SyncMoveOff``
+    is_synchronised: bool  # whether the program has these
 
 
 class Zone(NamedTuple):
-    """How near to a target another motion begins.
+    """How near to a target another motion begins."""
 
-    Attributes:
-        tool: Distance of the tool in [mm].
-        turn: Of turning external axes in [deg].
-        slide: Of sliding external axes in [mm].
-    """
-
-    tool: float
-    turn: float
-    slide: float
+    tool: float  # distance of the tool in [mm]
+    turn: float  # of turning external axes in [deg]
+    slide: float  # of sliding external axes in [mm]
 
 
 STOP: Final = Zone(0.0, 0.0, 0.0)

@@ -23,17 +23,11 @@ _SHOWN: Final = 60  # characters of a statement in a message
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """A statement without its semicolon, spaces where it needs them only.
-
-    Attributes:
-        text: The text.
-        file: Its file.
-        line: Its first line there.
-    """
+    """A statement without its semicolon, spaces where it needs them only."""
 
     text: str
     file: str
-    line: int
+    line: int  # its first line there
 
     def refuse(self, expected: str, got: str | None = None) -> NoReturn:
         """Raise an ``InputError`` that says what was expected here.
@@ -47,23 +41,14 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Datum:
-    """A declaration.
+    """A declaration."""
 
-    Attributes:
-        statement: Where it stands.
-        storage: ``pers``, ``const`` or ``var``.
-        kind: Its data type, in lower case.
-        name: Its name as written.
-        count: Number of elements of an array; None for a single value.
-        value: Text of its value; None without one.
-    """
-
-    statement: Statement
-    storage: str
-    kind: str
-    name: str
-    count: int | None
-    value: str | None
+    statement: Statement  # where it stands
+    storage: str  # ``pers``, ``const`` or ``var``
+    kind: str  # its data type, in lower case
+    name: str  # its name as written
+    count: int | None  # number of elements of an array; None for a single value
+    value: str | None  # text of its value; None without one
 
 
 @dataclass(slots=True)

@@ -57,23 +57,14 @@ NAME: Final = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{LONGEST_NAME - 1}}}")
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RapidUnit:
-    """A robot as RAPID programs it.
-
-    Attributes:
-        robot: The robot.
-        task: Name of its task on the controller; None where no other task runs with it.
-        module: Name of its module, and of its files.
-        tool: Name of its tool data; those of all robots differ, as persistent data are shared between tasks.
-        axes: Which joints belong to the arm, and which are external axes.
-        decimals: Of a degree or millimetre.
-    """
+    """A robot as RAPID programs it."""
 
     robot: Robot
-    task: str | None
-    module: str
-    tool: str
-    axes: Axes
-    decimals: int
+    task: str | None  # name of its task on the controller; None where no other task runs with it
+    module: str  # name of its module, and of its files
+    tool: str  # name of its tool data; those of all robots differ, as persistent data are shared between tasks
+    axes: Axes  # which joints belong to the arm, and which are external axes
+    decimals: int  # of a degree or millimetre
 
     @property
     def has_tool(self) -> bool:
@@ -83,15 +74,10 @@ class RapidUnit:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PartFrame:
-    """The work object of a part that a robot carries.
+    """The work object of a part that a robot carries."""
 
-    Attributes:
-        unit: The mechanical unit that moves it.
-        X_FP: The part in the flange frame of that unit, shape (4, 4).
-    """
-
-    unit: str
-    X_FP: Array
+    unit: str  # the mechanical unit that moves it
+    X_FP: Array  # the part in the flange frame of that unit, shape (4, 4)
 
 
 def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:

@@ -25,16 +25,10 @@ FIGURES: Final = 6  # decimals of the figures
 
 
 class StreamAxis(NamedTuple):
-    """One column of positions.
+    """One column of positions."""
 
-    Attributes:
-        name: Name of the axis on the controller: ``A1`` to ``A6`` of an arm, ``E1`` and so on of all others.
-        place: Place of its joint in the model.
-        joint: The joint.
-    """
-
-    name: str
-    place: int
+    name: str  # name of the axis on the controller: ``A1`` to ``A6`` of an arm, ``E1`` and so on of all others
+    place: int  # place of its joint in the model
     joint: Joint
 
     @property

@@ -23,28 +23,18 @@ DEEPEST: Final = 8  # loops in one another
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """A statement.
+    """A statement."""
 
-    Attributes:
-        line: Its line in the file.
-        text: What stands there.
-    """
-
-    line: int
-    text: str
+    line: int  # its line in the file
+    text: str  # what stands there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move(Statement):
-    """A motion of the joints.
+    """A motion of the joints."""
 
-    Attributes:
-        names: Data of the joints, of the tool and of the motion descriptor.
-        indices: Which of their values: a number, or the name that a loop counts.
-    """
-
-    names: tuple[str, str, str]
-    indices: tuple[int | str, int | str, int | str]
+    names: tuple[str, str, str]  # data of the joints, of the tool and of the motion descriptor
+    indices: tuple[int | str, int | str, int | str]  # which of their values: a number, or the name that a loop counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,54 +49,34 @@ class Reset(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WaitFor(Statement):
-    """A wait for an input.
+    """A wait for an input."""
 
-    Attributes:
-        name: Its data.
-        is_on: The state.
-    """
-
-    name: str
-    is_on: bool
+    name: str  # its data
+    is_on: bool  # the state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetOutput(Statement):
-    """A change of an output.
+    """A change of an output."""
 
-    Attributes:
-        name: Its data.
-        is_on: The state.
-    """
-
-    name: str
-    is_on: bool
+    name: str  # its data
+    is_on: bool  # the state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Call(Statement):
-    """A call of another program.
-
-    Attributes:
-        name: Its name.
-    """
+    """A call of another program."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Loop(Statement):
-    """Statements that are done again and again.
+    """Statements that are done again and again."""
 
-    Attributes:
-        counter: Name of what counts.
-        values: Its values.
-        body: The statements.
-    """
-
-    counter: str
+    counter: str  # name of what counts
     values: range
-    body: Sequence["Node"]
+    body: Sequence["Node"]  # the statements
 
 
 Node = Move | StandStill | Reset | WaitFor | SetOutput | Call | Loop
@@ -138,17 +108,11 @@ def read_code(code: Element, counters: Collection[str]) -> tuple[list[Node], int
 
 @dataclass(slots=True, kw_only=True)
 class _Reader:
-    """Reads statements line by line.
-
-    Attributes:
-        code: The element.
-        lines: Numbers and texts of the lines that are left, the next one last.
-        counters: Names of the numbers that loops may count with.
-    """
+    """Reads statements line by line."""
 
     code: Element
-    lines: list[tuple[int, str]]
-    counters: Collection[str]
+    lines: list[tuple[int, str]]  # numbers and texts of the lines that are left, the next one last
+    counters: Collection[str]  # names of the numbers that loops may count with
 
     def statements(self, inside: tuple[str, ...]) -> list[Node]:
         """Statements up to the end of the loop, or of the program.

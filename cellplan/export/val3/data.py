@@ -35,17 +35,11 @@ _BLENDS: Final = ("off", "joint", "Cartesian")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Data:
-    """An array of values.
+    """An array of values."""
 
-    Attributes:
-        element: Where it is declared.
-        kind: Type of its values.
-        values: Attributes of each value; one that is missing has its default.
-    """
-
-    element: Element
-    kind: str
-    values: Sequence[Mapping[str, str]]
+    element: Element  # where it is declared
+    kind: str  # type of its values
+    values: Sequence[Mapping[str, str]]  # attributes of each value; one that is missing has its default
 
     @property
     def size(self) -> int:

@@ -52,32 +52,20 @@ def read_val3(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Program:
-    """A program of a project.
-
-    Attributes:
-        file: Its file.
-        code: Its statements.
-        end: Line of its ``end``.
-    """
+    """A program of a project."""
 
     file: str
-    code: Sequence[Node]
-    end: int
+    code: Sequence[Node]  # its statements
+    end: int  # line of its ``end``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Project:
-    """What the files of a project hold.
+    """What the files of a project hold."""
 
-    Attributes:
-        path: Its folder.
-        data: Its data by name.
-        programs: Its programs by name.
-    """
-
-    path: str
-    data: Mapping[str, Data]
-    programs: Mapping[str, _Program]
+    path: str  # its folder
+    data: Mapping[str, Data]  # its data by name
+    programs: Mapping[str, _Program]  # its programs by name
 
 
 def _project(left: dict[str, str], path: str) -> _Project:
@@ -169,34 +157,22 @@ class _Player:
     """Follows the programs of a project statement by statement.
 
     Attributes:
-        frame: Which robots.
-        robot: The robot.
-        project: Its project.
-        rows: Joint positions of the controller in each row.
         zones: Distance of the tool in [mm] within which each row is rounded; 0 for a stop.
-        marks: Rows with a handshake.
-        calls: Programs that were called.
-        used: Number of values that were moved to, by the name of their data.
-        stands: Whether the robot has come to a stop after its last motion.
-        is_exact: Whether the last motion ends in its row.
-        step: Number of instructions of a handshake that were met.
-        lowered: Line of ``start`` at which its output was lowered before the first motion, 0 if it was not.
-        steps: Number of statements that were done.
     """
 
-    frame: ExportFrame
+    frame: ExportFrame  # which robots
     robot: str
     project: _Project
-    rows: list[Sequence[float]] = field(default_factory=list)
+    rows: list[Sequence[float]] = field(default_factory=list)  # joint positions of the controller in each row
     zones: list[float] = field(default_factory=list)
-    marks: list[int] = field(default_factory=list)
-    calls: list[str] = field(default_factory=list)
-    used: dict[str, int] = field(default_factory=dict)
-    stands: bool = True
-    is_exact: bool = True
-    step: int = 0
-    lowered: int = 0
-    steps: int = 0
+    marks: list[int] = field(default_factory=list)  # rows with a handshake
+    calls: list[str] = field(default_factory=list)  # programs that were called
+    used: dict[str, int] = field(default_factory=dict)  # number of values that were moved to, by the name of their data
+    stands: bool = True  # whether the robot has come to a stop after its last motion
+    is_exact: bool = True  # whether the last motion ends in its row
+    step: int = 0  # number of instructions of a handshake that were met
+    lowered: int = 0  # line of ``start`` at which its output was lowered before the first motion, 0 if it was not
+    steps: int = 0  # number of statements that were done
 
     def play_all(self) -> None:
         """Follow ``start`` and what it calls, and make sure that all that the project holds was used.

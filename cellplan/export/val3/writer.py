@@ -48,44 +48,26 @@ XML: Final = '<?xml version="1.0" encoding="utf-8"?>'
 
 
 class _Move(NamedTuple):
-    """How a row is approached and passed.
+    """How a row is approached and passed."""
 
-    Attributes:
-        speed: Share of the top speed in [%].
-        zone: Distance of the tool from the row in [um] within which it is rounded, 0 for a stop.
-    """
-
-    speed: int
-    zone: int
+    speed: int  # share of the top speed in [%]
+    zone: int  # distance of the tool from the row in [um] within which it is rounded, 0 for a stop
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Project:
-    """What is written of one robot in one program.
+    """What is written of one robot in one program."""
 
-    Attributes:
-        path: Folder of the project; its last part is its name.
-        notes: Notes for the heads of its files.
-        rows: The rows.
-        numbers: Joint positions of the arm, shape (N, 6).
-        decimals: Of these.
-        moves: How each row is approached and passed.
-        steps: Instructions at a mark.
-        first: Instructions before the first motion.
-        pages: Rows of each page.
-        tool: Tool in the flange frame, shape (4, 4).
-    """
-
-    path: str
-    notes: Sequence[str]
+    path: str  # folder of the project; its last part is its name
+    notes: Sequence[str]  # notes for the heads of its files
     rows: RobotRows
-    numbers: Array
-    decimals: int
-    moves: Sequence[_Move]
-    steps: Sequence[Step]
-    first: Sequence[Step]
-    pages: Sequence[range]
-    tool: Array
+    numbers: Array  # joint positions of the arm, shape (N, 6)
+    decimals: int  # of these
+    moves: Sequence[_Move]  # how each row is approached and passed
+    steps: Sequence[Step]  # instructions at a mark
+    first: Sequence[Step]  # instructions before the first motion
+    pages: Sequence[range]  # rows of each page
+    tool: Array  # tool in the flange frame, shape (4, 4)
 
     @property
     def name(self) -> str:

@@ -19,25 +19,15 @@ TYPE: Final = f"{TYPE_SPACE} type"
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Element:
-    """An element of a file.
-
-    Attributes:
-        file: The file.
-        line: Line of its tag.
-        name: Name with its namespace before it.
-        attributes: Its attributes; those of a namespace have it before the name.
-        children: Its elements.
-        text: Its text.
-        text_line: Line on which the text begins.
-    """
+    """An element of a file."""
 
     file: str
-    line: int
-    name: str
-    attributes: dict[str, str]
+    line: int  # line of its tag
+    name: str  # name with its namespace before it
+    attributes: dict[str, str]  # its attributes; those of a namespace have it before the name
     children: list["Element"] = field(default_factory=list)
     text: str = ""
-    text_line: int = 0
+    text_line: int = 0  # line on which the text begins
 
     def error(self, expected: str, got: str) -> InputError:
         """An error at its tag."""

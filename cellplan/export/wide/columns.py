@@ -30,23 +30,14 @@ Columns = dict[str, Column]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PhaseRows:
-    """One phase of a program, and where its tools are.
+    """One phase of a program, and where its tools are."""
 
-    Attributes:
-        name: Name of the phase.
-        rows: Its rows in the table.
-        schedule: Desired tool poses.
-        report: What the checks found in these rows.
-        X_WT: Tool tips in the world, shape (n, 4, 4), by robot.
-        X_WP: The part in the world, shape (n, 4, 4), or (1, 4, 4) for a part at rest.
-    """
-
-    name: str
-    rows: slice
-    schedule: Schedule
-    report: Report
-    X_WT: Mapping[str, Array]
-    X_WP: Array
+    name: str  # name of the phase
+    rows: slice  # its rows in the table
+    schedule: Schedule  # desired tool poses
+    report: Report  # what the checks found in these rows
+    X_WT: Mapping[str, Array]  # tool tips in the world, shape (n, 4, 4), by robot
+    X_WP: Array  # the part in the world, shape (n, 4, 4), or (1, 4, 4) for a part at rest
 
     def scheduled(self, task: str) -> TaskSchedule | None:
         """The desired tool poses of a task; None where it is not worked on."""
@@ -74,17 +65,13 @@ class ProgramRows:
     """A program with all that its wide table shows.
 
     Attributes:
-        cell: The cell.
-        times: Times of the rows in [s], shape (N,).
-        sigma: Nominal times of the rows in [s], shape (N,).
-        phases: Its phases in their order; the row that two of them share is of the later one.
         process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task.
     """
 
     cell: Cell
-    times: Array
-    sigma: Array
-    phases: Sequence[PhaseRows]
+    times: Array  # times of the rows in [s], shape (N,)
+    sigma: Array  # nominal times of the rows in [s], shape (N,)
+    phases: Sequence[PhaseRows]  # its phases in their order; the row that two of them share is of the later one
     process: Mapping[str, Sequence[Interval]]
 
     @property

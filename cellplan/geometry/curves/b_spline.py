@@ -10,15 +10,10 @@ from cellplan.geometry.arrays import Array
 
 @dataclass(frozen=True, kw_only=True)
 class UniformBSpline:
-    """The basis of clamped B-splines with evenly spaced knots (de Boor 1978).
+    """The basis of clamped B-splines with evenly spaced knots (de Boor 1978)."""
 
-    Attributes:
-        degree: Degree of the polynomials between two knots.
-        count: Number of basis functions, at least ``degree + 1``.
-    """
-
-    degree: int
-    count: int
+    degree: int  # degree of the polynomials between two knots
+    count: int  # number of basis functions, at least ``degree + 1``
 
     def __post_init__(self) -> None:
         """Check that there are enough functions for the degree."""

@@ -29,17 +29,11 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CircleCurve:
-    """Full circle ``centre + first cos(u) + second sin(u)``.
+    """Full circle ``centre + first cos(u) + second sin(u)``."""
 
-    Attributes:
-        centre: Centre in [m], shape (3,).
-        first: Radius vector to the start in [m], shape (3,).
-        second: Radius vector a quarter turn later in [m], shape (3,).
-    """
-
-    centre: Array
-    first: Array
-    second: Array
+    centre: Array  # centre in [m], shape (3,)
+    first: Array  # radius vector to the start in [m], shape (3,)
+    second: Array  # radius vector a quarter turn later in [m], shape (3,)
 
     @property
     def knots(self) -> Array:
@@ -54,15 +48,10 @@ class CircleCurve:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BezierCurve:
-    """Chain of Bezier spans of one degree.
+    """Chain of Bezier spans of one degree."""
 
-    Attributes:
-        knots: Increasing parameter values, shape (M + 1,).
-        control: Control points of each span, shape (M, degree + 1, 3).
-    """
-
-    knots: Array
-    control: Array
+    knots: Array  # increasing parameter values, shape (M + 1,)
+    control: Array  # control points of each span, shape (M, degree + 1, 3)
 
     def evaluate(self, u: Array, interval: Interval) -> tuple[Array, Array]:
         """Points and derivatives by de Casteljau's rule, see `Curve`."""

@@ -138,16 +138,11 @@ class ProjectedCurve:
     """A curve projected onto a patch along a direction.
 
     With the height h along the direction d, ``p = c + h d`` stays on the patch when ``n . (dc + dh d) = 0``.
-
-    Attributes:
-        curve: The curve before projection.
-        patch: Where it comes to lie.
-        direction: Unit direction towards the side it comes from, shape (3,).
     """
 
-    curve: Curve
-    patch: Patch
-    direction: Array
+    curve: Curve  # the curve before projection
+    patch: Patch  # where it comes to lie
+    direction: Array  # unit direction towards the side it comes from, shape (3,)
 
     @property
     def knots(self) -> Array:

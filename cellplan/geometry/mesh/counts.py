@@ -12,19 +12,12 @@ PAIR_CHUNK: Final = 1_000_000  # point-triangle pairs worked on at once: about 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EdgeCount:
-    """How well the triangles of a surface fit together.
+    """How well the triangles of a surface fit together."""
 
-    Attributes:
-        open: Edges with a triangle on one side only.
-        crowded: Edges shared by more than two triangles.
-        turned: Edges whose two triangles disagree about which side is outside.
-        unbalanced: Edges through which the triangles run more often one way than the other, of all these.
-    """
-
-    open: int
-    crowded: int
-    turned: int
-    unbalanced: int
+    open: int  # edges with a triangle on one side only
+    crowded: int  # edges shared by more than two triangles
+    turned: int  # edges whose two triangles disagree about which side is outside
+    unbalanced: int  # edges through which the triangles run more often one way than the other, of all these
 
     @property
     def is_closed(self) -> bool:

@@ -15,17 +15,11 @@ COARSEST: Final = 4  # [-] below it a shape could not be recognised
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decimated:
-    """A mesh for a picture.
+    """A mesh for a picture."""
 
-    Attributes:
-        points: Corner points in [m], shape (V, 3).
-        triangles: Corner indices, shape (M, 3).
-        deviation: Largest distance in [m] by which a point of the surface was moved.
-    """
-
-    points: Array
-    triangles: np.ndarray[tuple[int, int], np.dtype[np.int64]]
-    deviation: float
+    points: Array  # corner points in [m], shape (V, 3)
+    triangles: np.ndarray[tuple[int, int], np.dtype[np.int64]]  # corner indices, shape (M, 3)
+    deviation: float  # largest distance in [m] by which a point of the surface was moved
 
 
 def decimated(mesh: Mesh, limit: int, *, finest: float = FINEST) -> Decimated:

@@ -28,17 +28,11 @@ SAME_DECIMALS: Final = 10  # decimals of a way in [m]: crossings that agree in t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RayHits:
-    """First meeting of each ray with a mesh.
+    """First meeting of each ray with a mesh."""
 
-    Attributes:
-        points: Where the ray meets the mesh in [m], shape (N, 3); NaN where it misses.
-        faces: Which triangle, shape (N,); -1 where it misses.
-        distance: Way from the ray's origin in [m], shape (N,); inf where it misses.
-    """
-
-    points: Array
-    faces: Indices
-    distance: Array
+    points: Array  # where the ray meets the mesh in [m], shape (N, 3); NaN where it misses
+    faces: Indices  # which triangle, shape (N,); -1 where it misses
+    distance: Array  # way from the ray's origin in [m], shape (N,); inf where it misses
 
     @property
     def is_hit(self) -> NDArray[np.bool_]:
@@ -48,17 +42,11 @@ class RayHits:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Crossings:
-    """Every crossing of some lines with a mesh, sorted by line and then along the line.
+    """Every crossing of some lines with a mesh, sorted by line and then along the line."""
 
-    Attributes:
-        line: Which line, shape (K,).
-        way: Signed way from the line's point in [m], shape (K,).
-        is_entering: Whether the line enters the solid there rather than leaves it, shape (K,).
-    """
-
-    line: Indices
-    way: Array
-    is_entering: NDArray[np.bool_]
+    line: Indices  # which line, shape (K,)
+    way: Array  # signed way from the line's point in [m], shape (K,)
+    is_entering: NDArray[np.bool_]  # whether the line enters the solid there rather than leaves it, shape (K,)
 
 
 def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
@@ -95,17 +83,11 @@ def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tree:
-    """Binary tree of boxes over triangles sorted along a space-filling curve.
+    """Binary tree of boxes over triangles sorted along a space-filling curve."""
 
-    Attributes:
-        order: Triangles in leaf order, shape (leaves, per leaf); the last one repeated to fill up.
-        low: Lower box corners of each level from the root, shapes (2^level, 3).
-        high: Upper box corners.
-    """
-
-    order: Indices
-    low: tuple[Array, ...]
-    high: tuple[Array, ...]
+    order: Indices  # triangles in leaf order, shape (leaves, per leaf); the last one repeated to fill up
+    low: tuple[Array, ...]  # lower box corners of each level from the root, shapes (2^level, 3)
+    high: tuple[Array, ...]  # upper box corners
 
     @classmethod
     def over(cls, triangles: Array) -> "_Tree":

@@ -31,20 +31,15 @@ class Address:
     """Something of a cell file, or one number of it.
 
     Attributes:
-        group: What the number belongs to, as the file addresses it: ``robots.kuka.base``.
-        what: Its kind: the last key of the address as it may be written in a layout.
-        name: Robot or task; empty for the part at rest and the mode.
         parts: Endings of the addresses of all its numbers: ``.x_mm``, or ``[0]``; empty for what has none.
-        keys: What these numbers are called in a mapping of ranges.
-        index: Which of them it is; None for all.
     """
 
-    group: str
-    what: str
-    name: str
+    group: str  # what the number belongs to, as the file addresses it: ``robots.kuka.base``
+    what: str  # its kind: the last key of the address as it may be written in a layout
+    name: str  # robot or task; empty for the part at rest and the mode
     parts: tuple[str, ...] = ()
-    keys: tuple[str, ...] = ()
-    index: int | None = None
+    keys: tuple[str, ...] = ()  # what these numbers are called in a mapping of ranges
+    index: int | None = None  # which of them it is; None for all
 
     @property
     def numbers(self) -> tuple[str, ...]:

@@ -66,19 +66,15 @@ class CellFile:
     """The document of a cell, and the folders of the files that it names.
 
     Attributes:
-        document: The file, with the values that were changed since.
         changes: These values by address, in the order in which they were set.
-        name: Name of the file, without folders.
-        folder: Folder that the names of files start from.
-        allow_dirs: Further folders that these files may lie in.
         parts: What the cell was built from the document with, by attribute.
     """
 
-    document: YamlDocument
+    document: YamlDocument  # the file, with the values that were changed since
     changes: Mapping[str, object] = field(default_factory=dict)
-    name: str
-    folder: Path
-    allow_dirs: tuple[Path, ...]
+    name: str  # name of the file, without folders
+    folder: Path  # folder that the names of files start from
+    allow_dirs: tuple[Path, ...]  # further folders that these files may lie in
     parts: Mapping[str, object] = field(default_factory=dict)
 
     @property

@@ -9,15 +9,10 @@ from cellplan.io.input.findings import shown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AllowedFolders:
-    """Folder that names are relative to, and folders that they may lead into.
+    """Folder that names are relative to, and folders that they may lead into."""
 
-    Attributes:
-        folder: Folder of the file that names others.
-        allowed: Further folders, by leave of the user.
-    """
-
-    folder: Path
-    allowed: tuple[Path, ...] = ()
+    folder: Path  # folder of the file that names others
+    allowed: tuple[Path, ...] = ()  # further folders, by leave of the user
 
     def file(self, written: str) -> Path:
         """Path of a file that exists within the allowed folders.

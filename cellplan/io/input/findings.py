@@ -17,19 +17,12 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing that is wrong in a file.
+    """One thing that is wrong in a file."""
 
-    Attributes:
-        line: Line from 1; 0 when the finding is about the whole file or about a value that is not in the file.
-        key: Key path as the user would write it; empty for the whole file.
-        text: What is wrong, what was found and what is allowed.
-        changes: What was changed of the file before it was read: ``motion.duration_s = 2.5``; empty for nothing.
-    """
-
-    line: int
-    key: str
-    text: str
-    changes: str = ""
+    line: int  # line from 1; 0 when the finding is about the whole file or about a value that is not in the file
+    key: str  # key path as the user would write it; empty for the whole file
+    text: str  # what is wrong, what was found and what is allowed
+    changes: str = ""  # what was changed of the file before it was read: ``motion.duration_s = 2.5``; empty for nothing
 
     def to_error(self, file: str) -> InputError:
         """The finding as one line: ``file:line: key: text``."""

@@ -34,17 +34,11 @@ TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bo
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotTable:
-    """A robot model and the files it was read from.
-
-    Attributes:
-        model: The robot.
-        digest: SHA-256 of the table.
-        mesh_files: Mesh files by name as written in the table.
-    """
+    """A robot model and the files it was read from."""
 
     model: RobotModel
-    digest: str
-    mesh_files: Mapping[str, Path]
+    digest: str  # SHA-256 of the table
+    mesh_files: Mapping[str, Path]  # mesh files by name as written in the table
 
 
 def read_robot_table(path: Path) -> RobotModel:

@@ -15,23 +15,14 @@ RATES: Final = {"lower": "", "upper": "", "velocity": "_s", "acceleration": "_s2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedLimits:
-    """Limits of one joint as far as a file states them, in [rad] or [m] and their rates; None where it does not.
+    """Limits of one joint as far as a file states them, in [rad] or [m] and their rates; None where it does not."""
 
-    Attributes:
-        lower: Lowest position.
-        upper: Highest position.
-        velocity: Largest velocity.
-        acceleration: Largest acceleration.
-        jerk: Largest jerk.
-        wraps: Whether a continuous joint may turn without end.
-    """
-
-    lower: float | None = None
-    upper: float | None = None
-    velocity: float | None = None
-    acceleration: float | None = None
-    jerk: float | None = None
-    wraps: bool = False
+    lower: float | None = None  # lowest position
+    upper: float | None = None  # highest position
+    velocity: float | None = None  # largest velocity
+    acceleration: float | None = None  # largest acceleration
+    jerk: float | None = None  # largest jerk
+    wraps: bool = False  # whether a continuous joint may turn without end
 
 
 def limits_of(joint: Joint) -> StatedLimits:

@@ -26,19 +26,12 @@ _FIXED: Final = ("time_s", "sigma_s", "phase")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockText:
-    """A clock that was read back, with what its lines are needed for in messages.
+    """A clock that was read back, with what its lines are needed for in messages."""
 
-    Attributes:
-        table: Its content.
-        cell: Name of the cell, as the header has it.
-        program: SHA-256 of the rows of the joint tables, as the header has it.
-        first_line: Line of the first row in the file, from 1.
-    """
-
-    table: ClockTable
-    cell: str
-    program: str
-    first_line: int
+    table: ClockTable  # its content
+    cell: str  # name of the cell, as the header has it
+    program: str  # SHA-256 of the rows of the joint tables, as the header has it
+    first_line: int  # line of the first row in the file, from 1
 
     def line(self, row: int) -> int:
         """Line of a row, counted from 0, in the file."""

@@ -44,22 +44,16 @@ class TableHeader:
     """The entries of the header of a table besides its title and the caution.
 
     Attributes:
-        cell: Name of the cell.
-        mode: Who moves.
-        verdict: ``passed``, ``REJECTED: <first violation>`` or ``not checked``.
-        digests: SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``).
-        remark: What else has to be known of the rows; empty for the program of the cell as it is written.
         accelerations: The largest acceleration and jerk of the robot's joints; empty for rows that are not checked.
-        zero: From which zero the joint positions count; empty for rows that are not checked.
     """
 
-    cell: str
-    mode: str
-    verdict: str = NOT_CHECKED
-    digests: Mapping[str, str]
-    remark: str = ""
+    cell: str  # name of the cell
+    mode: str  # who moves
+    verdict: str = NOT_CHECKED  # ``passed``, ``REJECTED: <first violation>`` or ``not checked``
+    digests: Mapping[str, str]  # SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``)
+    remark: str = ""  # what else has to be known of the rows; empty for the program of the cell as it is written
     accelerations: str = ""
-    zero: str = ""
+    zero: str = ""  # from which zero the joint positions count; empty for rows that are not checked
 
 
 def render_table(

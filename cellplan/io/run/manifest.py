@@ -35,25 +35,15 @@ class StoredFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Manifest:
-    """What a run folder holds and rests on.
+    """What a run folder holds and rests on."""
 
-    Attributes:
-        cell: Name of the cell.
-        status: ``passed`` or ``failed``.
-        cell_file: Name of the cell file, without folders.
-        changes: Values that were set when the cell was solved, by their address in the cell file.
-        inputs: SHA-256 of every file that was read, by its path from the folder of the cell file.
-        versions: Version by package, of those whose arithmetic the result rests on.
-        files: Every file of the run but the manifest, by its path in the run folder.
-    """
-
-    cell: str
-    status: str
-    cell_file: str
-    changes: Mapping[str, object]
-    inputs: Mapping[str, str]
-    versions: Mapping[str, str]
-    files: Mapping[str, StoredFile]
+    cell: str  # name of the cell
+    status: str  # ``passed`` or ``failed``
+    cell_file: str  # name of the cell file, without folders
+    changes: Mapping[str, object]  # values that were set when the cell was solved, by their address in the cell file
+    inputs: Mapping[str, str]  # SHA-256 of every file that was read, by its path from the folder of the cell file
+    versions: Mapping[str, str]  # version by package, of those whose arithmetic the result rests on
+    files: Mapping[str, StoredFile]  # every file of the run but the manifest, by its path in the run folder
 
     @property
     def own_inputs(self) -> tuple[str, ...]:

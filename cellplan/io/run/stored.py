@@ -33,22 +33,16 @@ class StoredRun:
     """The content of a run folder whose files are all as they were written.
 
     Attributes:
-        folder: The run folder.
-        digest: SHA-256 of the manifest, which stands for the whole run.
-        manifest: What the run holds and rests on.
-        record: Its ``report.json``.
         records: The ``report.json`` of each phase, by its place in the folder: empty for a single one, else the task.
-        tables: Text of the joint tables, by robot.
-        clock: Text of the clock of the program; empty for a failed run.
     """
 
-    folder: Path
-    digest: str
-    manifest: Manifest
-    record: Record
+    folder: Path  # the run folder
+    digest: str  # SHA-256 of the manifest, which stands for the whole run
+    manifest: Manifest  # what the run holds and rests on
+    record: Record  # its ``report.json``
     records: Mapping[str, Record]
-    tables: Mapping[str, str]
-    clock: str
+    tables: Mapping[str, str]  # text of the joint tables, by robot
+    clock: str  # text of the clock of the program; empty for a failed run
 
     def file(self, place: str, name: str) -> str:
         """Path of a file of one run as messages show it."""

@@ -23,29 +23,17 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mismatch:
-    """A value that the format does not allow, as data; `mismatch_text` renders it.
+    """A value that the format does not allow, as data; `mismatch_text` renders it."""
 
-    Attributes:
-        kind: What is wrong.
-        path: Key path of the value.
-        expected: What may stand there, as a phrase; the whole text of a rule.
-        allowed: Words or keys that may stand there.
-        at_least: Lower bound of a number or of a count; None without one.
-        at_most: Upper bound; None without one.
-        is_positive: Whether the lower bound reads as "positive".
-        unit: Unit of a number, as in "of millimetres"; empty without one.
-        got: The value that was found.
-    """
-
-    kind: Kind
-    path: KeyPath
-    expected: str = ""
-    allowed: tuple[str, ...] = ()
-    at_least: float | None = None
-    at_most: float | None = None
-    is_positive: bool = False
-    unit: str = ""
-    got: Any = None
+    kind: Kind  # what is wrong
+    path: KeyPath  # key path of the value
+    expected: str = ""  # what may stand there, as a phrase; the whole text of a rule
+    allowed: tuple[str, ...] = ()  # words or keys that may stand there
+    at_least: float | None = None  # lower bound of a number or of a count; None without one
+    at_most: float | None = None  # upper bound; None without one
+    is_positive: bool = False  # whether the lower bound reads as "positive"
+    unit: str = ""  # unit of a number, as in "of millimetres"; empty without one
+    got: Any = None  # the value that was found
 
     @property
     def is_at_key(self) -> bool:

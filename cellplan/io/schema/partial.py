@@ -28,37 +28,21 @@ from cellplan.io.yaml.reader import YamlDocument
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValidEntries:
-    """The entries of a cell file that conform to the format.
+    """The entries of a cell file that conform to the format."""
 
-    Attributes:
-        whole: The whole file; None when any entry is invalid.
-        robots: Valid robots by name.
-        tasks: Valid tasks by name.
-        environment: Valid obstacles by name.
-        controllers: Valid controllers by name.
-        part: The part, if valid.
-        motion: The motion, if valid.
-        solver: The solver's settings, if valid.
-        checks: The checks, if valid.
-        layout: The layout, if given and valid.
-        program: The program from home to home, if given and valid.
-        acceleration: The cell's rule for accelerations, if the whole file is valid.
-        names: All names in each section, of valid and invalid entries.
-    """
-
-    whole: CellDocument | None
-    robots: Mapping[str, RobotEntry]
-    tasks: Mapping[str, TaskEntry]
-    environment: Mapping[str, ObstacleEntry]
-    controllers: Mapping[str, ControllerEntry]
-    part: PartEntry | None
-    motion: MotionEntry | None
-    solver: SolverEntry | None
-    checks: ChecksEntry | None
-    layout: LayoutEntry | None
-    program: ProgramEntry | None
-    acceleration: AccelerationChoice | None
-    names: Mapping[str, tuple[str, ...]]
+    whole: CellDocument | None  # the whole file; None when any entry is invalid
+    robots: Mapping[str, RobotEntry]  # valid robots by name
+    tasks: Mapping[str, TaskEntry]  # valid tasks by name
+    environment: Mapping[str, ObstacleEntry]  # valid obstacles by name
+    controllers: Mapping[str, ControllerEntry]  # valid controllers by name
+    part: PartEntry | None  # the part, if valid
+    motion: MotionEntry | None  # the motion, if valid
+    solver: SolverEntry | None  # the solver's settings, if valid
+    checks: ChecksEntry | None  # the checks, if valid
+    layout: LayoutEntry | None  # the layout, if given and valid
+    program: ProgramEntry | None  # the program from home to home, if given and valid
+    acceleration: AccelerationChoice | None  # the cell's rule for accelerations, if the whole file is valid
+    names: Mapping[str, tuple[str, ...]]  # all names in each section, of valid and invalid entries
 
     @property
     def is_too_large(self) -> bool:

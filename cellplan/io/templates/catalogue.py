@@ -9,23 +9,14 @@ from cellplan.io.input.findings import did_you_mean, shown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Template:
-    """A shipped cell to begin with.
+    """A shipped cell to begin with."""
 
-    Attributes:
-        name: Name of the template and of its cell.
-        summary: What the cell is, in one line.
-        setting: A first change to try, ``KEY=VALUE`` for ``--set``; the cell passes with it, too.
-        meaning: What that changes.
-        files: Files that the cell names, relative to its folder.
-        more: A further hint; empty for none.
-    """
-
-    name: str
-    summary: str
-    setting: str
-    meaning: str
-    files: tuple[str, ...] = ()
-    more: str = ""
+    name: str  # name of the template and of its cell
+    summary: str  # what the cell is, in one line
+    setting: str  # A first change to try, ``KEY=VALUE`` for ``--set``; the cell passes with it, too
+    meaning: str  # what that changes
+    files: tuple[str, ...] = ()  # files that the cell names, relative to its folder
+    more: str = ""  # A further hint; empty for none
 
     @property
     def source(self) -> str:

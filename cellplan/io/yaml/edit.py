@@ -19,19 +19,12 @@ COMMENT: Final = re.compile(r"\s#")
 
 @dataclass(slots=True, kw_only=True)
 class _Node:
-    """Where a value stands in the text.
+    """Where a value stands in the text."""
 
-    Attributes:
-        key: Index of the first character of its key, and of the first one after it; of itself in a list.
-        span: Likewise of the value; of a block only up to its last entry.
-        is_block: Whether it is a mapping or list with an entry to a line.
-        children: The paths of its entries.
-    """
-
-    key: tuple[int, int]
-    span: tuple[int, int]
-    is_block: bool = False
-    children: list[KeyPath] = field(default_factory=list)
+    key: tuple[int, int]  # index of the first character of its key, and of the first one after it; of itself in a list
+    span: tuple[int, int]  # likewise of the value; of a block only up to its last entry
+    is_block: bool = False  # whether it is a mapping or list with an entry to a line
+    children: list[KeyPath] = field(default_factory=list)  # the paths of its entries
 
 
 def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:

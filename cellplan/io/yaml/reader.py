@@ -54,23 +54,16 @@ class YamlDocument:
     """A file as plain values, and where they stand.
 
     Attributes:
-        file: Name in messages.
-        digest: SHA-256 of the bytes that were read.
-        root: The values: dict, tuple, str, int, float, bool, or ``UNREADABLE`` where a finding was made.
-        values: Place of each value; a block mapping or list stands at its key.
-        keys: Place of each key.
-        findings: What the reader refused; the caller adds its own and raises all at once.
-        unreadable: Key paths whose value was refused.
         changes: Key paths at which other values were set after reading, each with its text in messages.
     """
 
-    file: str
-    digest: str
-    root: dict[str, Any]
-    values: Mapping[KeyPath, Mark]
-    keys: Mapping[KeyPath, Mark]
-    findings: tuple[Finding, ...]
-    unreadable: frozenset[KeyPath]
+    file: str  # name in messages
+    digest: str  # SHA-256 of the bytes that were read
+    root: dict[str, Any]  # the values: dict, tuple, str, int, float, bool, or ``UNREADABLE`` where a finding was made
+    values: Mapping[KeyPath, Mark]  # place of each value; a block mapping or list stands at its key
+    keys: Mapping[KeyPath, Mark]  # place of each key
+    findings: tuple[Finding, ...]  # what the reader refused; the caller adds its own and raises all at once
+    unreadable: frozenset[KeyPath]  # key paths whose value was refused
     changes: Mapping[KeyPath, str] = field(default_factory=dict)
 
     def line(self, path: KeyPath) -> int:

@@ -29,16 +29,13 @@ class Network:
     """Circuits of a cell at one configuration, and what unit speed of each joint adds to the sum round each of them.
 
     Attributes:
-        graph: Links and joints.
-        circuits: One for each chord.
-        joints: Names of the driven joints of all robots in the stacked order, then of the virtual joints.
         matrix: Network matrix of unit screws, shape (rows per circuit * circuits, joints), expressed in P about the
             origin of P, linear part first.
     """
 
-    graph: CouplingGraph
-    circuits: tuple[Circuit, ...]
-    joints: tuple[str, ...]
+    graph: CouplingGraph  # links and joints
+    circuits: tuple[Circuit, ...]  # one for each chord
+    joints: tuple[str, ...]  # names of the driven joints of all robots in the stacked order, then of the virtual joints
     matrix: Array
 
     def columns(self, names: Collection[str]) -> list[int]:
@@ -55,15 +52,10 @@ class Network:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NetworkSpeeds:
-    """Speeds of all joints that keep every circuit closed.
+    """Speeds of all joints that keep every circuit closed."""
 
-    Attributes:
-        speeds: By joint name, in [rad/s] or [m/s]; the imposed ones as given.
-        freedom: How many of the sought speeds could still be chosen; 0 when the imposed ones decide all.
-    """
-
-    speeds: Mapping[str, float]
-    freedom: int
+    speeds: Mapping[str, float]  # by joint name, in [rad/s] or [m/s]; the imposed ones as given
+    freedom: int  # how many of the sought speeds could still be chosen; 0 when the imposed ones decide all
 
 
 def network(

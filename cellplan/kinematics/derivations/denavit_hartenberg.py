@@ -23,23 +23,14 @@ ROUNDING = 1e-12  # [m] a distance below this says nothing about a direction
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DHRow:
-    """One row of a Denavit-Hartenberg table, taken where the joint reads zero.
+    """One row of a Denavit-Hartenberg table, taken where the joint reads zero."""
 
-    Attributes:
-        is_revolute: Whether the joint's position adds to ``theta`` rather than to ``d``.
-        theta: Angle about z of the frame before, in [rad].
-        d: Offset along z of the frame before, in [m].
-        a: Length of the common normal, along the new x, in [m].
-        alpha: Twist about the new x, in [rad].
-        beta: Further twist about the new y in [rad]: zero but for axes that are nearly, not quite, parallel.
-    """
-
-    is_revolute: bool
-    theta: float
-    d: float
-    a: float
-    alpha: float
-    beta: float = 0.0
+    is_revolute: bool  # whether the joint's position adds to ``theta`` rather than to ``d``
+    theta: float  # angle about z of the frame before, in [rad]
+    d: float  # offset along z of the frame before, in [m]
+    a: float  # length of the common normal, along the new x, in [m]
+    alpha: float  # twist about the new x, in [rad]
+    beta: float = 0.0  # further twist about the new y in [rad]: zero but for axes that are nearly, not quite, parallel
 
     def pose(self, position: float) -> Array:
         r"""Frame i in frame i-1, ``Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha) Rot_y(beta)``, shape (4, 4).
@@ -58,21 +49,13 @@ class DHRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DHChain:
-    """Denavit-Hartenberg description of a robot from its base to its flange.
+    """Denavit-Hartenberg description of a robot from its base to its flange."""
 
-    Attributes:
-        X_BD: Frame 0, z along the first axis, in the robot's base.
-        rows: One row per axis on the way to the flange, followers included.
-        X_DF: Flange in the last frame: a turn about and a slide along their common z.
-        axes: The axes the rows were made from.
-        joints: Number of driven joints of the robot.
-    """
-
-    X_BD: Array
-    rows: tuple[DHRow, ...]
-    X_DF: Array
-    axes: tuple[ChainAxis, ...]
-    joints: int
+    X_BD: Array  # frame 0, z along the first axis, in the robot's base
+    rows: tuple[DHRow, ...]  # one row per axis on the way to the flange, followers included
+    X_DF: Array  # flange in the last frame: a turn about and a slide along their common z
+    axes: tuple[ChainAxis, ...]  # the axes the rows were made from
+    joints: int  # number of driven joints of the robot
 
     def frames(self, q: Array) -> Array:
         """Frames 0..n in B for driven joints ``q``, shape (n,); result has shape (axes + 1, 4, 4)."""

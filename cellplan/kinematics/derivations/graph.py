@@ -13,27 +13,16 @@ Signs = NDArray[np.int_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coupling:
-    """One joint as an edge that points from the link that carries it to the link it moves.
+    """One joint as an edge that points from the link that carries it to the link it moves."""
 
-    Attributes:
-        name: ``robot/joint``, or ``task:px`` for a virtual joint.
-        owner: Name of the robot or task.
-        tail: Link that carries the joint.
-        head: Link that the joint moves.
-        kind: Revolute or prismatic.
-        drive: Name of the joint whose speed moves it: its own, or that of a follower's leader.
-        ratio: Its speed per speed of the drive.
-        is_virtual: Whether it belongs to a virtual Assur chain.
-    """
-
-    name: str
-    owner: str
-    tail: str
-    head: str
-    kind: JointKind
-    drive: str
-    ratio: float = 1.0
-    is_virtual: bool = False
+    name: str  # ``robot/joint``, or ``task:px`` for a virtual joint
+    owner: str  # name of the robot or task
+    tail: str  # link that carries the joint
+    head: str  # link that the joint moves
+    kind: JointKind  # revolute or prismatic
+    drive: str  # name of the joint whose speed moves it: its own, or that of a follower's leader
+    ratio: float = 1.0  # its speed per speed of the drive
+    is_virtual: bool = False  # whether it belongs to a virtual Assur chain
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,11 +48,10 @@ class Circuit:
     """A closed way round, in the direction of its chord.
 
     Attributes:
-        chord: Index of the joint that closes it.
         passed: Joints in the order of the way, each with +1 where it is passed from tail to head, else -1.
     """
 
-    chord: int
+    chord: int  # index of the joint that closes it
     passed: tuple[tuple[int, int], ...]
 
 

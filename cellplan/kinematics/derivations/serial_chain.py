@@ -12,25 +12,15 @@ from cellplan.model.robot import JointKind, RobotModel
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ChainAxis:
-    """One axis on the way from base to flange; a driven joint has ratio 1 and offset 0.
+    """One axis on the way from base to flange; a driven joint has ratio 1 and offset 0."""
 
-    Attributes:
-        name: Name of the joint or follower.
-        kind: Revolute or prismatic.
-        axis_B: Unit direction at the reference configuration, shape (3,).
-        point_B: A point on the axis in [m], shape (3,).
-        leader: Index of the driven joint that moves it, in ``RobotModel.joints``.
-        ratio: Its motion per motion of that joint.
-        offset: Its position in [rad] or [m] when that joint reads zero.
-    """
-
-    name: str
-    kind: JointKind
-    axis_B: Array
-    point_B: Array
-    leader: int
-    ratio: float = 1.0
-    offset: float = 0.0
+    name: str  # name of the joint or follower
+    kind: JointKind  # revolute or prismatic
+    axis_B: Array  # unit direction at the reference configuration, shape (3,)
+    point_B: Array  # A point on the axis in [m], shape (3,)
+    leader: int  # index of the driven joint that moves it, in ``RobotModel.joints``
+    ratio: float = 1.0  # its motion per motion of that joint
+    offset: float = 0.0  # its position in [rad] or [m] when that joint reads zero
 
     @property
     def is_revolute(self) -> bool:

@@ -18,23 +18,14 @@ from cellplan.model.task import Frame
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Step:
-    """One axis on the walk, at the reference configuration, expressed in the part frame P.
+    """One axis on the walk, at the reference configuration, expressed in the part frame P."""
 
-    Attributes:
-        s_P: Unit direction, shape (3,): against the table's direction where the axis is passed from tip to base.
-        s0_P: A point on the axis in [m], shape (3,).
-        is_revolute: Whether it turns.
-        column: Place of the driving joint in the stacked joint vector.
-        share: Speed of the axis per speed of that joint.
-        position: Where the axis stands, in [rad] or [m].
-    """
-
-    s_P: Array
-    s0_P: Array
-    is_revolute: bool
-    column: int
-    share: float
-    position: float
+    s_P: Array  # unit direction, shape (3,): against the table's direction where the axis is passed from tip to base
+    s0_P: Array  # A point on the axis in [m], shape (3,)
+    is_revolute: bool  # whether it turns
+    column: int  # place of the driving joint in the stacked joint vector
+    share: float  # speed of the axis per speed of that joint
+    position: float  # where the axis stands, in [rad] or [m]
 
 
 def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Array]:

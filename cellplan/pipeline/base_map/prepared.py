@@ -76,17 +76,11 @@ class MapRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PreparedMap:
-    """A cell of which a map is made.
+    """A cell of which a map is made."""
 
-    Attributes:
-        cell: The cell as it is asked for.
-        asked: Its job and the places.
-        schedule: The tasks on the common clock.
-    """
-
-    cell: Cell
-    asked: MapJob
-    schedule: Schedule
+    cell: Cell  # the cell as it is asked for
+    asked: MapJob  # its job and the places
+    schedule: Schedule  # the tasks on the common clock
 
     def starts(self) -> tuple[Array, Indices]:
         """Start postures at all places, and the places; see ``starts_at``."""

@@ -28,11 +28,10 @@ class Tiles:
     """The places of a map that have a start within limits, in tiles whose places lie all over the map.
 
     Attributes:
-        known: What is known of every place before its motions.
         values: Values of each tile: ``places`` and ``starts``, those of a place in the order in which they are tried.
     """
 
-    known: Sequence[PlaceVerdict]
+    known: Sequence[PlaceVerdict]  # what is known of every place before its motions
     values: Sequence[Mapping[str, Any]]
 
     @classmethod

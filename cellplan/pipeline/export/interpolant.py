@@ -24,17 +24,11 @@ ROUNDS: Final = 50  # [-] passes over rows whose curve leaves a limit; each spee
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class HermiteRows:
-    """Rows with speeds, and the curve through them; it rests before the first and after the last row.
+    """Rows with speeds, and the curve through them; it rests before the first and after the last row."""
 
-    Attributes:
-        times: Times of the rows in [s], increasing, shape (N,), N at least 2.
-        q: Positions in [rad] or [m], shape (N, n).
-        qd: Speeds in [rad/s] or [m/s], shape (N, n).
-    """
-
-    times: Array
-    q: Array
-    qd: Array
+    times: Array  # times of the rows in [s], increasing, shape (N,), N at least 2
+    q: Array  # positions in [rad] or [m], shape (N, n)
+    qd: Array  # speeds in [rad/s] or [m/s], shape (N, n)
 
     def at(self, times: Array) -> Array:
         """Positions at times in [s], shape (M,), shape (M, n)."""

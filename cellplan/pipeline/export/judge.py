@@ -30,19 +30,12 @@ HELD_TOL: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Deviation:
-    """The largest distance of the written rows, as they are played, from those of the run.
+    """The largest distance of the written rows, as they are played, from those of the run."""
 
-    Attributes:
-        subject: A joint as ``robot/joint``, or what is said of a tool or further holder.
-        largest: In the unit.
-        unit: ``deg`` or ``mm``.
-        at_s: Its instant in the run in [s].
-    """
-
-    subject: str
-    largest: float
-    unit: str
-    at_s: float
+    subject: str  # A joint as ``robot/joint``, or what is said of a tool or further holder
+    largest: float  # in the unit
+    unit: str  # ``deg`` or ``mm``
+    at_s: float  # its instant in the run in [s]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,18 +43,14 @@ class Judgement:
     """What was found.
 
     Attributes:
-        findings: Demands that are not kept; a program with any is not written.
-        deviations: Of every joint, then of every tool and further holder on the part.
-        not_judged: What does not hold on the files alone, with the reason.
         corners: No tool is farther off by rounded rows than this; of every task, none where no row is rounded.
-        rounded: Rows of all robots that are rounded, and all rows of them.
     """
 
-    findings: tuple[str, ...]
-    deviations: tuple[Deviation, ...] = ()
-    not_judged: tuple[str, ...] = ()
+    findings: tuple[str, ...]  # demands that are not kept; a program with any is not written
+    deviations: tuple[Deviation, ...] = ()  # of every joint, then of every tool and further holder on the part
+    not_judged: tuple[str, ...] = ()  # what does not hold on the files alone, with the reason
     corners: tuple[Deviation, ...] = ()
-    rounded: tuple[int, int] = (0, 0)
+    rounded: tuple[int, int] = (0, 0)  # rows of all robots that are rounded, and all rows of them
 
     @property
     def passed(self) -> bool:

@@ -40,24 +40,17 @@ class PathRows:
     """Joint positions of a phase, straight between times.
 
     Attributes:
-        scene: The cell as it is in the phase.
-        schedule: Desired tool poses at the rows of the run.
-        times: Times in [s] on the phase's own time, shape (M,).
-        q: Positions of all robots there in [rad] or [m], shape (M, n), by robot.
-        is_row: Which of them are rows of the run, where what the cell demands of rows holds, shape (M,).
-        is_break: Which of them are needed, the joints being straight between these already, shape (M,).
-        off: How far each joint may be from the straight motion by itself in each step, shape (M - 1, nq).
         corners: How far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
             ``margins.corners_at``.
     """
 
-    scene: Scene
-    schedule: Schedule
-    times: Array
-    q: Mapping[str, Array]
-    is_row: Flags
-    is_break: Flags
-    off: Array
+    scene: Scene  # the cell as it is in the phase
+    schedule: Schedule  # desired tool poses at the rows of the run
+    times: Array  # times in [s] on the phase's own time, shape (M,)
+    q: Mapping[str, Array]  # positions of all robots there in [rad] or [m], shape (M, n), by robot
+    is_row: Flags  # which of them are rows of the run, where what the cell demands of rows holds, shape (M,)
+    is_break: Flags  # which of them are needed, the joints being straight between these already, shape (M,)
+    off: Array  # how far each joint may be from the straight motion by itself in each step, shape (M - 1, nq)
     corners: Array
 
     @property

@@ -37,35 +37,24 @@ class Stretch:
     """Rows between two neighbouring marks, within which every order of the robots is certified.
 
     Attributes:
-        phase: Name of the phase.
-        place: Number of the motion of the run that the phase repeats.
-        first: Row of the first mark.
-        last: Row of the second one.
         pairs: Robots that both move between them, of which all combinations of places are certified.
-        proved: Distance in [m] that the bodies of these keep in every order; inf without such bodies.
     """
 
-    phase: str
-    place: int
-    first: int
-    last: int
+    phase: str  # name of the phase
+    place: int  # number of the motion of the run that the phase repeats
+    first: int  # row of the first mark
+    last: int  # row of the second one
     pairs: tuple[Pair, ...] = ()
-    proved: float = np.inf
+    proved: float = np.inf  # distance in [m] that the bodies of these keep in every order; inf without such bodies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orders:
-    """The marks of a program.
+    """The marks of a program."""
 
-    Attributes:
-        program: Name of the program; None for the only one.
-        stretches: What lies between them, in order.
-        times: Times of the marks in [s] in the run.
-    """
-
-    program: str | None
-    stretches: tuple[Stretch, ...]
-    times: tuple[float, ...]
+    program: str | None  # name of the program; None for the only one
+    stretches: tuple[Stretch, ...]  # what lies between them, in order
+    times: tuple[float, ...]  # times of the marks in [s] in the run
 
     @property
     def marks(self) -> tuple[int, ...]:

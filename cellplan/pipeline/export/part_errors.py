@@ -17,23 +17,14 @@ LEFT_OVER: Final = 0.8  # [-] of what a cell allows between rows; the rest is fo
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolsOnPart:
-    """Tasks that are worked on and closures of a cell, as far as a set of robots takes part in them.
+    """Tasks that are worked on and closures of a cell, as far as a set of robots takes part in them."""
 
-    Attributes:
-        cell: The cell, as it is in a phase.
-        chains: Kinematics by robot.
-        relations: The tasks, and the grasps of further holders.
-        names: What each is called in messages.
-        movers: Names of the robots that move each.
-        allowed: Largest errors that the cell allows between rows, in [m] and [rad].
-    """
-
-    cell: Cell
-    chains: Mapping[str, ScrewChain]
-    relations: tuple[Relation, ...]
-    names: tuple[str, ...]
-    movers: tuple[frozenset[str], ...]
-    allowed: tuple[tuple[float, float], ...]
+    cell: Cell  # the cell, as it is in a phase
+    chains: Mapping[str, ScrewChain]  # kinematics by robot
+    relations: tuple[Relation, ...]  # the tasks, and the grasps of further holders
+    names: tuple[str, ...]  # what each is called in messages
+    movers: tuple[frozenset[str], ...]  # names of the robots that move each
+    allowed: tuple[tuple[float, float], ...]  # largest errors that the cell allows between rows, in [m] and [rad]
 
     @classmethod
     def of(

@@ -37,19 +37,12 @@ Kept = Callable[[float], bool]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _End:
-    """Where a phase ends and the next one begins.
-
-    Attributes:
-        program: The program.
-        scenes: Scene of each motion of the run.
-        before: The phase that ends.
-        after: The one that begins.
-    """
+    """Where a phase ends and the next one begins."""
 
     program: RunProgram
-    scenes: Sequence[Scene]
-    before: RunPhase
-    after: RunPhase
+    scenes: Sequence[Scene]  # scene of each motion of the run
+    before: RunPhase  # the phase that ends
+    after: RunPhase  # the one that begins
 
     @property
     def at(self) -> float:
@@ -181,21 +174,13 @@ def _relations(motion: VerifiedMotion, cell: Cell) -> Iterator[tuple[Relation, t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Tool:
-    """A tool that is on the part in a phase which ends, or begins, at an end of phases.
-
-    Attributes:
-        end: The end.
-        scene: Scene of that phase.
-        motion: Its motion.
-        relation: Its task or grasp.
-        is_before: Whether it is the phase that ends.
-    """
+    """A tool that is on the part in a phase which ends, or begins, at an end of phases."""
 
     end: _End
-    scene: Scene
+    scene: Scene  # scene of that phase
     motion: VerifiedMotion
-    relation: Relation
-    is_before: bool
+    relation: Relation  # its task or grasp
+    is_before: bool  # whether it is the phase that ends
 
     @property
     def carrier(self) -> str | None:

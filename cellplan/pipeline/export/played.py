@@ -20,19 +20,12 @@ MOST_PARTS: Final = 10  # [-] of a step of a cubic curve
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """One phase of a played program.
+    """One phase of a played program."""
 
-    Attributes:
-        place: Place of its motion among those of the run.
-        motion: What is demanded in it.
-        begin: Time in [s] of the played program at which it begins.
-        end: Time at which it ends.
-    """
-
-    place: int
-    motion: VerifiedMotion
-    begin: float
-    end: float
+    place: int  # place of its motion among those of the run
+    motion: VerifiedMotion  # what is demanded in it
+    begin: float  # time in [s] of the played program at which it begins
+    end: float  # time at which it ends
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,21 +33,15 @@ class Played:
     """One program as it is played: rows that were read, with those of the run for robots that are not exported.
 
     Attributes:
-        run: The verified run.
-        place: Place of the program among those of the run.
-        rows: Rows with times of all robots of the cell, by robot.
-        interpolation: How the target moves the joints of the robots that are exported.
-        exported: Names of these.
-        lead: Time in [s] by which the rows are later than those of the run.
         shares: Share of the shorter neighbouring segment within which each of their rows is rounded, shape (N,).
     """
 
     run: VerifiedRun
-    place: int
-    rows: Mapping[str, RobotRows]
-    interpolation: Interpolation
-    exported: tuple[str, ...]
-    lead: float
+    place: int  # place of the program among those of the run
+    rows: Mapping[str, RobotRows]  # rows with times of all robots of the cell, by robot
+    interpolation: Interpolation  # how the target moves the joints of the robots that are exported
+    exported: tuple[str, ...]  # names of these
+    lead: float  # time in [s] by which the rows are later than those of the run
     shares: Mapping[str, Array]
 
     @classmethod

@@ -32,26 +32,20 @@ class Prepared:
     """What a format is to write.
 
     Attributes:
-        dialect: The format.
-        job: Frame and rows, without notes.
-        promised: What is promised.
-        asked: The promise that was asked for; None where the best one was.
         skew: What the start skew may be; None where there is one controller only, or the promise does not depend on it.
         orders: Marks and what was certified between them, of each program; empty unless robots wait at marks.
         thinning: How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out.
-        lead: Time in [s] by which the rows are later than those of the run.
-        shared: What exports of the run share.
     """
 
-    dialect: Dialect
-    job: ExportJob
-    promised: Promised
-    asked: Promise | None
+    dialect: Dialect  # the format
+    job: ExportJob  # frame and rows, without notes
+    promised: Promised  # what is promised
+    asked: Promise | None  # the promise that was asked for; None where the best one was
     skew: RunSkew | None
     orders: tuple[Orders, ...]
     thinning: tuple[float, float] | None
-    lead: float
-    shared: Shared
+    lead: float  # time in [s] by which the rows are later than those of the run
+    shared: Shared  # what exports of the run share
 
 
 def prepare(

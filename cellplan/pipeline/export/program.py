@@ -35,12 +35,11 @@ class Exporter:
     Attributes:
         render: Text of every file of a run, by its path in the folder of the export.
         read: What a reader of its own finds in these files: the tables of each motion, by robot.
-        decimals: Of a second, degree or millimetre in these files.
     """
 
     render: Callable[[VerifiedRun], dict[str, str]]
     read: Callable[[VerifiedRun, Mapping[str, str]], tuple[dict[str, JointTable], ...]]
-    decimals: int
+    decimals: int  # of a second, degree or millimetre in these files
 
 
 TABLES: Final[dict[str, Exporter]] = {

@@ -24,17 +24,11 @@ ONE_CLOCK: Final = "timed for one controller; several controllers agree only to 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Promised:
-    """What is promised.
-
-    Attributes:
-        promise: The promise.
-        reasons: Why it is not a better one, one for each better one.
-        remarks: Under which conditions it holds.
-    """
+    """What is promised."""
 
     promise: Promise
-    reasons: tuple[str, ...] = ()
-    remarks: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()  # why it is not a better one, one for each better one
+    remarks: tuple[str, ...] = ()  # under which conditions it holds
 
 
 class _Against(NamedTuple):

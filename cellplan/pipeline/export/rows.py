@@ -16,45 +16,27 @@ from cellplan.pipeline.export.interpolant import resting, row_speeds
 
 
 class NominalRows(NamedTuple):
-    """A program of a run with the nominal time of its rows.
+    """A program of a run with the nominal time of its rows."""
 
-    Attributes:
-        name: Its name among several; None for the only one.
-        tables: Its rows by robot.
-        sigma: Nominal times of the rows in [s], shape (N,).
-        begins: Nominal times in [s] at which its phases begin, and the one at which the last ends.
-    """
-
-    name: str | None
-    tables: dict[str, JointTable]
-    sigma: Array
-    begins: tuple[float, ...]
+    name: str | None  # its name among several; None for the only one
+    tables: dict[str, JointTable]  # its rows by robot
+    sigma: Array  # nominal times of the rows in [s], shape (N,)
+    begins: tuple[float, ...]  # nominal times in [s] at which its phases begin, and the one at which the last ends
 
 
 class WorkRows(NamedTuple):
-    """Rows of a phase, in which tools and further holders keep their tolerances on the part.
+    """Rows of a phase, in which tools and further holders keep their tolerances on the part."""
 
-    Attributes:
-        rows: The rows, both ends included.
-        cell: The cell as it is in the phase.
-        tasks: Names of the tasks that are worked on.
-    """
-
-    rows: slice
-    cell: Cell
-    tasks: tuple[str, ...]
+    rows: slice  # the rows, both ends included
+    cell: Cell  # the cell as it is in the phase
+    tasks: tuple[str, ...]  # names of the tasks that are worked on
 
 
 class KeptRows(NamedTuple):
-    """What a thinned program keeps.
+    """What a thinned program keeps."""
 
-    Attributes:
-        rows: Ends, ends of phases, stops, and the ends of dwells.
-        work: The phases of the program.
-    """
-
-    rows: tuple[int, ...]
-    work: tuple[WorkRows, ...]
+    rows: tuple[int, ...]  # ends, ends of phases, stops, and the ends of dwells
+    work: tuple[WorkRows, ...]  # the phases of the program
 
 
 def full_rows(run: VerifiedRun, robots: Collection[str] | None = None) -> tuple[ProgramRows, ...]:

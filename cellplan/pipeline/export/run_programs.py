@@ -21,19 +21,12 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunPhase:
-    """A phase of a program.
-
-    Attributes:
-        name: Its name.
-        place: Number of the motion of the run that it repeats.
-        first: Its first row in the program.
-        last: Its last row, which the next phase may share.
-    """
+    """A phase of a program."""
 
     name: str
-    place: int
-    first: int
-    last: int
+    place: int  # number of the motion of the run that it repeats
+    first: int  # its first row in the program
+    last: int  # its last row, which the next phase may share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,17 +34,13 @@ class RunProgram:
     """A program of all robots of a cell.
 
     Attributes:
-        name: Name of the program; None for the only one.
-        times: Times of its rows in [s], from 0, shape (N,).
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        phases: Its phases in their order.
         process: Whether the tool of a task is in process, shape (N,), by task, both ends of a process included.
     """
 
-    name: str | None
-    times: Array
-    q: Array
-    phases: tuple[RunPhase, ...]
+    name: str | None  # name of the program; None for the only one
+    times: Array  # times of its rows in [s], from 0, shape (N,)
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    phases: tuple[RunPhase, ...]  # its phases in their order
     process: dict[str, Flags]
 
     def phase_at(self, row: int) -> RunPhase:

@@ -20,18 +20,14 @@ class ClockPair:
     """Two robots on different controllers.
 
     Attributes:
-        first: The one robot.
-        second: The other one.
         allowed: Largest skew in [s] of their clocks that keeps all that is demanded; ``MOST_SKEW`` for that or more.
-        stated: Largest difference in [s] that the cell states of them; None for nothing stated.
-        reason: What more would break.
     """
 
-    first: str
-    second: str
+    first: str  # the one robot
+    second: str  # the other one
     allowed: float
-    stated: float | None
-    reason: str
+    stated: float | None  # largest difference in [s] that the cell states of them; None for nothing stated
+    reason: str  # what more would break
 
     @property
     def is_kept(self) -> bool:
@@ -41,15 +37,10 @@ class ClockPair:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunSkew:
-    """Allowed skew of a run.
+    """Allowed skew of a run."""
 
-    Attributes:
-        pairs: All pairs of robots on different controllers.
-        cycle: Duration of the run in [s].
-    """
-
-    pairs: tuple[ClockPair, ...]
-    cycle: float
+    pairs: tuple[ClockPair, ...]  # all pairs of robots on different controllers
+    cycle: float  # duration of the run in [s]
 
     @property
     def least(self) -> ClockPair:

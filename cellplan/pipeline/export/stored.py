@@ -22,17 +22,11 @@ IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StoredExport:
-    """What a folder of programs holds.
-
-    Attributes:
-        folder: The folder.
-        record: What its ``export.json`` says.
-        files: Text of its programs by path.
-    """
+    """What a folder of programs holds."""
 
     folder: Path
-    record: Mapping[str, Any]
-    files: Mapping[str, str]
+    record: Mapping[str, Any]  # what its ``export.json`` says
+    files: Mapping[str, str]  # text of its programs by path
 
     @property
     def form(self) -> str:

@@ -29,18 +29,14 @@ class ThinningLimits:
     """How far thinned rows may be off the rows that they are chosen from.
 
     Attributes:
-        turn: Of a turning joint in [rad].
-        slide: Of a sliding joint in [m].
         tool: Of a tool on the part, or in the world for a task given there, in [m]; less where the cell allows less.
-        shortest_time: Shortest time in [s] between two rows, unless both must be kept; 0 for no limit.
-        shortest_distance: Shortest way in [m] of the tool that moves most between two rows, likewise.
     """
 
-    turn: float
-    slide: float
+    turn: float  # of a turning joint in [rad]
+    slide: float  # of a sliding joint in [m]
     tool: float
-    shortest_time: float = 0.0
-    shortest_distance: float = 0.0
+    shortest_time: float = 0.0  # shortest time in [s] between two rows, unless both must be kept; 0 for no limit
+    shortest_distance: float = 0.0  # shortest way in [m] of the tool that moves most between two rows, likewise
 
 
 def thinned(

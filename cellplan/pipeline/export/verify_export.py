@@ -27,15 +27,10 @@ NOT_COMPARED: Final = "the texts were not compared: another version of cellplan 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VerifiedExport:
-    """What was found of a folder of programs.
+    """What was found of a folder of programs."""
 
-    Attributes:
-        record: What its ``export.json`` says.
-        remarks: What to know before relying on it.
-    """
-
-    record: Mapping[str, Any]
-    remarks: tuple[str, ...]
+    record: Mapping[str, Any]  # what its ``export.json`` says
+    remarks: tuple[str, ...]  # what to know before relying on it
 
 
 def verify_export(stored: StoredExport, run: VerifiedRun, *, progress: Progress = silent) -> VerifiedExport:

@@ -24,17 +24,11 @@ RATIO_NOISE: Final = 1e-9  # [-] of a step that is the cycle of a controller
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Written:
-    """The files of an export.
+    """The files of an export."""
 
-    Attributes:
-        job: What was written, with its notes.
-        files: Text by path.
-        judgement: What was found in what was read back.
-    """
-
-    job: ExportJob
-    files: dict[str, str]
-    judgement: Judgement
+    job: ExportJob  # what was written, with its notes
+    files: dict[str, str]  # text by path
+    judgement: Judgement  # what was found in what was read back
 
 
 def write(run: VerifiedRun, prepared: Prepared, *, progress: Progress = silent) -> Written:

@@ -21,17 +21,11 @@ SEARCHED_KEYS: Final = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StoredCell:
-    """The cell of a run and how far its sources were compared.
+    """The cell of a run and how far its sources were compared."""
 
-    Attributes:
-        cell: The cell that was solved, every start posture filled in.
-        compared: Names of the inputs that are as they were.
-        remarks: What was not compared, or set when the cell was solved.
-    """
-
-    cell: Cell
-    compared: tuple[str, ...]
-    remarks: tuple[str, ...]
+    cell: Cell  # the cell that was solved, every start posture filled in
+    compared: tuple[str, ...]  # names of the inputs that are as they were
+    remarks: tuple[str, ...]  # what was not compared, or set when the cell was solved
 
 
 def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequence[Path]) -> StoredCell:

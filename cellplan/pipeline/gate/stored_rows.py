@@ -30,19 +30,15 @@ class StoredRows:
     """The rows of a program as they are on disk; of the run only times, nominal times and joint positions are used.
 
     Attributes:
-        stored: The run.
-        program: The phases that the cell demands, and the cell in each of them.
         clock: The plan on its clock, and the desired tool poses: all from the cell but for the nominal times of the
             rows of a retimed program, and the number of rows of transfer moves.
-        tables: The joint tables with all rows of the program, by robot.
-        motion: The same as one motion.
     """
 
     stored: StoredRun
-    program: DemandedProgram
+    program: DemandedProgram  # the phases that the cell demands, and the cell in each of them
     clock: ProgramClock
-    tables: dict[str, JointTable]
-    motion: Motion
+    tables: dict[str, JointTable]  # the joint tables with all rows of the program, by robot
+    motion: Motion  # the same as one motion
 
     def of_phase(self, place: int) -> dict[str, JointTable]:
         """The rows of one phase on its own time, by robot."""

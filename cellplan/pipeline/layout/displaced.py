@@ -30,23 +30,14 @@ from cellplan.study.trial import Outcome, TrialStatus, Variant
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisplacedLayout:
-    """A layout whose bases are displaced.
+    """A layout whose bases are displaced."""
 
-    Attributes:
-        request: What was searched for.
-        choice: Discrete choices of the layout, by address.
-        x: Its variables, n of them.
-        robots: The robot of each displacement, m of them.
-        components: Their components, see ``BaseDisplacements``.
-        factor: How many times as long as in the cell everything takes; None for as long as there.
-    """
-
-    request: LayoutRequest
-    choice: Mapping[str, object]
-    x: tuple[float, ...]
-    robots: tuple[int, ...]
-    components: tuple[int, ...]
-    factor: float | None
+    request: LayoutRequest  # what was searched for
+    choice: Mapping[str, object]  # discrete choices of the layout, by address
+    x: tuple[float, ...]  # its variables, n of them
+    robots: tuple[int, ...]  # the robot of each displacement, m of them
+    components: tuple[int, ...]  # their components, see ``BaseDisplacements``
+    factor: float | None  # how many times as long as in the cell everything takes; None for as long as there
 
     def cell(self, ready: Prepared, d: Array, start: Array) -> Cell:
         """The cell of the file with displacements of shape (m,), and with the start posture near a given one, (nq,).

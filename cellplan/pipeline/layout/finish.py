@@ -132,20 +132,15 @@ class Finish:
     """The finish of layouts of one cell.
 
     Attributes:
-        ready: The cell.
-        progress: Called with the stage and the fraction done.
-        workers: Processes that help where they are idle; or how many each study begins.
-        solves: How often a layout was solved in full so far.
         records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
-        choice: Discrete choices that the cell was made ready with.
     """
 
-    ready: Prepared
-    progress: Progress
-    workers: int | Executor = 1
-    solves: int = 0
+    ready: Prepared  # the cell
+    progress: Progress  # called with the stage and the fraction done
+    workers: int | Executor = 1  # processes that help where they are idle; or how many each study begins
+    solves: int = 0  # how often a layout was solved in full so far
     records: dict[int, MisplacementRecord] = field(default_factory=dict)
-    choice: Mapping[str, object] = field(default_factory=dict)
+    choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices that the cell was made ready with
     _problems: dict[tuple[Prepared, int, tuple[float, ...]], Any] = field(default_factory=dict)
 
     def use(self, choice: Mapping[str, object]) -> None:

@@ -20,17 +20,11 @@ REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some mi
 
 
 class Given(NamedTuple):
-    """What is shown of the given layout.
-
-    Attributes:
-        record: Its record.
-        drawing: Its floor plan.
-        reach: Reach of each arm, without its tool, in [m].
-    """
+    """What is shown of the given layout."""
 
     record: GivenRecord
-    drawing: dict[str, Any]
-    reach: dict[str, float]
+    drawing: dict[str, Any]  # its floor plan
+    reach: dict[str, float]  # reach of each arm, without its tool, in [m]
 
 
 def given_layout(request: LayoutRequest) -> Given:

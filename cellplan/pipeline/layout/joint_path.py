@@ -25,16 +25,13 @@ class PathSearch:
     """Joint paths of one search.
 
     Attributes:
-        own: What varies beside the path.
         unled: What varies where the motion is that by the pseudo-inverse, the start posture of the positioner with it.
-        schedule: The tasks on the common clock.
-        start: Start posture of the given layout in [rad] or [m], shape (nq,).
     """
 
-    own: Variables
+    own: Variables  # what varies beside the path
     unled: Variables
-    schedule: Schedule
-    start: Array
+    schedule: Schedule  # the tasks on the common clock
+    start: Array  # start posture of the given layout in [rad] or [m], shape (nq,)
 
     @property
     def asked(self) -> PathRange:

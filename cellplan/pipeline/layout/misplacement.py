@@ -62,28 +62,18 @@ Placed = tuple[Array, Array]  # displacement, shape (m,), and start posture, sha
 
 @dataclass(frozen=True, slots=True)
 class _Verdict:
-    """What ``solve`` says of a layout with displaced bases.
+    """What ``solve`` says of a layout with displaced bases."""
 
-    Attributes:
-        reason: Why it is rejected; empty where it passed.
-        load: How many times as long its limits ask it to last; 0 where it has no motion.
-        is_mendable: Whether only a margin or a distance is missed, so that the search may ask for more.
-    """
-
-    reason: str
-    load: float
-    is_mendable: bool
+    reason: str  # why it is rejected; empty where it passed
+    load: float  # how many times as long its limits ask it to last; 0 where it has no motion
+    is_mendable: bool  # whether only a margin or a distance is missed, so that the search may ask for more
 
 
 @dataclass(slots=True, kw_only=True)
 class MisplacedFinish(Finish):
-    """The finish of layouts that must keep all demands with all bases off their places.
+    """The finish of layouts that must keep all demands with all bases off their places."""
 
-    Attributes:
-        misplacement: By how much.
-    """
-
-    misplacement: Misplacement
+    misplacement: Misplacement  # by how much
     _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
 
     def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:

@@ -47,25 +47,18 @@ class Prepared:
     """A cell whose layout is searched.
 
     Attributes:
-        request: What is searched for.
-        cell: The cell, with what the request sets in it.
-        variables: What may change.
-        scene: The bodies of the cell.
-        bodies: Their distances, wherever the layout puts them.
-        schedule: The tasks on the common clock.
-        moving: Names of the robots that move.
         unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
             with; None where no path varies.
         found_start: The start posture of the given layout where it was found before all else, shape (nq,).
     """
 
-    request: LayoutRequest
-    cell: Cell
-    variables: Variables
-    scene: Scene
-    bodies: CellDistances
-    schedule: Schedule
-    moving: tuple[str, ...]
+    request: LayoutRequest  # what is searched for
+    cell: Cell  # the cell, with what the request sets in it
+    variables: Variables  # what may change
+    scene: Scene  # the bodies of the cell
+    bodies: CellDistances  # their distances, wherever the layout puts them
+    schedule: Schedule  # the tasks on the common clock
+    moving: tuple[str, ...]  # names of the robots that move
     unled: "Prepared | None" = None
     found_start: Array | None = None
 

@@ -33,16 +33,14 @@ class Proposals:
     """What each round tries; the same for the same finished rounds.
 
     Attributes:
-        request: What is searched for.
         choices: Combinations of discrete choices, values by address, the present one first; tried in turn.
         branches: Other start postures of the given layout, each with its variables: the keys ``x`` and ``start``.
-        rejected: Trials that are no candidates any more.
     """
 
-    request: LayoutRequest
+    request: LayoutRequest  # what is searched for
     choices: Sequence[Mapping[str, object]] = ({},)
     branches: Sequence[Mapping[str, Any]] = ()
-    rejected: frozenset[int] = frozenset()
+    rejected: frozenset[int] = frozenset()  # trials that are no candidates any more
 
     def __call__(self, finished: Sequence[Trial]) -> list[dict[str, Any]]:
         """Values of the trials of the next round."""

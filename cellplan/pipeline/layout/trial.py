@@ -39,13 +39,11 @@ class _Begin:
     """Where a trial begins.
 
     Attributes:
-        x: Variables, shape (n,).
-        start: Start posture in [rad] or [m], shape (nq,).
         unled: The same of the motion by the pseudo-inverse that a joint path comes from; None for all others.
     """
 
-    x: Array
-    start: Array
+    x: Array  # variables, shape (n,)
+    start: Array  # start posture in [rad] or [m], shape (nq,)
     unled: Begin | None = None
 
 

@@ -29,19 +29,12 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DemandedProgram:
-    """The program that a cell demands.
+    """The program that a cell demands."""
 
-    Attributes:
-        plan: Its phases, on no clock yet; those of all cycles.
-        cells: The cell as it is in each phase of the first cycle.
-        stages: The stages of one cycle of a program from home to home; empty for any other.
-        cycles: How often its phases follow one another.
-    """
-
-    plan: Plan
-    cells: tuple[Cell, ...]
-    stages: tuple[Stage, ...] = ()
-    cycles: int = 1
+    plan: Plan  # its phases, on no clock yet; those of all cycles
+    cells: tuple[Cell, ...]  # the cell as it is in each phase of the first cycle
+    stages: tuple[Stage, ...] = ()  # the stages of one cycle of a program from home to home; empty for any other
+    cycles: int = 1  # how often its phases follow one another
 
     @classmethod
     def of(cls, cell: Cell, *, only: str | None = None) -> "DemandedProgram":

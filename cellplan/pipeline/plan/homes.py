@@ -97,17 +97,11 @@ def depends_on_homes(cell: Cell, runs: Sequence[PlannedRun]) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _IdleRun:
-    """One run in which the robot is idle.
-
-    Attributes:
-        run: The run.
-        scene: Its scene, with those pairs only that the robot's configuration matters to.
-        q: Stacked joint positions in [rad] or [m], shape (N, nq), the homes that are known in place.
-    """
+    """One run in which the robot is idle."""
 
     run: PlannedRun
-    scene: Scene
-    q: Array
+    scene: Scene  # its scene, with those pairs only that the robot's configuration matters to
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq), the homes that are known in place
 
 
 class _Search:

@@ -32,15 +32,12 @@ class ProgramClock:
     described or certified there.
 
     Attributes:
-        plan: The plan, its phases on the nominal time of the whole program.
-        times: Times of all rows in [s], shape (N,).
-        sigma: Nominal time of each row in [s], shape (N,).
         schedules: Desired tool poses of each phase of the program, on the phase's own time, which starts at 0.
     """
 
-    plan: Plan
-    times: Array
-    sigma: Array
+    plan: Plan  # the plan, its phases on the nominal time of the whole program
+    times: Array  # times of all rows in [s], shape (N,)
+    sigma: Array  # nominal time of each row in [s], shape (N,)
     schedules: tuple[Schedule, ...]
 
     @classmethod

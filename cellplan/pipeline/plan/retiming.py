@@ -69,19 +69,12 @@ def retimed(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Retimed:
-    """The phases of a program that is retimed; transfer moves and dwells keep their rows.
+    """The phases of a program that is retimed; transfer moves and dwells keep their rows."""
 
-    Attributes:
-        scenes: The scene of each phase.
-        clock: The program as its time laws have it.
-        motions: Motion of each phase, likewise.
-        paths: The joints of each phase between its rows too; None where it keeps its rows.
-    """
-
-    scenes: Sequence[Scene]
-    clock: ProgramClock
-    motions: Sequence[Motion]
-    paths: Sequence[JointPath | None]
+    scenes: Sequence[Scene]  # the scene of each phase
+    clock: ProgramClock  # the program as its time laws have it
+    motions: Sequence[Motion]  # motion of each phase, likewise
+    paths: Sequence[JointPath | None]  # the joints of each phase between its rows too; None where it keeps its rows
 
     def nominal(self, cycles: Sequence[float | None], progress: Progress) -> list[Array]:
         """Nominal times of the rows of each phase in [s] from its begin, as fast as possible or in given times."""
@@ -148,20 +141,15 @@ class RowLimits:
     """The limits of a cell in rows of one phase, as the checks compute them.
 
     Attributes:
-        scene: The scene of the cell.
-        paths: Paths of the tasks that are worked on.
-        bounds: Limits of all joints.
-        step: Time between two rows in [s].
         path: The joints over the nominal time; needed for the speed of the tools in the world only.
-        errors: Errors of the tools between rows; None where they do not bound the speed.
     """
 
-    scene: Scene
-    paths: tuple[ClockedPath, ...]
-    bounds: JointBounds
-    step: float
+    scene: Scene  # the scene of the cell
+    paths: tuple[ClockedPath, ...]  # paths of the tasks that are worked on
+    bounds: JointBounds  # limits of all joints
+    step: float  # time between two rows in [s]
     path: JointPath | None = None
-    errors: StepErrors | None = None
+    errors: StepErrors | None = None  # errors of the tools between rows; None where they do not bound the speed
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""

@@ -22,19 +22,12 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedRun:
-    """The motion of one phase.
+    """The motion of one phase."""
 
-    Attributes:
-        phase: Tasks, moving robots and idle robots.
-        schedule: Where every tool must be.
-        motion: What all joints do.
-        scene: The scene in which it is judged where that is not the scene of the cell.
-    """
-
-    phase: Phase
-    schedule: Schedule
-    motion: Motion
-    scene: Scene | None = None
+    phase: Phase  # tasks, moving robots and idle robots
+    schedule: Schedule  # where every tool must be
+    motion: Motion  # what all joints do
+    scene: Scene | None = None  # the scene in which it is judged where that is not the scene of the cell
 
 
 def on_grid(motion: Motion, times: Array) -> Motion:

@@ -43,38 +43,23 @@ CLOSED: Final = 1e-9  # [rad] or [m] within which co-holders are back where they
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedStage:
-    """One stage of a program with its motion, nothing of it verified yet.
+    """One stage of a program with its motion, nothing of it verified yet."""
 
-    Attributes:
-        stage: The stage of the solved cell.
-        scene: The scene that it is judged in.
-        schedule: Desired tool poses; no task in transfer moves and dwells.
-        motion: What all joints do.
-        rungs: How the transfer move of each robot was found, by robot.
-    """
-
-    stage: Stage
-    scene: Scene
-    schedule: Schedule
-    motion: Motion
-    rungs: Mapping[str, str]
+    stage: Stage  # the stage of the solved cell
+    scene: Scene  # the scene that it is judged in
+    schedule: Schedule  # desired tool poses; no task in transfer moves and dwells
+    motion: Motion  # what all joints do
+    rungs: Mapping[str, str]  # how the transfer move of each robot was found, by robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedProgram:
-    """One cycle of a program from home to home.
+    """One cycle of a program from home to home."""
 
-    Attributes:
-        cell: The solved cell: starts, homes and the starts of all tasks filled in.
-        scenes: The scenes of its stages.
-        stages: The stages in their order, each beginning where the one before ends.
-        remarks: Notes on starts that were found, where no trial was without fault.
-    """
-
-    cell: Cell
+    cell: Cell  # the solved cell: starts, homes and the starts of all tasks filled in
     scenes: StageScenes
-    stages: tuple[PlannedStage, ...]
-    remarks: tuple[str, ...]
+    stages: tuple[PlannedStage, ...]  # the stages in their order, each beginning where the one before ends
+    remarks: tuple[str, ...]  # notes on starts that were found, where no trial was without fault
 
     @property
     def cycles(self) -> int:

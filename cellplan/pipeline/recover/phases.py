@@ -28,21 +28,13 @@ class RecoveryKind(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecoveryPhase:
-    """One phase of a recovery, from rest to rest.
+    """One phase of a recovery, from rest to rest."""
 
-    Attributes:
-        kind: What is done.
-        robots: Names of the robots that move.
-        words: The same for people.
-        q: Its rows in [rad] or [m], shape (N, nq); the first one is the last one of the phase before.
-        place: Place of the phase of the program that is played backwards; None for what is not.
-    """
-
-    kind: RecoveryKind
-    robots: tuple[str, ...]
-    words: str
-    q: Array
-    place: int | None = None
+    kind: RecoveryKind  # what is done
+    robots: tuple[str, ...]  # names of the robots that move
+    words: str  # the same for people
+    q: Array  # its rows in [rad] or [m], shape (N, nq); the first one is the last one of the phase before
+    place: int | None = None  # place of the phase of the program that is played backwards; None for what is not
 
 
 def scene_of(phase: RecoveryPhase, places: RunPlaces, state: StoppedState) -> Scene:

@@ -34,20 +34,15 @@ class RunPlaces:
     """The phases of a run and their scenes.
 
     Attributes:
-        cell: The cell, in which no cycle is to be closed any more.
-        motion: All rows of the program.
-        phases: Its phases with rows, those of all cycles.
-        stages: The stages of one cycle of a program from home to home; empty for any other.
-        scenes: What the scenes are made by.
         tipped: The same with a small ball at the tip of every tool that works on the part: not every tool has a body
             as far as there.
     """
 
-    cell: Cell
-    motion: Motion
-    phases: tuple[Phase, ...]
-    stages: tuple[Stage, ...]
-    scenes: StageScenes
+    cell: Cell  # the cell, in which no cycle is to be closed any more
+    motion: Motion  # all rows of the program
+    phases: tuple[Phase, ...]  # its phases with rows, those of all cycles
+    stages: tuple[Stage, ...]  # the stages of one cycle of a program from home to home; empty for any other
+    scenes: StageScenes  # what the scenes are made by
     tipped: StageScenes
 
     @classmethod

@@ -32,21 +32,13 @@ DIVERGED_RATIO: Final = 2.0  # [-] an error above this multiple of the first one
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pass:
-    """What stays the same from pass to pass.
+    """What stays the same from pass to pass."""
 
-    Attributes:
-        cell: The written cell, with its start postures.
-        schedule: Desired tool poses.
-        moving: Names of the robots that may move.
-        judged_from: First sample that is judged, by task.
-        q: Joint positions of the program as it was solved, shape (N, nq).
-    """
-
-    cell: Cell
-    schedule: Schedule
-    moving: tuple[str, ...]
-    judged_from: dict[str, int]
-    q: Array
+    cell: Cell  # the written cell, with its start postures
+    schedule: Schedule  # desired tool poses
+    moving: tuple[str, ...]  # names of the robots that may move
+    judged_from: dict[str, int]  # first sample that is judged, by task
+    q: Array  # joint positions of the program as it was solved, shape (N, nq)
 
     @property
     def operators(self) -> tuple[str, ...]:

@@ -22,14 +22,10 @@ class StartFault:
 
     The start posture of an operator follows from its own base, tool and branch and from where the part is: a change of
     other operators leaves it as it is.
-
-    Attributes:
-        robots: Robots of which a change may help.
-        text: What is missed.
     """
 
-    robots: frozenset[str]
-    text: str
+    robots: frozenset[str]  # robots of which a change may help
+    text: str  # what is missed
 
     def excludes(self, attempt: Attempt) -> bool:
         """Whether an attempt cannot help."""

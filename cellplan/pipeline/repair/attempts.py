@@ -50,21 +50,13 @@ CONTINUOUS: Final = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    """What may change at once, as plain data.
+    """What may change at once, as plain data."""
 
-    Attributes:
-        kind: What changes.
-        robots: Of which robots.
-        addresses: Numbers that may change, of those that the cell lets a layout search change.
-        vary: In place of them: entries as of ``layout.vary``.
-        values: In place of both: values by address.
-    """
-
-    kind: RemedyKind
-    robots: tuple[str, ...]
-    addresses: tuple[str, ...] = ()
-    vary: Mapping[str, Any] = field(default_factory=dict)
-    values: Mapping[str, Any] = field(default_factory=dict)
+    kind: RemedyKind  # what changes
+    robots: tuple[str, ...]  # of which robots
+    addresses: tuple[str, ...] = ()  # numbers that may change, of those that the cell lets a layout search change
+    vary: Mapping[str, Any] = field(default_factory=dict)  # in place of them: entries as of ``layout.vary``
+    values: Mapping[str, Any] = field(default_factory=dict)  # in place of both: values by address
 
     @property
     def record(self) -> dict[str, Any]:

@@ -34,21 +34,13 @@ MORE_TIME: Final = 0.002  # [-] likewise
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Confirmed:
-    """What came of a change when it was solved in full.
+    """What came of a change when it was solved in full."""
 
-    Attributes:
-        values: What changes, by address of the cell file.
-        cost: Size of the change.
-        solved: The last solution; None where there is none.
-        reason: Why it is no remedy; empty where it passed.
-        solves: How often it was solved.
-    """
-
-    values: Mapping[str, object]
-    cost: float
-    solved: Solved | None
-    reason: str
-    solves: int
+    values: Mapping[str, object]  # what changes, by address of the cell file
+    cost: float  # size of the change
+    solved: Solved | None  # the last solution; None where there is none
+    reason: str  # why it is no remedy; empty where it passed
+    solves: int  # how often it was solved
 
 
 def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:

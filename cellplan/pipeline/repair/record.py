@@ -22,19 +22,12 @@ DIGITS: Final = 6  # of a cost
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Case:
-    """A repair that is done.
+    """A repair that is done."""
 
-    Attributes:
-        ready: The cell with all that may change.
-        given: What came of it as it is given.
-        remedies: Attempts that passed, the smallest first.
-        failures: The others, in their order.
-    """
-
-    ready: Prepared
-    given: Outcome
-    remedies: Sequence[Tried]
-    failures: Sequence[Tried]
+    ready: Prepared  # the cell with all that may change
+    given: Outcome  # what came of it as it is given
+    remedies: Sequence[Tried]  # attempts that passed, the smallest first
+    failures: Sequence[Tried]  # the others, in their order
 
     @property
     def failed(self) -> list[dict[str, Any]]:

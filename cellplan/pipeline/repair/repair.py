@@ -98,20 +98,15 @@ class _Work:
     """The attempts of a repair.
 
     Attributes:
-        request: What is repaired.
-        workers: Number of processes.
-        progress: Called with the stage and the fraction done.
-        faults: What the given start posture misses already.
         given: What came of the cell as it is given.
-        tried: What came of the attempts.
     """
 
-    request: LayoutRequest
-    workers: int
-    progress: Progress
-    faults: Sequence[StartFault] = ()
+    request: LayoutRequest  # what is repaired
+    workers: int  # number of processes
+    progress: Progress  # called with the stage and the fraction done
+    faults: Sequence[StartFault] = ()  # what the given start posture misses already
     given: Outcome = field(default_factory=lambda: Outcome(status=TrialStatus.FAILED, figures={}))
-    tried: list[Tried] = field(default_factory=list)
+    tried: list[Tried] = field(default_factory=list)  # what came of the attempts
 
     def try_all(self, ready: Prepared, seems_sound: bool) -> None:
         """Make attempts until changes of the layout of some number of robots pass, and all others."""

@@ -22,15 +22,10 @@ MARGIN: Final = "joint_margin"  # a demanded margin among the checks
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solved:
-    """A solution measured against the demands of a repair.
-
-    Attributes:
-        solution: The solution.
-        margin: Demanded distance of every joint from its limits in [rad] or [m], shape (nq,).
-    """
+    """A solution measured against the demands of a repair."""
 
     solution: Solution
-    margin: Array
+    margin: Array  # demanded distance of every joint from its limits in [rad] or [m], shape (nq,)
 
     @property
     def checks(self) -> list[Check]:

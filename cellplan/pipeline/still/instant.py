@@ -17,27 +17,16 @@ MOST_NOTES: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Instant:
-    """The instant that decides a verdict.
+    """The instant that decides a verdict."""
 
-    Attributes:
-        at_s: Its time in [s].
-        check: The check that failed then; None where all passed.
-        minimum: The smallest clearance, where that is what decides.
-        bodies: Names of the bodies that matter.
-        robot: The robot that matters; None where bodies do.
-        joint: Its joint.
-        task: The task that matters.
-        use: The joint that is nearest to a limit, where neither a failure nor a clearance decides.
-    """
-
-    at_s: float
-    check: Check | None = None
-    minimum: ClearanceMinimum | None = None
-    bodies: tuple[str, ...] = ()
-    robot: str | None = None
+    at_s: float  # its time in [s]
+    check: Check | None = None  # the check that failed then; None where all passed
+    minimum: ClearanceMinimum | None = None  # the smallest clearance, where that is what decides
+    bodies: tuple[str, ...] = ()  # names of the bodies that matter
+    robot: str | None = None  # the robot that matters; None where bodies do
     joint: str | None = None
-    task: str | None = None
-    use: JointUse | None = None
+    task: str | None = None  # the task that matters
+    use: JointUse | None = None  # the joint that is nearest to a limit, where neither a failure nor a clearance decides
 
     @property
     def is_failure(self) -> bool:

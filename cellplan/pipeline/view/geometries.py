@@ -26,12 +26,11 @@ class Geometries:
     """The shapes of a page in the order in which they were first used.
 
     Attributes:
-        records: The shapes.
         visuals: What the file of each robot draws, by its name; read when it is first asked for.
         weights: Number of triangles that each mesh has in its file, by its key.
     """
 
-    records: list[GeometryRecord] = field(default_factory=list)
+    records: list[GeometryRecord] = field(default_factory=list)  # the shapes
     visuals: dict[str, tuple[Visual, ...]] = field(default_factory=dict)
     weights: dict[Hashable, int] = field(default_factory=dict)
     _places: dict[Hashable, int] = field(default_factory=dict)

@@ -33,21 +33,13 @@ class Stretch:
 
 
 class Closest(NamedTuple):
-    """The closest pair of a configuration.
+    """The closest pair of a configuration."""
 
-    Attributes:
-        row: Its place in ``Scene.pairs``.
-        distance: In [m]; zero or less where the bodies touch.
-        first: Point of the first body in the world in [m], shape (3,).
-        second: Point of the second body likewise.
-        is_bound: Whether the distance is that of hulls that hold more than the bodies.
-    """
-
-    row: int
-    distance: float
-    first: Array
-    second: Array
-    is_bound: bool
+    row: int  # its place in ``Scene.pairs``
+    distance: float  # in [m]; zero or less where the bodies touch
+    first: Array  # point of the first body in the world in [m], shape (3,)
+    second: Array  # point of the second body likewise
+    is_bound: bool  # whether the distance is that of hulls that hold more than the bodies
 
 
 def sampled_rows(times: Array, further: Iterable[float | None], steps: int = SAMPLES) -> Indices:
@@ -86,17 +78,11 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
 
 @dataclass(slots=True)
 class _ClosestSearch:
-    """The closest pairs of some configurations while they are searched.
-
-    Attributes:
-        scene: The scene.
-        poses: Poses of its bodies.
-        queries: Surface queries that may still be asked.
-    """
+    """The closest pairs of some configurations while they are searched."""
 
     scene: Scene
-    poses: BodyPoses
-    queries: int
+    poses: BodyPoses  # poses of its bodies
+    queries: int  # surface queries that may still be asked
 
     def closest(self, sample: int, near: NearPairs, places: Indices) -> Closest | None:
         """The closest of some near pairs, the nearest hulls first: surfaces are asked while hulls leave it open."""

@@ -44,27 +44,16 @@ SAME_TIME: Final = 1e-9  # [s] within which the end of a phase is the begin of t
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Played:
-    """A phase as it is played.
+    """A phase as it is played."""
 
-    Attributes:
-        name: Name of the phase.
-        place: Folder of its report in the run.
-        begin: When it begins on the clock of the program in [s].
-        number: Number among the phases of one cycle.
-        times: Times of its rows on the clock of the program in [s], shape (N,).
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        kept_times: Times on the clock of the program for which the report certifies a distance in [s], shape (M,).
-        kept: What all pairs keep about each of them in [mm], shape (M,); what is not finite is not known.
-    """
-
-    name: str
-    place: str
-    begin: float
-    number: int
-    times: Array
-    q: Array
-    kept_times: Array
-    kept: Array
+    name: str  # name of the phase
+    place: str  # folder of its report in the run
+    begin: float  # when it begins on the clock of the program in [s]
+    number: int  # number among the phases of one cycle
+    times: Array  # times of its rows on the clock of the program in [s], shape (N,)
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    kept_times: Array  # times on the clock of the program for which the report certifies a distance in [s], shape (M,)
+    kept: Array  # what all pairs keep about each of them in [mm], shape (M,); what is not finite is not known
 
 
 def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:

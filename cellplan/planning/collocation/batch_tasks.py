@@ -18,19 +18,12 @@ Desired = tuple[Array, Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ToolPoses:
-    """The tools as the tasks see them.
+    """The tools as the tasks see them."""
 
-    Attributes:
-        R_WR: Frames that the tasks are relative to, in W, shape (3, 3, tasks, batch).
-        R: Tool orientations in these frames, shape (3, 3, tasks, batch).
-        p: Tool tips in these frames in [m], shape (3, tasks, batch).
-        p_WT: Tool tips in W in [m], shape (3, tasks, batch).
-    """
-
-    R_WR: Array
-    R: Array
-    p: Array
-    p_WT: Array
+    R_WR: Array  # frames that the tasks are relative to, in W, shape (3, 3, tasks, batch)
+    R: Array  # tool orientations in these frames, shape (3, 3, tasks, batch)
+    p: Array  # tool tips in these frames in [m], shape (3, tasks, batch)
+    p_WT: Array  # tool tips in W in [m], shape (3, tasks, batch)
 
 
 class BatchTasks:

@@ -12,21 +12,13 @@ from cellplan.planning.collocation.windows import Panel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CollocatedPath:
-    """Motion of all joints, continuous over all panels.
+    """Motion of all joints, continuous over all panels."""
 
-    Attributes:
-        start: Stacked joint vector at the beginning, shape (nq,).
-        begin: First time in [s].
-        panels: Stretches of time, one after the other; none where collocation did not converge.
-        nodes: Stacked joint vectors at the nodes of each panel, shape (nq, degree + 1).
-        worst: Largest tool error at the nodes and between them, in [m] or [rad].
-    """
-
-    start: Array
-    begin: float
-    panels: Sequence[Panel]
-    nodes: Sequence[Array]
-    worst: float = 0.0
+    start: Array  # stacked joint vector at the beginning, shape (nq,)
+    begin: float  # first time in [s]
+    panels: Sequence[Panel]  # stretches of time, one after the other; none where collocation did not converge
+    nodes: Sequence[Array]  # stacked joint vectors at the nodes of each panel, shape (nq, degree + 1)
+    worst: float = 0.0  # largest tool error at the nodes and between them, in [m] or [rad]
 
     @property
     def end(self) -> float:

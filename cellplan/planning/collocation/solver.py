@@ -45,13 +45,11 @@ class Attempt:
     """What came of one window.
 
     Attributes:
-        q: Configurations at the nodes, shape (nq, cells, nodes).
-        is_settled: Whether the passes came to an end, shape (cells,).
         errors: Bound of the tool errors at the nodes and between them, [m] or [rad], by panel, shape (panels, cells).
     """
 
-    q: Array
-    is_settled: NDArray[np.bool_]
+    q: Array  # configurations at the nodes, shape (nq, cells, nodes)
+    is_settled: NDArray[np.bool_]  # whether the passes came to an end, shape (cells,)
     errors: Array
 
 
@@ -60,28 +58,21 @@ class Precision:
     """How exact a motion has to be, and how fine it may become.
 
     Attributes:
-        accuracy: Largest tool error at the nodes and between them, in [m] and [rad].
         configuration_tol: Distance of configurations from the limit of the passes, in [rad] and [m]; None for ten
             times the accuracy.
-        shortest: Length in [s] below which no panel is made by halving.
     """
 
-    accuracy: float
+    accuracy: float  # largest tool error at the nodes and between them, in [m] and [rad]
     configuration_tol: float | None = None
-    shortest: float = 0.0
+    shortest: float = 0.0  # length in [s] below which no panel is made by halving
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NullSpaceMotion:
-    """What decides about the redundancy besides the smallest velocities with constant weights.
+    """What decides about the redundancy besides the smallest velocities with constant weights."""
 
-    Attributes:
-        drift: Joint velocities that are added in the null space of the tasks; None for none.
-        redundancy: Goals and changing weights of a single cell; None for none.
-    """
-
-    drift: Drift | None = None
-    redundancy: Redundancy | None = None
+    drift: Drift | None = None  # joint velocities that are added in the null space of the tasks; None for none
+    redundancy: Redundancy | None = None  # goals and changing weights of a single cell; None for none
 
 
 class Collocation:

@@ -67,13 +67,9 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """Panels one after the other; where two meet, each has a node of its own, as the targets may have a corner there.
+    """Panels one after the other. Where two meet, both have a node there, as the targets may have a corner."""
 
-    Attributes:
-        panels: The panels in order.
-    """
-
-    panels: tuple[Panel, ...]
+    panels: tuple[Panel, ...]  # the panels in order
 
     @cached_property
     def places(self) -> list[slice]:

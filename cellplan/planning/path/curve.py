@@ -34,22 +34,16 @@ class PathCurve:
     """The curve of a tool tip in P: as its task states it, or projected onto the part.
 
     Attributes:
-        curve: The curve.
-        stops: Parameters at which the tool rests: the start, corners that are not rounded, the end.
-        given: Parameters of the points as they were listed, shape (N,); a closed path ends with its start.
-        is_closed: Whether the end is the start.
-        runs_on: Whether a closed curve passes its start without a corner.
         patch: The smooth patch of the part that the curve lies on; None on a mesh or where it is not projected.
-        inward: Inward normals of a mesh along the curve; None elsewhere.
     """
 
     curve: Curve
-    stops: Array
-    given: Array
-    is_closed: bool
-    runs_on: bool = False
+    stops: Array  # parameters at which the tool rests: the start, corners that are not rounded, the end
+    given: Array  # parameters of the points as they were listed, shape (N,); a closed path ends with its start
+    is_closed: bool  # whether the end is the start
+    runs_on: bool = False  # whether a closed curve passes its start without a corner
     patch: Patch | None = None
-    inward: BezierCurve | None = None
+    inward: BezierCurve | None = None  # inward normals of a mesh along the curve; None elsewhere
 
 
 def path_curve(task: Task) -> PathCurve:

@@ -21,19 +21,12 @@ TILT: Final = 0.4  # [-] tangent of the angle between the tool's axis and the di
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RetractLine:
-    """A straight retract of one robot.
+    """A straight retract of one robot."""
 
-    Attributes:
-        robot: Its name.
-        lengths: How far the tool has come at each configuration in [m], shape (M,), from 0.
-        q: The joints of the robot, shape (M, n).
-        words: The direction.
-    """
-
-    robot: str
-    lengths: Array
-    q: Array
-    words: str
+    robot: str  # its name
+    lengths: Array  # how far the tool has come at each configuration in [m], shape (M,), from 0
+    q: Array  # the joints of the robot, shape (M, n)
+    words: str  # the direction
 
     def up_to(self, length: float) -> "RetractLine":
         """Its beginning; all of it where it is shorter."""

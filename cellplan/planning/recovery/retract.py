@@ -26,15 +26,10 @@ SAMPLES: Final = 31  # configurations of robots that retract together
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RetractLeg:
-    """One straight retract of one robot, or of several together.
+    """One straight retract of one robot, or of several together."""
 
-    Attributes:
-        q: Stacked joint positions in [rad] or [m] along it, shape (M, nq).
-        lines: The line of each robot.
-    """
-
-    q: Array
-    lines: tuple[RetractLine, ...]
+    q: Array  # stacked joint positions in [rad] or [m] along it, shape (M, nq)
+    lines: tuple[RetractLine, ...]  # the line of each robot
 
     @property
     def length(self) -> float:

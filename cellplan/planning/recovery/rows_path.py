@@ -17,15 +17,10 @@ RAMP: Final = 0.1  # [s] least time in which the speed of a path that is known w
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RowsPath:
-    """Cubic pieces through rows, with slopes by central differences.
+    """Cubic pieces through rows, with slopes by central differences."""
 
-    Attributes:
-        sigma: Increasing path parameter of each row, shape (N,), N at least 2.
-        q: Joint positions in [rad] or [m], shape (N, nq).
-    """
-
-    sigma: Array
-    q: Array
+    sigma: Array  # increasing path parameter of each row, shape (N,), N at least 2
+    q: Array  # joint positions in [rad] or [m], shape (N, nq)
 
     def at(self, sigma: Array) -> Array:
         """Joint positions at path parameters, shape (M, nq)."""

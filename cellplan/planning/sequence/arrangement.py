@@ -19,11 +19,10 @@ class Block:
 
     Attributes:
         tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest after them all.
-        dwell: Time in [s] for which all robots stand still before the tasks begin.
     """
 
     tasks: tuple[str, ...]
-    dwell: float = 0.0
+    dwell: float = 0.0  # time in [s] for which all robots stand still before the tasks begin
 
 
 def arrange(cell: Cell) -> tuple[Block, ...]:

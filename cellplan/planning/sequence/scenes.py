@@ -17,13 +17,11 @@ class StageScenes:
     """The scenes that the stages of a program are judged in; each is built once.
 
     Attributes:
-        cell: The cell; its starts and homes do not matter.
-        held: Its scene with the part held, or fixed.
         lying: Those with the part lying somewhere, by its pose.
     """
 
-    cell: Cell
-    held: Scene
+    cell: Cell  # the cell; its starts and homes do not matter
+    held: Scene  # its scene with the part held, or fixed
     lying: dict[bytes, Scene] = field(default_factory=dict, repr=False)
 
     @classmethod

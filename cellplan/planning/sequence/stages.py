@@ -22,21 +22,13 @@ AT_REST: Final = frozenset({Mode.PART_AT_REST, Mode.SEMI_COORDINATED})
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stage:
-    """One phase of a program and the cell meanwhile.
+    """One phase of a program and the cell meanwhile."""
 
-    Attributes:
-        phase: The phase, not yet on a clock.
-        cell: The cell with the tasks of the phase only, the starts of their robots, and the part where it is.
-        place: Where the part lies; None while it is held, or fixed anyway.
-        move: The straight move that grips or puts down the part; None in all other stages.
-        dwell: Time in [s] for which all robots stand; None for a motion.
-    """
-
-    phase: Phase
-    cell: Cell
-    place: PartPlace | None = None
-    move: PartMove | None = None
-    dwell: float | None = None
+    phase: Phase  # the phase, not yet on a clock
+    cell: Cell  # the cell with the tasks of the phase only, the starts of their robots, and the part where it is
+    place: PartPlace | None = None  # where the part lies; None while it is held, or fixed anyway
+    move: PartMove | None = None  # the straight move that grips or puts down the part; None in all other stages
+    dwell: float | None = None  # time in [s] for which all robots stand; None for a motion
 
     @property
     def is_transfer(self) -> bool:

@@ -39,23 +39,14 @@ Branch = tuple[float, Array]  # what a configuration is worth, and the configura
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartSearch:
-    """What all parts of the search for a start use.
+    """What all parts of the search for a start use."""
 
-    Attributes:
-        cell: The cell in the order of names.
-        chains: Kinematic chain of each robot, by name.
-        paths: Path of every task on the common clock, by task name.
-        trials: The coarse clock on which motions are tried, and the bodies.
-        random: Random numbers of each robot, by name.
-        failures: Why configurations were dropped.
-    """
-
-    cell: Cell
-    chains: Mapping[str, ScrewChain]
-    paths: Mapping[str, ClockedPath]
-    trials: StartTrials
-    random: Mapping[str, np.random.Generator]
-    failures: Failures
+    cell: Cell  # the cell in the order of names
+    chains: Mapping[str, ScrewChain]  # kinematic chain of each robot, by name
+    paths: Mapping[str, ClockedPath]  # path of every task on the common clock, by task name
+    trials: StartTrials  # the coarse clock on which motions are tried, and the bodies
+    random: Mapping[str, np.random.Generator]  # random numbers of each robot, by name
+    failures: Failures  # why configurations were dropped
 
     @property
     def is_holder_open(self) -> bool:

@@ -22,21 +22,13 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Two bodies that touch.
+    """Two bodies that touch."""
 
-    Attributes:
-        robot: The robot whose configurations were evaluated.
-        bodies: The body of that robot first.
-        count: In how many of them they touch.
-        of: How many there were.
-        is_everywhere: Whether they also touch wherever else the robot may be.
-    """
-
-    robot: str
-    bodies: tuple[SceneBody, SceneBody]
-    count: int
-    of: int
-    is_everywhere: bool = False
+    robot: str  # the robot whose configurations were evaluated
+    bodies: tuple[SceneBody, SceneBody]  # the body of that robot first
+    count: int  # in how many of them they touch
+    of: int  # how many there were
+    is_everywhere: bool = False  # whether they also touch wherever else the robot may be
 
     @property
     def is_in_all(self) -> bool:

@@ -27,19 +27,16 @@ class Failures:
 
     Attributes:
         arrived: Configurations within the limits that reach a goal, each with that of the positioner.
-        missed: Goals that no configuration within the limits reaches.
-        misses: How many such goals there were.
         beyond: Configurations that reach a goal with a joint outside its limits.
         off: Smallest distance in [m] and [rad] of a given start from its task or grasp, as the part was held.
-        touching: Configurations of the whole cell in which something touches.
     """
 
     arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
-    missed: dict[str, list[Goal]] = field(default_factory=dict)
-    misses: dict[str, int] = field(default_factory=dict)
+    missed: dict[str, list[Goal]] = field(default_factory=dict)  # goals that no configuration within the limits reaches
+    misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
     beyond: dict[str, list[Array]] = field(default_factory=dict)
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
-    touching: list[Array] = field(default_factory=list)
+    touching: list[Array] = field(default_factory=list)  # configurations of the whole cell in which something touches
 
     def reached(self, robot: str, q: Array, holder_configuration: Array | None) -> None:
         """Keep configurations of a robot, shape (K, n), that reach its goal with the positioner at one of its own."""

@@ -29,17 +29,11 @@ COMBINATIONS_PER_HOLDER: Final = 3  # candidates taken from one configuration of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartChoice:
-    """A start of the whole cell, and how it was chosen.
+    """A start of the whole cell, and how it was chosen."""
 
-    Attributes:
-        start: Stacked start configuration in the order of the file, shape (nq,).
-        tried: How many were tried out; 0 when all were given.
-        trial: What is known of the motion from it; None when all were given.
-    """
-
-    start: Array
-    tried: int = 0
-    trial: Trial | None = None
+    start: Array  # stacked start configuration in the order of the file, shape (nq,)
+    tried: int = 0  # how many were tried out; 0 when all were given
+    trial: Trial | None = None  # what is known of the motion from it; None when all were given
 
     @property
     def words(self) -> str | None:

@@ -42,18 +42,14 @@ class Trial:
     """What is known of the motion from one start configuration of the whole cell.
 
     Attributes:
-        start: Stacked start configuration on the turns that leave its joints most room, shape (nq,).
-        ranges: Share of half its range that each joint leaves free at least, shape (nq,); negative beyond a limit.
         speeds: Share of its speed limit that each joint leaves free at least, shape (nq,); negative above the limit.
-        is_followed: Whether every tool keeps to its path.
-        touches: Whether something collides on the way.
     """
 
-    start: Array
-    ranges: Array
+    start: Array  # stacked start configuration on the turns that leave its joints most room, shape (nq,)
+    ranges: Array  # share of half its range that each joint leaves free at least, shape (nq,); negative beyond a limit
     speeds: Array
-    is_followed: bool = True
-    touches: bool = False
+    is_followed: bool = True  # whether every tool keeps to its path
+    touches: bool = False  # whether something collides on the way
 
     @property
     def shares(self) -> Array:

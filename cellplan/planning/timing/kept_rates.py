@@ -25,32 +25,20 @@ MARGIN: Final = 1e-9  # [-] of a number of steps: rounding
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptRate:
-    """A stretch of nominal time whose rate is demanded.
+    """A stretch of nominal time whose rate is demanded."""
 
-    Attributes:
-        begin: Its begin in [s].
-        end: Its end in [s].
-        tolerance: Share by which the rate may be lower; 1 for any.
-    """
-
-    begin: float
-    end: float
-    tolerance: float = 1.0
+    begin: float  # its begin in [s]
+    end: float  # its end in [s]
+    tolerance: float = 1.0  # share by which the rate may be lower; 1 for any
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtRest:
-    """All joints rest; time passes in the stretches that are demanded only, or in a single step.
+    """All joints rest; time passes in the stretches that are demanded only, or in a single step."""
 
-    Attributes:
-        begin: Nominal time in [s] at which the rest begins.
-        end: Nominal time in [s] at which it ends.
-        spans: Stretches of nominal time in [s] whose time is kept, shape (n, 2), in their order.
-    """
-
-    begin: float
-    end: float
-    spans: Array
+    begin: float  # nominal time in [s] at which the rest begins
+    end: float  # nominal time in [s] at which it ends
+    spans: Array  # stretches of nominal time in [s] whose time is kept, shape (n, 2), in their order
 
     @property
     def seconds(self) -> float:
@@ -76,19 +64,12 @@ class AtRest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtKeptRate:
-    """Motion of a stretch between two rests at one rate of the nominal time in all that is demanded.
-
-    Attributes:
-        piece: The stretch.
-        spans: Stretches of nominal time in [s] within it, shape (n, 2), in their order, that do not overlap.
-        rate: Rate of the nominal time in these.
-        step: Time between two rows in [s].
-    """
+    """Motion of a stretch between two rests at one rate of the nominal time in all that is demanded."""
 
     piece: Stretch
-    spans: Array
-    rate: float
-    step: float
+    spans: Array  # stretches of nominal time in [s] within it, shape (n, 2), in their order, that do not overlap
+    rate: float  # rate of the nominal time in these
+    step: float  # time between two rows in [s]
 
     @property
     def kept_seconds(self) -> float:

@@ -24,21 +24,13 @@ HALVINGS: Final = 60  # of an interval: down to the last digit
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
-    """A stretch of a path between two rests of all joints.
+    """A stretch of a path between two rests of all joints."""
 
-    Attributes:
-        path: The whole path.
-        scale: Seconds that each joint takes for a unit of its position at its top speed, shape (nq,).
-        sigma: Nominal times in [s] from its beginning to its end, shape (M,).
-        lengths: Length of path behind each of them in [s], from 0, increasing, shape (M,).
-        rates: Derivative of the length by the nominal time there, shape (M,).
-    """
-
-    path: JointPath
-    scale: Array
-    sigma: Array
-    lengths: Array
-    rates: Array
+    path: JointPath  # the whole path
+    scale: Array  # seconds that each joint takes for a unit of its position at its top speed, shape (nq,)
+    sigma: Array  # nominal times in [s] from its beginning to its end, shape (M,)
+    lengths: Array  # length of path behind each of them in [s], from 0, increasing, shape (M,)
+    rates: Array  # derivative of the length by the nominal time there, shape (M,)
 
     @property
     def length(self) -> float:

@@ -75,21 +75,18 @@ class Retimer:
     """What a joint path is retimed by.
 
     Attributes:
-        bounds: Limits of all joints.
-        step: Time between two rows in [s].
         feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
             in [s], shape (N,) to shape (N,).
         slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
-        kept: Where the rate of the nominal time is demanded.
         errors: Errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit.
             Where they cannot be kept by a slower motion they are left to the checks.
     """
 
-    bounds: JointBounds
-    step: float
+    bounds: JointBounds  # limits of all joints
+    step: float  # time between two rows in [s]
     feed_share: Callable[[Array], Array]
     slower: Slower
-    kept: tuple[KeptRate, ...] = ()
+    kept: tuple[KeptRate, ...] = ()  # where the rate of the nominal time is demanded
     errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:

@@ -67,17 +67,11 @@ class RestToRest:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RetimedPath:
-    """Motion along a whole path; every rest of all joints is a row.
+    """Motion along a whole path; every rest of all joints is a row."""
 
-    Attributes:
-        motions: The motion of each stretch.
-        counts: Steps that each of them takes.
-        end: Last nominal time in [s].
-    """
-
-    motions: tuple[Rows, ...]
-    counts: tuple[int, ...]
-    end: float
+    motions: tuple[Rows, ...]  # the motion of each stretch
+    counts: tuple[int, ...]  # steps that each of them takes
+    end: float  # last nominal time in [s]
 
     @property
     def steps(self) -> int:

@@ -23,17 +23,11 @@ ROUNDING: Final = 1e-13  # [-] of a bound on the acceleration
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpeedProfile:
-    """Motion along a path, with constant acceleration of the path between neighbouring lengths.
+    """Motion along a path, with constant acceleration of the path between neighbouring lengths."""
 
-    Attributes:
-        lengths: Lengths of path, increasing from 0, shape (N,).
-        speeds: Speed of the path there, shape (N,), 0 at both ends.
-        times: Times in [s] at which they are passed, shape (N,), from 0.
-    """
-
-    lengths: Array
-    speeds: Array
-    times: Array
+    lengths: Array  # lengths of path, increasing from 0, shape (N,)
+    speeds: Array  # speed of the path there, shape (N,), 0 at both ends
+    times: Array  # times in [s] at which they are passed, shape (N,), from 0
 
     @property
     def duration(self) -> float:

@@ -13,19 +13,12 @@ from cellplan.model.motion import Schedule
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GivenPath:
-    """The joints of one robot over time, which the other robots only follow.
+    """The joints of one robot over time, which the other robots only follow."""
 
-    Attributes:
-        columns: Place of its joints in the stacked joint vector.
-        joint_count: Length of that vector.
-        spline: The joints over the share of the clock.
-        end: Nominal time in [s] at which the clock ends.
-    """
-
-    columns: slice
-    joint_count: int
-    spline: JointSpline
-    end: float
+    columns: slice  # place of its joints in the stacked joint vector
+    joint_count: int  # length of that vector
+    spline: JointSpline  # the joints over the share of the clock
+    end: float  # nominal time in [s] at which the clock ends
 
     @classmethod
     def of(cls, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> "GivenPath | None":
@@ -61,15 +54,10 @@ class GivenPath:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GivenRows:
-    """A given path at the samples of a clock; no joints where there is none.
+    """A given path at the samples of a clock; no joints where there is none."""
 
-    Attributes:
-        columns: Place of its joints in the stacked joint vector.
-        q: Their positions, shape (N, n).
-    """
-
-    columns: slice
-    q: Array
+    columns: slice  # place of its joints in the stacked joint vector
+    q: Array  # their positions, shape (N, n)
 
     @classmethod
     def of(cls, cell: Cell, schedule: Schedule, moving: Sequence[str]) -> "GivenRows":

@@ -12,19 +12,12 @@ from cellplan.model.motion import Schedule
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionTask:
-    """The coupled motion of one phase: the tasks that are worked on together and the robots that move for them.
+    """The coupled motion of one phase: the tasks that are worked on together and the robots that move for them."""
 
-    Attributes:
-        cell: The cell; its solver names method and integrator.
-        schedule: The tasks on the clock.
-        moving: Names of the robots that carry the part or work on it; all others stand still.
-        start: Stacked configuration at the first sample, shape (nq,), in [rad] or [m].
-    """
-
-    cell: Cell
-    schedule: Schedule
-    moving: Sequence[str]
-    start: Array
+    cell: Cell  # the cell; its solver names method and integrator
+    schedule: Schedule  # the tasks on the clock
+    moving: Sequence[str]  # names of the robots that carry the part or work on it; all others stand still
+    start: Array  # stacked configuration at the first sample, shape (nq,), in [rad] or [m]
 
     @property
     def grasps(self) -> tuple[Grasp, ...]:

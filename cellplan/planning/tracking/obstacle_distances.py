@@ -21,18 +21,14 @@ class ClosestPair:
     """Two bodies that are near each other.
 
     Attributes:
-        row: Index into ``Scene.pairs``.
         distance: In [m]; negative where their convex hulls overlap by so much. Reports state 0 for bodies in contact.
-        point_a: Nearest point of the pair's first body in the world, shape (3,), in [m].
-        point_b: Nearest point of its second body.
-        gradient: Change of the distance per joint, shape (nq,), in [m/rad] or [m/m].
     """
 
-    row: int
+    row: int  # index into ``Scene.pairs``
     distance: float
-    point_a: Array
-    point_b: Array
-    gradient: Array
+    point_a: Array  # nearest point of the pair's first body in the world, shape (3,), in [m]
+    point_b: Array  # nearest point of its second body
+    gradient: Array  # change of the distance per joint, shape (nq,), in [m/rad] or [m/m]
 
 
 class ClosestPairs:

@@ -32,19 +32,14 @@ class FirstOrder:
     """All tasks at one sample and configuration, to first order; only the components that they constrain.
 
     Attributes:
-        J: Rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move.
-        twist: Reference tool twists relative to the part, shape (m,).
-        error: Pose errors, desired minus actual, shape (m,).
-        weights: Joint weights, the diagonal of W, shape (nq,).
-        secondary: Joint speeds that the secondary goals ask for, shape (nq,); None when there are none.
         bounds: Lowest and highest joint speeds that goals may lead to, shape (nq,) each; None when there are no goals.
     """
 
-    J: Array
-    twist: Array
-    error: Array
-    weights: Array
-    secondary: Array | None
+    J: Array  # rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move
+    twist: Array  # reference tool twists relative to the part, shape (m,)
+    error: Array  # pose errors, desired minus actual, shape (m,)
+    weights: Array  # joint weights, the diagonal of W, shape (nq,)
+    secondary: Array | None  # joint speeds that the secondary goals ask for, shape (nq,); None when there are none
     bounds: tuple[Array, Array] | None = None
 
     def bounded(self, null_space_projection: Array, *, beside: Array) -> Array:
@@ -64,17 +59,11 @@ class FirstOrder:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Advance:
-    """One step of a resolution method.
+    """One step of a resolution method."""
 
-    Attributes:
-        q: Stacked joint vector at the next sample, shape (nq,).
-        iterations: Number of evaluations of the tasks.
-        slack: Norm of the twist that was given up (task slack), in mixed units of m/s and rad/s.
-    """
-
-    q: Array
-    iterations: int = 1
-    slack: float = 0.0
+    q: Array  # stacked joint vector at the next sample, shape (nq,)
+    iterations: int = 1  # number of evaluations of the tasks
+    slack: float = 0.0  # norm of the twist that was given up (task slack), in mixed units of m/s and rad/s
 
 
 class TrackingProblem:

@@ -39,37 +39,23 @@ class Stance:
     """The cell at one sample and configuration, or at several, as goals evaluate it.
 
     Of several, all arrays but ``signs`` have them as first axis.
-
-    Attributes:
-        q: Stacked joint vector, shape (nq,), in [rad] or [m].
-        state: Kinematics there.
-        screws_W: Gives the screws of all axes as ``LinkState`` has them, shape (6, axes).
-        J: Task rows, shape (m, nq).
-        picks: Rows that pick what each task constrains, shape (m_i, 6) each.
-        signs: Sign of each joint in each task, 0 for joints that may not move, shape (tasks, nq).
-        mobility: Diagonal of ``W^-1``, 0 for joints that take no part in any task now, shape (nq,).
     """
 
-    q: Array
-    state: CellState
-    screws_W: Callable[[], Array]
-    J: Array
-    picks: Sequence[Array]
-    signs: Array
-    mobility: Array
+    q: Array  # stacked joint vector, shape (nq,), in [rad] or [m]
+    state: CellState  # kinematics there
+    screws_W: Callable[[], Array]  # gives the screws of all axes as ``LinkState`` has them, shape (6, axes)
+    J: Array  # task rows, shape (m, nq)
+    picks: Sequence[Array]  # rows that pick what each task constrains, shape (m_i, 6) each
+    signs: Array  # sign of each joint in each task, 0 for joints that may not move, shape (tasks, nq)
+    mobility: Array  # diagonal of ``W^-1``, 0 for joints that take no part in any task now, shape (nq,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slope:
-    """A goal to second order, at one configuration or at several, which are the first axis then.
+    """A goal to second order, at one configuration or at several, which are the first axis then."""
 
-    Attributes:
-        gradient: Gradient of w, shape (nq,).
-        curvature: About the largest curvature of ``-w``, in the metric of W, shape ().
-    """
-
-    gradient: Array
-    curvature: Array
+    gradient: Array  # gradient of w, shape (nq,)
+    curvature: Array  # about the largest curvature of ``-w``, in the metric of W, shape ()
 
 
 Pull = Callable[[Stance], Slope]

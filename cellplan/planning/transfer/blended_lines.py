@@ -26,19 +26,12 @@ SAME_TIME: Final = 1e-9  # [s] breaks that differ by less are one
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BlendedLine:
-    """Motion of one robot.
+    """Motion of one robot."""
 
-    Attributes:
-        columns: Its columns in the stacked joint vector.
-        times: Nominal times of its via points in [s], increasing, shape (K,), K at least 2.
-        q: The via points in [rad] or [m], shape (K, n).
-        halves: Half of the time over which the speed changes at each, in [s], shape (K,).
-    """
-
-    columns: slice
-    times: Array
-    q: Array
-    halves: Array
+    columns: slice  # its columns in the stacked joint vector
+    times: Array  # nominal times of its via points in [s], increasing, shape (K,), K at least 2
+    q: Array  # the via points in [rad] or [m], shape (K, n)
+    halves: Array  # half of the time over which the speed changes at each, in [s], shape (K,)
 
     @classmethod
     def through(cls, columns: slice, times: Array, q: Array, *, shares: Array | float = 1.0) -> "BlendedLine":

@@ -28,15 +28,10 @@ MOST_FAILED: Final = 6  # searches by trees that fail before no further one is b
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RobotMove:
-    """Move of one robot while the others stand.
+    """Move of one robot while the others stand."""
 
-    Attributes:
-        robot: Its name.
-        line: Its way, smooth.
-    """
-
-    robot: str
-    line: BlendedLine
+    robot: str  # its name
+    line: BlendedLine  # its way, smooth
 
     @property
     def is_straight(self) -> bool:

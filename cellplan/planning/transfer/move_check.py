@@ -30,15 +30,10 @@ LEAST_RESERVE: Final = 1e-6  # [m] where a pair is hardly farther apart than dem
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Others:
-    """Everything but the robot that moves, at one moment or at many.
+    """Everything but the robot that moves, at one moment or at many."""
 
-    Attributes:
-        poses: Where the engine's bodies are at each moment.
-        travel: How far a point of each body has come at most by each moment in [m], shape (B, moments).
-    """
-
-    poses: BodyPoses
-    travel: Array
+    poses: BodyPoses  # where the engine's bodies are at each moment
+    travel: Array  # how far a point of each body has come at most by each moment in [m], shape (B, moments)
 
     @classmethod
     def moving(cls, scene: Scene, q: Array) -> "Others":
@@ -232,15 +227,10 @@ class MoveCheck:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Samples:
-    """Some bodies at some samples.
+    """Some bodies at some samples."""
 
-    Attributes:
-        poses: Rotations, shape (K, 3, 3), and positions in [m], shape (K, 3), by the body.
-        centres: Centres of their bounding spheres in the world in [m], shape (B, K, 3).
-    """
-
-    poses: dict[int, tuple[Array, Array]]
-    centres: Array
+    poses: dict[int, tuple[Array, Array]]  # rotations, shape (K, 3, 3), and positions in [m], shape (K, 3), by the body
+    centres: Array  # centres of their bounding spheres in the world in [m], shape (B, K, 3)
 
 
 def lever_matrix(scene: Scene, robot: str, pairs: Indices) -> Array:

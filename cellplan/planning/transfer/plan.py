@@ -33,17 +33,11 @@ STRAIGHT_ROWS: Final = 33  # rows of a straight move that is certified before it
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlannedTransfer:
-    """A transfer move in the rows of the tables, at rest at both ends, certified between its rows too.
+    """A transfer move in the rows of the tables, at rest at both ends, certified between its rows too."""
 
-    Attributes:
-        times: Times of the rows in [s], from 0, shape (N,).
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        rungs: How it was found, by the name of each robot that moves.
-    """
-
-    times: Array
-    q: Array
-    rungs: Mapping[str, Rung]
+    times: Array  # times of the rows in [s], from 0, shape (N,)
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    rungs: Mapping[str, Rung]  # how it was found, by the name of each robot that moves
 
 
 def plan_transfer(

@@ -16,21 +16,13 @@ ENDLESS: Final = np.pi  # [rad] by which a joint without limits may go beyond it
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TransferQuery:
-    """What is asked for.
+    """What is asked for."""
 
-    Attributes:
-        scene: The scene of the phase.
-        start: Stacked joint positions in [rad] or [m], shape (nq,).
-        goal: Likewise.
-        movers: Names of the robots that move, in the order of the cell.
-        seed: Seed of what is drawn.
-    """
-
-    scene: Scene
-    start: Array
-    goal: Array
-    movers: tuple[str, ...]
-    seed: int
+    scene: Scene  # the scene of the phase
+    start: Array  # stacked joint positions in [rad] or [m], shape (nq,)
+    goal: Array  # likewise
+    movers: tuple[str, ...]  # names of the robots that move, in the order of the cell
+    seed: int  # seed of what is drawn
 
     @classmethod
     def of(cls, scene: Scene, start: Array, goal: Array, *, seed: int) -> "TransferQuery":

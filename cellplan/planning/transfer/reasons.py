@@ -20,20 +20,16 @@ class Tried:
     """What one way of planning tried in vain.
 
     Attributes:
-        orders: Orders of the robots.
-        searches: Searches by trees that failed.
-        drawn: Configurations drawn in them.
         reached: Configurations reached from start and goal in the last search of each robot that failed.
         refused: How often each pair of bodies was too near, by their names.
-        uncertified: Moves that were found but are not certified between their rows.
     """
 
-    orders: int = 0
-    searches: int = 0
-    drawn: int = 0
+    orders: int = 0  # orders of the robots
+    searches: int = 0  # searches by trees that failed
+    drawn: int = 0  # configurations drawn in them
     reached: dict[str, tuple[int, int]] = field(default_factory=dict)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
-    uncertified: int = 0
+    uncertified: int = 0  # moves that were found but are not certified between their rows
 
     def failed(self, robot: str, drawn: int, reached: tuple[int, int]) -> None:
         """Count a search that found no way."""

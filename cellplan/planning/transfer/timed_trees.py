@@ -25,19 +25,12 @@ ROUNDING: Final = 1e-9  # [s]
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class TimedTree:
-    """Configurations at ticks, each with the one it was reached from.
+    """Configurations at ticks, each with the one it was reached from."""
 
-    Attributes:
-        sign: 1 for the tree that grows forwards in time, -1 for the other one.
-        x: Configurations divided by top speeds in [s], shape (n,) each; the root first.
-        ticks: Their ticks.
-        parents: Index of the node each was reached from.
-    """
-
-    sign: int
-    x: list[Array]
-    ticks: list[int]
-    parents: list[int] = field(default_factory=lambda: [0])
+    sign: int  # 1 for the tree that grows forwards in time, -1 for the other one
+    x: list[Array]  # configurations divided by top speeds in [s], shape (n,) each; the root first
+    ticks: list[int]  # their ticks
+    parents: list[int] = field(default_factory=lambda: [0])  # index of the node each was reached from
 
     def nearest(self, x: Array, tick: int) -> int | None:
         """Index of the nearest node from which a configuration can be reached in time; None without any."""
@@ -66,15 +59,10 @@ class TimedTree:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedWay:
-    """A way in joint space and time.
+    """A way in joint space and time."""
 
-    Attributes:
-        ticks: Ticks of the via points, increasing, shape (K,).
-        q: The via points in [rad] or [m], shape (K, n).
-    """
-
-    ticks: Indices
-    q: Array
+    ticks: Indices  # ticks of the via points, increasing, shape (K,)
+    q: Array  # the via points in [rad] or [m], shape (K, n)
 
 
 def is_free_in_time(check: MoveCheck, first: tuple[Array, int], second: tuple[Array, int]) -> bool:

@@ -21,16 +21,11 @@ SAME: Final = 1e-9  # [s] nodes that are nearer to each other are one
 
 @dataclass(slots=True, eq=False)
 class Tree:
-    """Configurations in seconds, each with the one it was reached from.
+    """Configurations in seconds, each with the one it was reached from."""
 
-    Attributes:
-        nodes: Configurations divided by top speeds, shape (n,) each; the root first.
-        parents: Index of the node each one was reached from.
-    """
-
-    nodes: Array
+    nodes: Array  # configurations divided by top speeds, shape (n,) each; the root first
     count: int = 1
-    parents: list[int] = field(default_factory=lambda: [0])
+    parents: list[int] = field(default_factory=lambda: [0])  # index of the node each one was reached from
 
     @classmethod
     def at(cls, root: Array, *, room: int) -> "Tree":
@@ -64,15 +59,10 @@ class Tree:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Found:
-    """What a search came to.
+    """What a search came to."""
 
-    Attributes:
-        way: Via points in [rad] or [m] from start to goal, shape (K, n); None where none was found.
-        reached: Configurations reached from the start and from the goal.
-    """
-
-    way: Array | None
-    reached: tuple[int, int]
+    way: Array | None  # via points in [rad] or [m] from start to goal, shape (K, n); None where none was found
+    reached: tuple[int, int]  # configurations reached from the start and from the goal
 
 
 def connected(
@@ -114,17 +104,11 @@ def connected(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class JointBox:
-    """Configurations that a robot may be in.
+    """Configurations that a robot may be in."""
 
-    Attributes:
-        lower: Lower limits in [rad] or [m], finite, shape (n,).
-        upper: Likewise.
-        velocity: Top speeds in [rad/s] or [m/s], shape (n,).
-    """
-
-    lower: Array
-    upper: Array
-    velocity: Array
+    lower: Array  # lower limits in [rad] or [m], finite, shape (n,)
+    upper: Array  # likewise
+    velocity: Array  # top speeds in [rad/s] or [m/s], shape (n,)
 
     def draw(self, rng: np.random.Generator, number: int, start: Array, goal: Array) -> Array:
         """A configuration from the limits, more often from near the ends of the way."""

@@ -27,21 +27,13 @@ class Layer(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanOutline:
-    """Outline of a body: its name, its layer, the robot that it belongs to, and corners, shape (N, 2).
+    """Outline of a body: its name, its layer, the robot that it belongs to, and corners, shape (N, 2)."""
 
-    Attributes:
-        name: Name of the body.
-        layer: Its layer.
-        robot: Name of its robot; None for the surroundings and a fixed part.
-        is_base: Whether it is part of a robot and never moves.
-        corners: Its corners, shape (N, 2).
-    """
-
-    name: str
+    name: str  # name of the body
     layer: Layer
-    robot: str | None
-    is_base: bool
-    corners: Array
+    robot: str | None  # name of its robot; None for the surroundings and a fixed part
+    is_base: bool  # whether it is part of a robot and never moves
+    corners: Array  # its corners, shape (N, 2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,43 +59,29 @@ class PlanRobot:
     """A robot of the plan.
 
     Attributes:
-        name: Its name.
-        model: Its model.
-        colour: Its colour.
-        base: Coordinates of the base, shape (3,).
-        turn_deg: Direction of the x axis of the base, from that of the world.
-        centre: Where its first axis stands, shape (2,).
         reach: Largest distance of the flange from there; None where the reach is no circle: on a rail, on a wall.
         reach_outline: Farthest places of the flange all round in that case, shape (K, 2); none where it is a circle.
-        swept: Contours of what links and tools cover during the motion; none without a motion.
     """
 
     name: str
     model: str
     colour: str
-    base: Array
-    turn_deg: float
-    centre: Array
+    base: Array  # coordinates of the base, shape (3,)
+    turn_deg: float  # direction of the x axis of the base, from that of the world
+    centre: Array  # where its first axis stands, shape (2,)
     reach: float | None
     reach_outline: Array
-    swept: tuple[Array, ...]
+    swept: tuple[Array, ...]  # contours of what links and tools cover during the motion; none without a motion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Dimension:
-    """A dimension along x (0) or y (1).
-
-    Attributes:
-        axis: The axis.
-        first: Where it begins along the axis, at the smaller coordinate.
-        second: Where it ends.
-        row: Number of its row, counted from the plan outwards.
-    """
+    """A dimension along x (0) or y (1)."""
 
     axis: int
-    first: float
-    second: float
-    row: int
+    first: float  # where it begins along the axis, at the smaller coordinate
+    second: float  # where it ends
+    row: int  # number of its row, counted from the plan outwards
 
     @property
     def length(self) -> float:
@@ -113,27 +91,16 @@ class Dimension:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class FloorPlan:
-    """A floor plan.
+    """A floor plan."""
 
-    Attributes:
-        cell: Name of the cell.
-        state: What the robots are shown at, and the motion of what is swept.
-        robots: All robots.
-        outlines: Outlines of all bodies.
-        paths: Paths of all tasks.
-        walls: Vertical half-spaces among the surroundings.
-        whole: Contours of what the whole cell covers during the motion.
-        square: Edge of the squares that swept areas are made of; None without a motion.
-    """
-
-    cell: str
-    state: str
+    cell: str  # name of the cell
+    state: str  # what the robots are shown at, and the motion of what is swept
     robots: tuple[PlanRobot, ...]
-    outlines: tuple[PlanOutline, ...]
-    paths: tuple[PlanPath, ...]
-    walls: tuple[PlanWall, ...]
-    whole: tuple[Array, ...]
-    square: float | None
+    outlines: tuple[PlanOutline, ...]  # outlines of all bodies
+    paths: tuple[PlanPath, ...]  # paths of all tasks
+    walls: tuple[PlanWall, ...]  # vertical half-spaces among the surroundings
+    whole: tuple[Array, ...]  # contours of what the whole cell covers during the motion
+    square: float | None  # edge of the squares that swept areas are made of; None without a motion
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:

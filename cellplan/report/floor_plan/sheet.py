@@ -28,19 +28,12 @@ NAME_BESIDE, NAME_ABOVE, NAME_IN_PLAN = 7, 32, 16  # letters of names beside and
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sheet:
-    """How a plan lies on the paper.
+    """How a plan lies on the paper."""
 
-    Attributes:
-        scale: How many [mm] of the cell one [mm] of paper stands for.
-        middle: Point of the cell in [mm] in the middle of the plan, shape (2,).
-        low: Left upper corner of the plan in units, shape (2,).
-        high: Right lower corner, shape (2,).
-    """
-
-    scale: float
-    middle: Array
-    low: Array
-    high: Array
+    scale: float  # how many [mm] of the cell one [mm] of paper stands for
+    middle: Array  # point of the cell in [mm] in the middle of the plan, shape (2,)
+    low: Array  # left upper corner of the plan in units, shape (2,)
+    high: Array  # right lower corner, shape (2,)
 
     def place(self, points: Array) -> Array:
         """Points of the cell in [mm], shape (..., 2), in units of the sheet: x to the right and y down."""

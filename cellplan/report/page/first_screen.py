@@ -18,17 +18,11 @@ MAX_SPEEDS: Final = 4  # tasks on the first screen; all of them have a line in t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorstInstant:
-    """What the picture of a report shows.
+    """What the picture of a report shows."""
 
-    Attributes:
-        at_s: The instant in [s], on the clock of its run.
-        shift: Time in [s] on the page's clock from which it counts; None if that is not known.
-        text: What is worst there.
-    """
-
-    at_s: float
-    shift: float | None
-    text: str
+    at_s: float  # the instant in [s], on the clock of its run
+    shift: float | None  # time in [s] on the page's clock from which it counts; None if that is not known
+    text: str  # what is worst there
 
 
 def worst_instant(record: Record) -> WorstInstant | None:

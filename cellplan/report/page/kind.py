@@ -10,18 +10,10 @@ from cellplan.report.record.rows import Tables
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Kind:
-    """A kind of result.
+    """A kind of result."""
 
-    Attributes:
-        name: As the schema of its record has it.
-        title: Of its card.
-        tables: Its tables by name.
-        shown: Tables on its card and their columns.
-        pictures: Pictures on its card.
-    """
-
-    name: str
-    title: str
-    tables: Callable[[Record], Tables]
-    shown: Mapping[str, tuple[str, ...]]
-    pictures: Callable[[Record], Mapping[str, Figure | None]]
+    name: str  # as the schema of its record has it
+    title: str  # of its card
+    tables: Callable[[Record], Tables]  # its tables by name
+    shown: Mapping[str, tuple[str, ...]]  # tables on its card and their columns
+    pictures: Callable[[Record], Mapping[str, Figure | None]]  # pictures on its card

@@ -21,17 +21,11 @@ MOST_LINES: Final = 5  # [-] of findings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """A short table.
+    """A short table."""
 
-    Attributes:
-        caption: What it shows.
-        columns: Values of each column by its name; numbers are shown with four digits.
-        more: Where all of it is found, as Python; empty where nothing is left out.
-    """
-
-    caption: str
-    columns: Mapping[str, Sequence[Any]]
-    more: str = ""
+    caption: str  # what it shows
+    columns: Mapping[str, Sequence[Any]]  # values of each column by its name; numbers are shown with four digits
+    more: str = ""  # where all of it is found, as Python; empty where nothing is left out
 
     @property
     def rows(self) -> list[list[Any]]:
@@ -52,27 +46,16 @@ class Grid:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """What is shown of a result.
+    """What is shown of a result."""
 
-    Attributes:
-        kind: What it is, in a word or two.
-        name: Name of the cell.
-        verdict: The verdict in a few words; empty without one.
-        passed: Whether it is a good one; None where it is neither good nor bad.
-        findings: What is wrong, a line each.
-        figures: Key figures, each as ``figure`` gives it.
-        pictures: Pictures as SVG by what they show.
-        grids: Short tables.
-    """
-
-    kind: str
-    name: str
-    verdict: str = ""
-    passed: bool | None = None
-    findings: Sequence[str] = ()
-    figures: Entries = field(default_factory=list)
-    pictures: Mapping[str, str] = field(default_factory=dict)
-    grids: Sequence[Grid] = ()
+    kind: str  # what it is, in a word or two
+    name: str  # name of the cell
+    verdict: str = ""  # the verdict in a few words; empty without one
+    passed: bool | None = None  # whether it is a good one; None where it is neither good nor bad
+    findings: Sequence[str] = ()  # what is wrong, a line each
+    figures: Entries = field(default_factory=list)  # key figures, each as ``figure`` gives it
+    pictures: Mapping[str, str] = field(default_factory=dict)  # pictures as SVG by what they show
+    grids: Sequence[Grid] = ()  # short tables
 
 
 def card_html(card: Card) -> str:

@@ -11,15 +11,10 @@ SCRIPTS: Final = ("page.js", "figures.js")
 
 @dataclass(frozen=True, slots=True)
 class PageScripts:
-    """Scripts as they stand in a page.
+    """Scripts as they stand in a page."""
 
-    Attributes:
-        texts: What stands between the tags, one text for each.
-        policy: The sources of scripts that its content security policy allows: these, and no others.
-    """
-
-    texts: tuple[str, ...]
-    policy: str
+    texts: tuple[str, ...]  # what stands between the tags, one text for each
+    policy: str  # the sources of scripts that its content security policy allows: these, and no others
 
 
 def page_scripts(texts: Iterable[str]) -> PageScripts:

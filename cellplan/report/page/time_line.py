@@ -18,19 +18,12 @@ WORK: Final = "work: "
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """What a robot does for a while.
+    """What a robot does for a while."""
 
-    Attributes:
-        kind: ``work``, ``process``, ``delay``, ``dwell``, ``settle``, ``carry``, ``move`` or ``rest``.
-        text: The same in words.
-        begin: Its begin in [s].
-        end: Its end in [s].
-    """
-
-    kind: str
-    text: str
-    begin: float
-    end: float
+    kind: str  # ``work``, ``process``, ``delay``, ``dwell``, ``settle``, ``carry``, ``move`` or ``rest``
+    text: str  # the same in words
+    begin: float  # its begin in [s]
+    end: float  # its end in [s]
 
 
 def time_line(record: Record, cell: Cell) -> dict[str, Any]:

@@ -12,17 +12,11 @@ DIGITS: Final = 4  # decimals of an instant in an address, in [s]
 
 @dataclass(frozen=True, slots=True)
 class TimeLink:
-    """An instant that may be chosen.
+    """An instant that may be chosen."""
 
-    Attributes:
-        text: What is printed.
-        at: The instant in [s] on the clock of the page.
-        address: Address of the 3-D page at that instant.
-    """
-
-    text: str
-    at: float
-    address: str
+    text: str  # what is printed
+    at: float  # the instant in [s] on the clock of the page
+    address: str  # address of the 3-D page at that instant
 
     def __html__(self) -> str:
         """The element; templates take it as it is."""
@@ -34,11 +28,10 @@ class TimeLinks:
     """Writer of times that may be chosen, ``at(1.626)`` in templates.
 
     Attributes:
-        view: Where the 3-D page lies from the page.
         begin: Time in [s] at which the clock of the page begins on that of the whole program, which the 3-D page has.
     """
 
-    view: str
+    view: str  # where the 3-D page lies from the page
     begin: float = 0.0
 
     def __call__(self, at: float | None, shift: float | None = 0.0) -> str | TimeLink:

@@ -18,20 +18,15 @@ class Axis:
     """What is measured along one side of a panel.
 
     Attributes:
-        low: Value at its lower or left end.
-        high: Value at its upper or right end.
-        label: What it measures.
-        unit: Unit of its values.
         is_log: Whether its scale is logarithmic; both ends are positive then, and smaller values lie at the lower end.
-        is_time: Whether it is the time of a motion in [s], which all figures of a page share.
     """
 
-    low: float
-    high: float
-    label: str = ""
-    unit: str = ""
+    low: float  # value at its lower or left end
+    high: float  # value at its upper or right end
+    label: str = ""  # what it measures
+    unit: str = ""  # unit of its values
     is_log: bool = False
-    is_time: bool = False
+    is_time: bool = False  # whether it is the time of a motion in [s], which all figures of a page share
 
     def share(self, values: Array | float) -> Array:
         """Place of values between the two ends, from 0 to 1."""
@@ -71,21 +66,13 @@ class Curve(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A line at a limit, with the forbidden range beyond it shaded where it has one.
+    """A line at a limit, with the forbidden range beyond it shaded where it has one."""
 
-    Attributes:
-        value: The limit.
-        label: Text at its right end.
-        is_upper: Whether values above it are forbidden, otherwise those below.
-        is_shaded: Whether the forbidden range is shaded.
-        is_vertical: Whether it limits the values along the x axis.
-    """
-
-    value: float
-    label: str = ""
-    is_upper: bool = True
-    is_shaded: bool = True
-    is_vertical: bool = False
+    value: float  # the limit
+    label: str = ""  # text at its right end
+    is_upper: bool = True  # whether values above it are forbidden, otherwise those below
+    is_shaded: bool = True  # whether the forbidden range is shaded
+    is_vertical: bool = False  # whether it limits the values along the x axis
 
 
 class Mark(NamedTuple):
@@ -146,21 +133,13 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Panel:
-    """One pair of axes.
+    """One pair of axes."""
 
-    Attributes:
-        title: Text at its upper left.
-        note: Small text at its upper right.
-        y: Its upward axis.
-        items: What it shows, in the order in which it is drawn.
-        keys: Names of its curves in their colours, at its upper right.
-    """
-
-    title: str
-    y: Axis
-    items: Sequence[Item]
-    note: str = ""
-    keys: Sequence[Key] = ()
+    title: str  # text at its upper left
+    y: Axis  # its upward axis
+    items: Sequence[Item]  # what it shows, in the order in which it is drawn
+    note: str = ""  # small text at its upper right
+    keys: Sequence[Key] = ()  # names of its curves in their colours, at its upper right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -168,25 +147,16 @@ class Figure:
     """Panels that share the axis along them.
 
     Attributes:
-        title: Text above the panels.
-        x: Their axis from left to right.
-        panels: The panels, row by row.
-        columns: Number of panels in a row.
-        width: Width of the figure in [inch].
-        row: Height of a row of panels in [inch].
         is_plane: Whether both axes are lengths in one scale, seen from above: a frame with ticks and no grid.
-        legend: Texts to the right of the panels.
-        is_exact: Whether its colours are data, and stay as they are on a dark page.
-        text: What the figure shows, for those who do not see it.
     """
 
-    title: str
-    x: Axis
-    panels: Sequence[Panel]
-    columns: int = 1
-    width: float = WIDTH
-    row: float = ROW
+    title: str  # text above the panels
+    x: Axis  # their axis from left to right
+    panels: Sequence[Panel]  # the panels, row by row
+    columns: int = 1  # number of panels in a row
+    width: float = WIDTH  # width of the figure in [inch]
+    row: float = ROW  # height of a row of panels in [inch]
     is_plane: bool = False
-    legend: Sequence[Key] = ()
-    is_exact: bool = False
-    text: str = ""
+    legend: Sequence[Key] = ()  # texts to the right of the panels
+    is_exact: bool = False  # whether its colours are data, and stay as they are on a dark page
+    text: str = ""  # what the figure shows, for those who do not see it

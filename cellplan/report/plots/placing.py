@@ -42,29 +42,17 @@ class Words(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlacedPanel:
-    """A panel with the box of its curves; its words are placed from the upper left corner of that box.
-
-    Attributes:
-        panel: The panel.
-        x: Its axis from left to right.
-        left: Left edge of the box.
-        top: Upper edge of the box.
-        width: Width of the box.
-        height: Height of the box.
-        x_ticks: Values with a tick along it.
-        y_ticks: Values with a tick upwards.
-        words: Texts outside the box, and at places in it.
-    """
+    """A panel with the box of its curves; its words are placed from the upper left corner of that box."""
 
     panel: Panel
-    x: Axis
-    left: float
-    top: float
-    width: float
-    height: float
-    x_ticks: Sequence[float]
-    y_ticks: Sequence[float]
-    words: Sequence[Words]
+    x: Axis  # its axis from left to right
+    left: float  # left edge of the box
+    top: float  # upper edge of the box
+    width: float  # width of the box
+    height: float  # height of the box
+    x_ticks: Sequence[float]  # values with a tick along it
+    y_ticks: Sequence[float]  # values with a tick upwards
+    words: Sequence[Words]  # texts outside the box, and at places in it
 
     def across(self, values: Array | float) -> Array:
         """Distance of values from the left edge of the box."""
@@ -77,23 +65,14 @@ class PlacedPanel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Placed:
-    """A figure with the places of its panels and texts.
-
-    Attributes:
-        figure: The figure.
-        width: Its width.
-        height: Its height.
-        panels: Its panels.
-        words: Its texts but for those of the panels.
-        swatches: Upper left corner and colour of each colour in the legend.
-    """
+    """A figure with the places of its panels and texts."""
 
     figure: Figure
     width: float
     height: float
     panels: Sequence[PlacedPanel]
-    words: Sequence[Words]
-    swatches: Sequence[tuple[float, float, str]]
+    words: Sequence[Words]  # its texts but for those of the panels
+    swatches: Sequence[tuple[float, float, str]]  # upper left corner and colour of each colour in the legend
 
 
 SWATCH: Final = (13.0, 8.6)  # width and height

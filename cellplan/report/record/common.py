@@ -23,15 +23,10 @@ AXES: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Provenance:
-    """Origin of a result.
+    """Origin of a result."""
 
-    Attributes:
-        versions: Version by package, cellplan's own first.
-        digests: SHA-256 by name (``program``, or a file of the run).
-    """
-
-    versions: Mapping[str, str]
-    digests: Mapping[str, str]
+    versions: Mapping[str, str]  # version by package, cellplan's own first
+    digests: Mapping[str, str]  # SHA-256 by name (``program``, or a file of the run)
 
 
 class CheckRecord(TypedDict):

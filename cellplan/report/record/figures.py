@@ -23,50 +23,29 @@ Fold = Callable[..., Any]  # max, min or sum
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """A quantity of a program.
+    """A quantity of a program."""
 
-    Attributes:
-        key: Of its worst value, in records and tables.
-        over_phases: The value of one subject over several phases.
-        worst: The value over all subjects.
-        scale: From SI to the unit of the record.
-        subject: Key of the subject that is worst; empty where that is not recorded.
-        absent: The worst value where there is none.
-        meaning: What it is.
-    """
-
-    key: str
-    over_phases: Fold
-    worst: Fold
-    scale: float
-    subject: str
-    absent: Number
-    meaning: str
+    key: str  # of its worst value, in records and tables
+    over_phases: Fold  # the value of one subject over several phases
+    worst: Fold  # the value over all subjects
+    scale: float  # from SI to the unit of the record
+    subject: str  # key of the subject that is worst; empty where that is not recorded
+    absent: Number  # the worst value where there is none
+    meaning: str  # what it is
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How the worst value of a quantity is shown.
+    """How the worst value of a quantity is shown."""
 
-    Attributes:
-        heading: Of a column of a page, its unit in a line of its own.
-        page: Its text there.
-        column: Heading of a column on the terminal.
-        form: Format of its text there, after the scale of ``percent``.
-        percent: 100 for a share, else 1: also the scale of its plot.
-        plot: Title of its plot.
-        limit: A limit there, and its name.
-        limit_name: Empty for a limit without a name.
-    """
-
-    heading: str
-    page: Callable[[Number], str]
-    column: str
-    form: str
-    percent: float
-    plot: str
-    limit: float | None = None
-    limit_name: str = ""
+    heading: str  # of a column of a page, its unit in a line of its own
+    page: Callable[[Number], str]  # its text there
+    column: str  # heading of a column on the terminal
+    form: str  # format of its text there, after the scale of ``percent``
+    percent: float  # 100 for a share, else 1: also the scale of its plot
+    plot: str  # title of its plot
+    limit: float | None = None  # A limit there, and its name
+    limit_name: str = ""  # empty for a limit without a name
 
     def text(self, value: Number) -> str:
         """Its text on the terminal."""

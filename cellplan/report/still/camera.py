@@ -9,19 +9,12 @@ from cellplan.geometry.arrays import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Camera:
-    """A parallel projection.
+    """A parallel projection."""
 
-    Attributes:
-        axes: Rows right, up and towards the viewer in W, unit vectors, shape (3, 3).
-        middle: What is shown in the middle, along right and up in [m], shape (2,).
-        scale: Units of the sheet per metre.
-        place: Where the middle is on the sheet, shape (2,).
-    """
-
-    axes: Array
-    middle: Array
-    scale: float
-    place: Array
+    axes: Array  # rows right, up and towards the viewer in W, unit vectors, shape (3, 3)
+    middle: Array  # what is shown in the middle, along right and up in [m], shape (2,)
+    scale: float  # units of the sheet per metre
+    place: Array  # where the middle is on the sheet, shape (2,)
 
     def project(self, points: Array) -> Array:
         """Points in the world in [m], shape (..., 3), as x to the right and y down on the sheet and depth in [m].

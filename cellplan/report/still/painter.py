@@ -28,17 +28,11 @@ SAME_POINT: Final = 6  # decimals of corners in [m] that are one corner
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mesh2D:
-    """Facets of all solids on the sheet.
+    """Facets of all solids on the sheet."""
 
-    Attributes:
-        corners: Corners on the sheet with their depths, shape (K, 4, 3).
-        normals: Unit normals along right, up and towards the viewer, shape (K, 3).
-        solids: Number of the solid of each, shape (K,).
-    """
-
-    corners: Array
-    normals: Array
-    solids: Indices
+    corners: Array  # corners on the sheet with their depths, shape (K, 4, 3)
+    normals: Array  # unit normals along right, up and towards the viewer, shape (K, 3)
+    solids: Indices  # number of the solid of each, shape (K,)
 
 
 @dataclass(slots=True)
@@ -46,16 +40,13 @@ class Painter:
     """Paints with one camera.
 
     Attributes:
-        camera: The camera.
-        low: Left upper corner of what is shown of the sheet, shape (2,).
-        high: Right lower corner, shape (2,).
         classes: Names of the classes of materials and tones, filled while painting.
         focus: Point of the sheet, shape (2,), near which facets must be in their right order; None for all of it.
     """
 
     camera: Camera
-    low: Array
-    high: Array
+    low: Array  # left upper corner of what is shown of the sheet, shape (2,)
+    high: Array  # right lower corner, shape (2,)
     classes: dict[tuple[str, int], str] = field(default_factory=dict)
     focus: Array | None = None
 

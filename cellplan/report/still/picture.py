@@ -9,21 +9,13 @@ from cellplan.geometry.shapes import Solid
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShownSolid:
-    """A solid of the picture.
-
-    Attributes:
-        name: Its name.
-        shape: The solid.
-        X_WS: Its pose in the world, shape (4, 4).
-        material: Name of its colour.
-        robot: Name of the robot that moves it; None in the surroundings.
-    """
+    """A solid of the picture."""
 
     name: str
     shape: Solid
-    X_WS: Array
-    material: str
-    robot: str | None = None
+    X_WS: Array  # its pose in the world, shape (4, 4)
+    material: str  # name of its colour
+    robot: str | None = None  # name of the robot that moves it; None in the surroundings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,28 +48,18 @@ class StillPicture:
     """A picture of an instant.
 
     Attributes:
-        title: What it shows, in one line.
-        notes: Lines below the title.
-        is_bad: Whether that failed.
-        solids: Everything solid.
-        lines: Lines, hidden by what is in front of them.
-        names: Names of the robots.
-        materials: Colours by name.
         mark: The points that matter in the world in [m]: the nearest points of a pair, shape (2, 3), a place, shape
             (1, 3), or none, shape (0, 3).
-        label: What is written beside it.
-        floor: Height of the floor in [m]; None without one.
-        marked: Names of the solids that matter.
     """
 
-    title: str
-    notes: tuple[str, ...]
-    is_bad: bool
-    solids: tuple[ShownSolid, ...]
-    lines: tuple[ShownLine, ...]
-    names: tuple[ShownName, ...]
-    materials: Mapping[str, Colour]
+    title: str  # what it shows, in one line
+    notes: tuple[str, ...]  # lines below the title
+    is_bad: bool  # whether that failed
+    solids: tuple[ShownSolid, ...]  # everything solid
+    lines: tuple[ShownLine, ...]  # lines, hidden by what is in front of them
+    names: tuple[ShownName, ...]  # names of the robots
+    materials: Mapping[str, Colour]  # colours by name
     mark: Array
-    label: str = ""
-    floor: float | None = None
-    marked: tuple[str, ...] = ()
+    label: str = ""  # what is written beside it
+    floor: float | None = None  # height of the floor in [m]; None without one
+    marked: tuple[str, ...] = ()  # names of the solids that matter

@@ -17,17 +17,11 @@ AT_ONCE: Final = 128  # [-] configurations placed together: about 10 MB
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """Two bodies that are too near.
+    """Two bodies that are too near."""
 
-    Attributes:
-        pair: Their names.
-        distance: Their distance in [m], negative where they overlap by so much.
-        node: Node of the motion at which it is so.
-    """
-
-    pair: tuple[str, str]
-    distance: float
-    node: int
+    pair: tuple[str, str]  # their names
+    distance: float  # their distance in [m], negative where they overlap by so much
+    node: int  # node of the motion at which it is so
 
 
 def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool = True) -> list[Contact | None]:

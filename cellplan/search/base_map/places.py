@@ -14,19 +14,12 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Places:
-    """K places of a base, row by row from the smallest y, each row from the smallest x.
+    """K places of a base, row by row from the smallest y, each row from the smallest x."""
 
-    Attributes:
-        x: Values of x in [mm], ascending, shape (columns,).
-        y: Values of y in [mm], ascending, shape (rows,).
-        yaw: Angle of the base about the vertical in [rad], shape (K,).
-        X_WB: Bases in the world, shape (K, 4, 4).
-    """
-
-    x: Array
-    y: Array
-    yaw: Array
-    X_WB: Array
+    x: Array  # values of x in [mm], ascending, shape (columns,)
+    y: Array  # values of y in [mm], ascending, shape (rows,)
+    yaw: Array  # angle of the base about the vertical in [rad], shape (K,)
+    X_WB: Array  # bases in the world, shape (K, 4, 4)
 
     @classmethod
     def of(cls, X_WB: Array, x: Array, y: Array, *, yaw: float | None = None, toward: Array | None = None) -> "Places":

@@ -36,23 +36,14 @@ Solve = Callable[[Indices, Array], tuple[Array, Indices]]  # starts and their pl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartGoal:
-    """What a robot's tool is to reach.
-
-    Attributes:
-        robot: The robot.
-        chain: The same at its present base.
-        relation: Its task.
-        X_RT: Tool tip at the start of the path in the frame R that the task is relative to, shape (4, 4).
-        X_WR: That frame in the world, shape (4, 4).
-        given: The present start posture in [rad] or [m], shape (n,).
-    """
+    """What a robot's tool is to reach."""
 
     robot: Robot
-    chain: ScrewChain
-    relation: Relation
-    X_RT: Array
-    X_WR: Array
-    given: Array
+    chain: ScrewChain  # the same at its present base
+    relation: Relation  # its task
+    X_RT: Array  # tool tip at the start of the path in the frame R that the task is relative to, shape (4, 4)
+    X_WR: Array  # that frame in the world, shape (4, 4)
+    given: Array  # the present start posture in [rad] or [m], shape (n,)
 
 
 def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *, seed: int) -> tuple[Array, Indices]:

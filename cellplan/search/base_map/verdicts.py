@@ -40,34 +40,23 @@ class PlaceVerdict:
     """One place.
 
     Attributes:
-        verdict: What becomes of it.
-        start: Start posture of the robot in [rad] or [m], shape (n,); None where there is none.
-        lost_at: Time in [s] at which a tool could not follow; None where all did.
-        joint: Robot and joint that is beyond a limit, or that leaves least.
         margin: Its smallest distance from a limit of a turning joint in [rad], of a sliding one in [m].
-        fast: Robot and joint that is fastest against its limits of speed and acceleration.
-        speed: Largest speed of any joint as a share of its limit; None where there is no motion.
-        acceleration: Largest acceleration likewise.
-        cycle: Shortest time in [s] of the same motion, faster or slower as a whole, that keeps both.
         pair: Bodies that are too near each other, and their distance in [m]; None where none are.
-        distance: That distance.
-        at: Time in [s] at which they are.
-        reason: Why it is not judged; empty where it is.
     """
 
-    verdict: Verdict
-    start: Array | None = None
-    lost_at: float | None = None
-    joint: tuple[str, str] | None = None
+    verdict: Verdict  # what becomes of it
+    start: Array | None = None  # start posture of the robot in [rad] or [m], shape (n,); None where there is none
+    lost_at: float | None = None  # time in [s] at which a tool could not follow; None where all did
+    joint: tuple[str, str] | None = None  # robot and joint that is beyond a limit, or that leaves least
     margin: float | None = None
-    fast: tuple[str, str] | None = None
-    speed: float | None = None
-    acceleration: float | None = None
-    cycle: float | None = None
+    fast: tuple[str, str] | None = None  # robot and joint that is fastest against its limits of speed and acceleration
+    speed: float | None = None  # largest speed of any joint as a share of its limit; None where there is no motion
+    acceleration: float | None = None  # largest acceleration likewise
+    cycle: float | None = None  # shortest time in [s] of the same motion, faster or slower as a whole, that keeps both
     pair: tuple[str, str] | None = None
-    distance: float | None = None
-    at: float | None = None
-    reason: str = ""
+    distance: float | None = None  # that distance
+    at: float | None = None  # time in [s] at which they are
+    reason: str = ""  # why it is not judged; empty where it is
 
     @property
     def passes(self) -> bool:
@@ -83,20 +72,12 @@ class PlaceVerdict:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MapJob:
-    """The job of one cell with one robot at many places.
+    """The job of one cell with one robot at many places."""
 
-    Attributes:
-        job: The tasks at their nodes.
-        scene: The cell made computable; of its mounted pairs those that depend on its place.
-        robot: Name of the robot.
-        start: Start configuration of the whole cell in [rad] or [m], shape (nq,).
-        places: The places.
-    """
-
-    job: Job
-    scene: Scene
-    robot: str
-    start: Array
+    job: Job  # the tasks at their nodes
+    scene: Scene  # the cell made computable; of its mounted pairs those that depend on its place
+    robot: str  # name of the robot
+    start: Array  # start configuration of the whole cell in [rad] or [m], shape (nq,)
     places: Places
 
 

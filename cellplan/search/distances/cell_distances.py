@@ -37,33 +37,19 @@ RAISED: Final = 0.1  # [m] by which a base on the floor is raised so that its co
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutDistances:
-    """Pairs that are nearer than a distance in one layout; M of them, ordered by configuration and pair.
+    """Pairs that are nearer than a distance in one layout; M of them, ordered by configuration and pair."""
 
-    Attributes:
-        pairs: Their places in ``CellDistances.pairs``, shape (M,).
-        keys: At which configuration, shape (M,); the first one for bodies without a joint between them.
-        distances: Signed distances in [m], negative where bodies overlap by so much, shape (M,).
-        demands: What is demanded of them in [m], shape (M,).
-        is_own: Whether both bodies belong to one robot, shape (M,).
-        normals: Unit directions from the first body to the second in W, shape (M, 3).
-        first: Nearest points of the first bodies in W in [m], shape (M, 3).
-        second: Nearest points of the second bodies, shape (M, 3).
-        by_joints: Derivatives by the stacked joints in [m/rad] or [m/m], shape (M, nq).
-        bodies: The bodies by their places in the engine, -1 for a half-space, shape (M, 2).
-        D: Displacements of the links, shape (links, K, 4, 4).
-    """
-
-    pairs: Indices
-    keys: Indices
-    distances: Array
-    demands: Array
-    is_own: Flags
-    normals: Array
-    first: Array
-    second: Array
-    by_joints: Array
-    bodies: Indices
-    D: Array
+    pairs: Indices  # their places in ``CellDistances.pairs``, shape (M,)
+    keys: Indices  # at which configuration, shape (M,); the first one for bodies without a joint between them
+    distances: Array  # signed distances in [m], negative where bodies overlap by so much, shape (M,)
+    demands: Array  # what is demanded of them in [m], shape (M,)
+    is_own: Flags  # whether both bodies belong to one robot, shape (M,)
+    normals: Array  # unit directions from the first body to the second in W, shape (M, 3)
+    first: Array  # nearest points of the first bodies in W in [m], shape (M, 3)
+    second: Array  # nearest points of the second bodies, shape (M, 3)
+    by_joints: Array  # derivatives by the stacked joints in [m/rad] or [m/m], shape (M, nq)
+    bodies: Indices  # the bodies by their places in the engine, -1 for a half-space, shape (M, 2)
+    D: Array  # displacements of the links, shape (links, K, 4, 4)
 
     @property
     def found(self) -> Found:

@@ -15,21 +15,13 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutPair:
-    """Two bodies that a layout keeps apart.
+    """Two bodies that a layout keeps apart."""
 
-    Attributes:
-        names: Their names.
-        ends: Their places in ``Scene.bodies``.
-        demand: Distance in [m] that is demanded; negative where they may reach into each other by so much.
-        is_own: Whether both belong to one robot: no layout gives them more room than the robot's design has.
-        is_fixed: Whether no joint is between them.
-    """
-
-    names: tuple[str, str]
-    ends: tuple[int, int]
-    demand: float
-    is_own: bool
-    is_fixed: bool
+    names: tuple[str, str]  # their names
+    ends: tuple[int, int]  # their places in ``Scene.bodies``
+    demand: float  # distance in [m] that is demanded; negative where they may reach into each other by so much
+    is_own: bool  # whether both belong to one robot: no layout gives them more room than the robot's design has
+    is_fixed: bool  # whether no joint is between them
 
 
 def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:

@@ -43,13 +43,11 @@ class Beside:
     """Two cells in which one number of a tool or of the part is a step in [m] or [rad] greater, and less.
 
     Attributes:
-        robot: The robot of which the solids of the tool differ; None where it is the place of the part.
-        by: By how much the number grows with each variable, shape (n,).
         sides: The cell with the greater number, and that with the smaller one; the rest of them does not count.
     """
 
-    robot: str | None
-    by: Array
+    robot: str | None  # the robot of which the solids of the tool differ; None where it is the place of the part
+    by: Array  # by how much the number grows with each variable, shape (n,)
     sides: tuple[Cell, Cell]
 
 

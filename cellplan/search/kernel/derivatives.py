@@ -27,17 +27,11 @@ REGULAR: Final = 1e-12  # [-] of the largest entry that keeps a matrix invertibl
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionDerivatives:
-    """Derivatives of one motion in p directions.
+    """Derivatives of one motion in p directions."""
 
-    Attributes:
-        q: Of the joint positions at the nodes, shape (N, nq, p).
-        qd: Of their speeds, shape (N, nq, p).
-        rates: Of the speeds by the joints at the same node, where the tools stay on their paths, shape (N, nq, nq).
-    """
-
-    q: Array
-    qd: Array
-    rates: Array
+    q: Array  # of the joint positions at the nodes, shape (N, nq, p)
+    qd: Array  # of their speeds, shape (N, nq, p)
+    rates: Array  # of the speeds by the joints at the same node, where the tools stay on their paths, shape (N, nq, nq)
 
 
 def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Directions) -> MotionDerivatives:

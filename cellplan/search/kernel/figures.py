@@ -14,14 +14,12 @@ class Peaks:
     """Largest values of functions of time that are known at nodes: of the parabola through a node and its neighbours.
 
     Attributes:
-        value: The largest values, shape (K, n).
-        node: The nodes in the middle, shape (K, n), from 1 to N - 2.
         shares: Shares of the values at that node's neighbour before, itself and the one after, shape (K, n, 3); with
             their signs where the largest magnitude was asked for.
     """
 
-    value: Array
-    node: Indices
+    value: Array  # the largest values, shape (K, n)
+    node: Indices  # the nodes in the middle, shape (K, n), from 1 to N - 2
     shares: Array
 
     @classmethod
@@ -58,12 +56,11 @@ class Crests:
     """Values of functions of time at their nodes, or where one is highest among its neighbours that of the parabola.
 
     Attributes:
-        value: The values, shape (N, n).
         shares: Shares of the values at the node before, the node and the one after, shape (N, n, 3); with their signs
             where magnitudes were asked for.
     """
 
-    value: Array
+    value: Array  # the values, shape (N, n)
     shares: Array
 
     @classmethod
@@ -105,19 +102,12 @@ class Crests:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Figures:
-    """What layouts are judged by, of each joint.
+    """What layouts are judged by, of each joint."""
 
-    Attributes:
-        beyond_lower: How far it goes below its lower limit in [rad] or [m]; negative where room is left.
-        beyond_upper: Likewise above its upper limit.
-        speeds: Its largest speed as a share of its limit.
-        accelerations: Its largest acceleration likewise; 0 without a limit.
-    """
-
-    beyond_lower: Peaks
-    beyond_upper: Peaks
-    speeds: Peaks
-    accelerations: Peaks
+    beyond_lower: Peaks  # how far it goes below its lower limit in [rad] or [m]; negative where room is left
+    beyond_upper: Peaks  # likewise above its upper limit
+    speeds: Peaks  # its largest speed as a share of its limit
+    accelerations: Peaks  # its largest acceleration likewise; 0 without a limit
 
     @classmethod
     def of(cls, job: Job, motions: Motions) -> "Figures":

@@ -29,37 +29,24 @@ class Job:
     Where a desired twist jumps there are two nodes at one time, which see it from either side.
 
     Attributes:
-        cell: The cell: its robots, part, limits and the weights that layouts have unless they state their own.
-        relations: The tasks, then the grasps of further holders that move.
-        moving: Names of the robots that move.
-        tasks: Pose errors and linearisation of the relations.
-        constraints: Which components they constrain, by which joints.
-        settling: 1 for joints that bring the tools to the starts of their paths, shape (nq,).
-        limits: Limits of the stacked joints.
-        times: Times of the nodes in [s], shape (N,), from 0 to the end.
-        X: Desired tool poses in the frames of the relations, shape (4, 4, relations, N).
-        V: Their twists, linear part first, along the axes of these frames, in [m/s] and [rad/s], (6, relations, N).
-        is_begin: Whether a node begins a stretch on which the desired twists are continuous, shape (N,).
         steps: Weights in [s] of the rates at a node and the two before it, which predict the next one by a multistep
             rule, shape (N - 1, 3).
-        rates: Derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N).
-        integral: Integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N).
     """
 
-    cell: Cell
-    relations: tuple[Relation, ...]
-    moving: tuple[str, ...]
-    tasks: BatchTasks
-    constraints: TaskConstraints
-    settling: Array
-    limits: JointLimits
-    times: Array
-    X: Array
-    V: Array
-    is_begin: Array
+    cell: Cell  # the cell: its robots, part, limits and the weights that layouts have unless they state their own
+    relations: tuple[Relation, ...]  # the tasks, then the grasps of further holders that move
+    moving: tuple[str, ...]  # names of the robots that move
+    tasks: BatchTasks  # pose errors and linearisation of the relations
+    constraints: TaskConstraints  # which components they constrain, by which joints
+    settling: Array  # 1 for joints that bring the tools to the starts of their paths, shape (nq,)
+    limits: JointLimits  # limits of the stacked joints
+    times: Array  # times of the nodes in [s], shape (N,), from 0 to the end
+    X: Array  # desired tool poses in the frames of the relations, shape (4, 4, relations, N)
+    V: Array  # their twists, linear part first, along the axes of these frames, in [m/s] and [rad/s], (6, relations, N)
+    is_begin: Array  # whether a node begins a stretch on which the desired twists are continuous, shape (N,)
     steps: Array
-    rates: Array
-    integral: Array
+    rates: Array  # derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N)
+    integral: Array  # integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N)
 
     @classmethod
     def of(
@@ -123,19 +110,12 @@ class Job:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Layouts:
-    """Candidates for one cell: the same job with other bases, tools, start postures and joint weights.
+    """Candidates for one cell: the same job with other bases, tools, start postures and joint weights."""
 
-    Attributes:
-        X_WB: Bases in the world, shape (K, robots, 4, 4).
-        X_FT: Tool tips in the flange frames, shape (K, robots, 4, 4).
-        start: Start postures in [rad] or [m], shape (K, nq); the tools need only be near the starts of their paths.
-        weights: Weights of the joints in the pseudo-inverse, shape (K, nq).
-    """
-
-    X_WB: Array
-    X_FT: Array
-    start: Array
-    weights: Array
+    X_WB: Array  # bases in the world, shape (K, robots, 4, 4)
+    X_FT: Array  # tool tips in the flange frames, shape (K, robots, 4, 4)
+    start: Array  # start postures in [rad] or [m], shape (K, nq); the tools need only be near the starts of their paths
+    weights: Array  # weights of the joints in the pseudo-inverse, shape (K, nq)
 
     def __post_init__(self) -> None:
         """Check at the door that all belong together and are finite, and that all weights are positive."""

@@ -32,14 +32,12 @@ class Motions:
     """The motions of K layouts; what comes after a candidate has lost a path is not valid.
 
     Attributes:
-        q: Stacked joint positions at the nodes in [rad] or [m], shape (K, N, nq).
-        qd: Their speeds in [rad/s] or [m/s], shape (K, N, nq).
         lost_at: Time in [s] at which a tool could not follow; -inf where it did not come to the start of its path, inf
             for candidates that did the whole job, shape (K,).
     """
 
-    q: Array
-    qd: Array
+    q: Array  # stacked joint positions at the nodes in [rad] or [m], shape (K, N, nq)
+    qd: Array  # their speeds in [rad/s] or [m/s], shape (K, N, nq)
     lost_at: Array
 
     @property
@@ -161,23 +159,14 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Passes:
-    """What passes over all nodes of some candidates have in common; see ``run_near``.
+    """What passes over all nodes of some candidates have in common; see ``run_near``."""
 
-    Attributes:
-        job: The tasks at their nodes.
-        start: Start postures, shape (nq, K, 1).
-        placement: Where the robots stand.
-        desired: The desired motion.
-        weights: Joint weights, shape (nq, K N).
-        rates: How speeds change with the joints, shape (N, nq, nq); None where that is not known.
-    """
-
-    job: Job
-    start: Array
-    placement: Placement
-    desired: Desired
-    weights: Array
-    rates: Array | None
+    job: Job  # the tasks at their nodes
+    start: Array  # start postures, shape (nq, K, 1)
+    placement: Placement  # where the robots stand
+    desired: Desired  # the desired motion
+    weights: Array  # joint weights, shape (nq, K N)
+    rates: Array | None  # how speeds change with the joints, shape (N, nq, nq); None where that is not known
 
     def once(self, at: Array) -> tuple[Array, Array, Array]:
         """Corrections and speeds at joints, shape (nq, K, N) all three, and tool errors before them, shape (K,)."""

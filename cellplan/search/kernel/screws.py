@@ -21,15 +21,12 @@ class Directions:
     Attributes:
         base: Displacement of each base per unit of the variable: of its origin in W in [m], then its rotation vector
             about that point along the axes of W in [rad], shape (robots, 6, p).
-        tool: Likewise of each tool tip, along the axes of the flange, shape (robots, 6, p).
-        start: Change of the start posture, shape (nq, p); joints that bring the tools to their paths follow.
-        weights: Change of the joint weights, shape (nq, p).
     """
 
     base: Array
-    tool: Array
-    start: Array
-    weights: Array
+    tool: Array  # likewise of each tool tip, along the axes of the flange, shape (robots, 6, p)
+    start: Array  # change of the start posture, shape (nq, p); joints that bring the tools to their paths follow
+    weights: Array  # change of the joint weights, shape (nq, p)
 
     @property
     def count(self) -> int:
@@ -46,23 +43,14 @@ class Directions:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TaskScrews:
-    """Screws and twists at N nodes of one motion, for T relations and p directions.
+    """Screws and twists at N nodes of one motion, for T relations and p directions."""
 
-    Attributes:
-        own: Axes of each relation's own robot, shape (N, T, levels, 6).
-        shared: Axes of the positioner in the part frame, shape (N, levels, 6); zero without one.
-        tip: Tool tips in R in [m], shape (N, T, 3).
-        based: What each direction gives the base of the own robot, seen from R, shape (N, T, p, 6).
-        tooled: What it gives the own tool, seen from its flange, shape (N, T, p, 6).
-        held: What it gives the part, seen from the positioner's flange, shape (N, p, 6).
-    """
-
-    own: Array
-    shared: Array
-    tip: Array
-    based: Array
-    tooled: Array
-    held: Array
+    own: Array  # axes of each relation's own robot, shape (N, T, levels, 6)
+    shared: Array  # axes of the positioner in the part frame, shape (N, levels, 6); zero without one
+    tip: Array  # tool tips in R in [m], shape (N, T, 3)
+    based: Array  # what each direction gives the base of the own robot, seen from R, shape (N, T, p, 6)
+    tooled: Array  # what it gives the own tool, seen from its flange, shape (N, T, p, 6)
+    held: Array  # what it gives the part, seen from the positioner's flange, shape (N, p, 6)
 
     @classmethod
     def of(cls, job: Job, layout: Layouts, q: Array, directions: Directions) -> "TaskScrews":

@@ -30,18 +30,14 @@ class SingularValues:
     """Least singular values of A arms at N nodes: of the relations whose own robot moves.
 
     Attributes:
-        job: The tasks.
-        layout: The layout, a batch of one.
-        q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
         directions: The p directions of the layout, which are the last ones of what derivatives are asked by.
-        values: The values in mixed units of [m] and [rad], shape (N, A).
     """
 
-    job: Job
-    layout: Layouts
-    q: Array
+    job: Job  # the tasks
+    layout: Layouts  # the layout, a batch of one
+    q: Array  # joint positions at the nodes in [rad] or [m], shape (N, nq)
     directions: Callable[[], Directions]
-    values: Array
+    values: Array  # the values in mixed units of [m] and [rad], shape (N, A)
 
     @classmethod
     def of(cls, job: Job, layout: Layouts, q: Array, directions: Callable[[], Directions]) -> "SingularValues":

@@ -15,23 +15,14 @@ from cellplan.search.programs.problem import Point
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Corner:
-    """A layout with displaced bases.
+    """A layout with displaced bases."""
 
-    Attributes:
-        d: The displacements, shape (m,).
-        start: Its start posture in [rad] or [m], shape (nq,); not valid where it is not followed.
-        cycle: Its shortest cycle in [s]; inf where a tool cannot follow its path.
-        margins: By how much each joint keeps more than the margin that is demanded, in [rad] or [m], shape (nq,).
-        rooms: By how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others.
-        first: The limit that is the next to be missed, or that is missed most: one line of text.
-    """
-
-    d: Array
-    start: Array
-    cycle: float
-    margins: Array
-    rooms: Array
-    first: str
+    d: Array  # the displacements, shape (m,)
+    start: Array  # its start posture in [rad] or [m], shape (nq,); not valid where it is not followed
+    cycle: float  # its shortest cycle in [s]; inf where a tool cannot follow its path
+    margins: Array  # by how much each joint keeps more than the margin that is demanded, in [rad] or [m], shape (nq,)
+    rooms: Array  # by how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others
+    first: str  # the limit that is the next to be missed, or that is missed most: one line of text
 
     @property
     def room(self) -> float:

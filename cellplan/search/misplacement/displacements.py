@@ -29,32 +29,19 @@ class BaseDisplacements:
     A base is displaced along the axes of the world in [m] and turned about the vertical through its origin in [rad]; a
     column below it goes with it. The tools come to their paths anew. Bases that stand on a plane of the environment
     stay on it.
-
-    Attributes:
-        variables: Variables of the layout.
-        x: Their values, shape (n,).
-        robots: The robot of each displacement, m of them.
-        components: Its place in ``COMPONENTS``, m of them.
-        amounts: By how much each base may be off, shape (m,).
-        names: Address that each changes.
-        given: No displacement, shape (m,).
-        lower: Lowest values, shape (m,).
-        upper: Highest values, shape (m,).
-        scale: Usual steps, shape (m,).
-        cost: Costs of a change, shape (m,).
     """
 
-    variables: Variables
-    x: Array
-    robots: tuple[int, ...]
-    components: tuple[int, ...]
-    amounts: Array
-    names: tuple[str, ...] = field(init=False)
-    given: Array = field(init=False)
-    lower: Array = field(init=False)
-    upper: Array = field(init=False)
-    scale: Array = field(init=False)
-    cost: Array = field(init=False)
+    variables: Variables  # variables of the layout
+    x: Array  # their values, shape (n,)
+    robots: tuple[int, ...]  # the robot of each displacement, m of them
+    components: tuple[int, ...]  # its place in ``COMPONENTS``, m of them
+    amounts: Array  # by how much each base may be off, shape (m,)
+    names: tuple[str, ...] = field(init=False)  # address that each changes
+    given: Array = field(init=False)  # no displacement, shape (m,)
+    lower: Array = field(init=False)  # lowest values, shape (m,)
+    upper: Array = field(init=False)  # highest values, shape (m,)
+    scale: Array = field(init=False)  # usual steps, shape (m,)
+    cost: Array = field(init=False)  # costs of a change, shape (m,)
 
     def __post_init__(self) -> None:
         """Name the displacements by the addresses that they change, and derive their bounds and steps."""

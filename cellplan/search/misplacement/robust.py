@@ -40,24 +40,17 @@ class Robust:
     """A layout and its corners.
 
     Attributes:
-        found: The layout, as the last programs left it, with its motion in place.
         corners: All corners that were planned: the worst ones by derivatives, the ends, then the seeded ones.
-        worst_ones: Number of those by derivatives.
-        ends: Number of displacements at their ends, one at a time.
-        nominal: Shortest cycle in [s] of the layout in place.
-        cycle: Shortest cycle in [s] in which the layout and all its corners keep their limits.
-        problem: The job, with the displacements as its variables.
-        displacements: These.
     """
 
-    found: Improved
+    found: Improved  # the layout, as the last programs left it, with its motion in place
     corners: tuple[Corner, ...]
-    worst_ones: int
-    ends: int
-    nominal: float
-    cycle: float
-    problem: GuardedProblem
-    displacements: BaseDisplacements
+    worst_ones: int  # number of those by derivatives
+    ends: int  # number of displacements at their ends, one at a time
+    nominal: float  # shortest cycle in [s] of the layout in place
+    cycle: float  # shortest cycle in [s] in which the layout and all its corners keep their limits
+    problem: GuardedProblem  # the job, with the displacements as its variables
+    displacements: BaseDisplacements  # these
 
     @property
     def is_kept(self) -> bool:
@@ -72,19 +65,12 @@ class Robust:
 
 @dataclass(slots=True, kw_only=True)
 class RobustSearch:
-    """Rounds of programs with scenarios.
+    """Rounds of programs with scenarios."""
 
-    Attributes:
-        problem: The layout problem.
-        displacements: Displacements of the bases of any of its layouts.
-        demands: The objective and what must be kept in every corner.
-        effort: How much work each round may do.
-    """
-
-    problem: GuardedProblem
-    displacements: BaseDisplacements
-    demands: Demands
-    effort: Effort
+    problem: GuardedProblem  # the layout problem
+    displacements: BaseDisplacements  # displacements of the bases of any of its layouts
+    demands: Demands  # the objective and what must be kept in every corner
+    effort: Effort  # how much work each round may do
     _scenarios: list[Array] = field(default_factory=list)
     _beyond: Array = field(init=False)
 

@@ -22,14 +22,10 @@ class ScenarioProblem(GuardedProblem):
     The variables are those of the layout. Every motion is planned anew. Distances are those of the layout in place.
     Directions of a displaced base are those of the base in place: the same for one that is moved and turned about the
     vertical.
-
-    Attributes:
-        displacements: Whose bases are displaced.
-        d: By how much, shape (S, m); no displacement first.
     """
 
-    displacements: BaseDisplacements
-    d: Array
+    displacements: BaseDisplacements  # whose bases are displaced
+    d: Array  # by how much, shape (S, m); no displacement first
 
     def __post_init__(self) -> None:
         """Repeat the nodes."""

@@ -16,25 +16,15 @@ HALVINGS: Final = 9  # [-] of the range: to 3 % of that amount
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tolerance:
-    """How far one base may be off in one direction, all else in place.
+    """How far one base may be off in one direction, all else in place."""
 
-    Attributes:
-        name: Address of what is displaced.
-        sign: Direction, -1 or 1.
-        unit: The displacement by 1 [m] or [rad] in this direction, shape (m,).
-        start: Start posture at ``kept`` in [rad] or [m], shape (nq,).
-        kept: Largest displacement found in [m] or [rad] at which all demands are kept, not negative.
-        missed: Smallest one found at which a demand is missed; inf where none was missed as far as was asked.
-        first: The demand that is missed there; empty without one.
-    """
-
-    name: str
-    sign: float
-    unit: Array
-    start: Array
-    kept: float
-    missed: float
-    first: str
+    name: str  # address of what is displaced
+    sign: float  # direction, -1 or 1
+    unit: Array  # the displacement by 1 [m] or [rad] in this direction, shape (m,)
+    start: Array  # start posture at ``kept`` in [rad] or [m], shape (nq,)
+    kept: float  # largest displacement found in [m] or [rad] at which all demands are kept, not negative
+    missed: float  # smallest one found at which a demand is missed; inf where none was missed as far as was asked
+    first: str  # the demand that is missed there; empty without one
 
 
 def tolerances(

@@ -22,21 +22,13 @@ MOST: Final = 8  # [-] corners of each kind of demand
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Worst:
-    """What displacements may take from the demands of one layout.
+    """What displacements may take from the demands of one layout."""
 
-    Attributes:
-        margins: What they take from the margins at the nodes to first order, in [rad] or [m], shape (N, nq).
-        speeds: Likewise from the speeds as shares of their limits, shape (N, nq).
-        accelerations: Likewise from the accelerations, shape (N, nq).
-        distances: Likewise from each pair of bodies in [m], shape (pairs,).
-        corners: The displacements that do it for what comes nearest to its limit, shape (K, m).
-    """
-
-    margins: Array
-    speeds: Array
-    accelerations: Array
-    distances: Array
-    corners: Array
+    margins: Array  # what they take from the margins at the nodes to first order, in [rad] or [m], shape (N, nq)
+    speeds: Array  # likewise from the speeds as shares of their limits, shape (N, nq)
+    accelerations: Array  # likewise from the accelerations, shape (N, nq)
+    distances: Array  # likewise from each pair of bodies in [m], shape (pairs,)
+    corners: Array  # the displacements that do it for what comes nearest to its limit, shape (K, m)
 
 
 def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effort) -> Worst:

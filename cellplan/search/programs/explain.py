@@ -21,18 +21,15 @@ class Binding:
     """A demand that keeps the objective from being better.
 
     Attributes:
-        kind: What it is about.
-        names: Robot and joint, the two bodies, or the robot whose singular values they are.
-        time: When, in [s] on the clock of the nodes.
         share: Of the objective's gradient; that of speeds and accelerations where the cycle is the objective, so that
             these add up to 1.
         gain: What the objective gains per unit in SI by which the demand is lower, of singular values per share of it;
             None where it is the objective.
     """
 
-    kind: Kind
-    names: tuple[str, str]
-    time: float
+    kind: Kind  # what it is about
+    names: tuple[str, str]  # robot and joint, the two bodies, or the robot whose singular values they are
+    time: float  # when, in [s] on the clock of the nodes
     share: float
     gain: float | None
 
@@ -42,14 +39,12 @@ class Explanation:
     """What binds at a point and what each variable does.
 
     Attributes:
-        binding: What binds, the largest share first.
-        by_variable: Derivatives of the objective by the variables in SI, whatever else is demanded, shape (n,).
         held: How fast the objective still falls along each variable with all demands kept, shape (n,): not 0 only where
             the variable is at its bound, or the point is no local optimum.
     """
 
-    binding: tuple[Binding, ...]
-    by_variable: Array
+    binding: tuple[Binding, ...]  # what binds, the largest share first
+    by_variable: Array  # derivatives of the objective by the variables in SI, whatever else is demanded, shape (n,)
     held: Array
 
 

@@ -32,44 +32,26 @@ GIVE_UP_AFTER: Final = 12  # programs: see ``Effort.give_up_above``
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Iteration:
-    """One program.
+    """One program."""
 
-    Attributes:
-        cycle: Shortest cycle in [s] after it.
-        violation: What is missed after it, in usual units; 0 where all demands are kept.
-        objective: The objective after it.
-        trust: Radius of the trust region in usual steps.
-        is_taken: Whether its step was taken.
-    """
-
-    cycle: float
-    violation: float
-    objective: float
-    trust: float
-    is_taken: bool
+    cycle: float  # shortest cycle in [s] after it
+    violation: float  # what is missed after it, in usual units; 0 where all demands are kept
+    objective: float  # the objective after it
+    trust: float  # radius of the trust region in usual steps
+    is_taken: bool  # whether its step was taken
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Improved:
-    """What a local optimisation comes to: the best conforming point, else the one that misses least.
+    """What a local optimisation comes to: the best conforming point, else the one that misses least."""
 
-    Attributes:
-        x: The variables, shape (n,).
-        start: Start posture of all joints in [rad] or [m], shape (nq,).
-        point: The motion.
-        cycle: Shortest cycle in [s].
-        objective: What was to be small, see ``Measures.objective``.
-        violation: What is missed, in usual units; 0 where all demands are kept at the nodes and keys.
-        history: All programs.
-    """
-
-    x: Array
-    start: Array
-    point: Point
-    cycle: float
-    objective: float
-    violation: float
-    history: tuple[Iteration, ...]
+    x: Array  # the variables, shape (n,)
+    start: Array  # start posture of all joints in [rad] or [m], shape (nq,)
+    point: Point  # the motion
+    cycle: float  # shortest cycle in [s]
+    objective: float  # what was to be small, see ``Measures.objective``
+    violation: float  # what is missed, in usual units; 0 where all demands are kept at the nodes and keys
+    history: tuple[Iteration, ...]  # all programs
 
     @property
     def is_conforming(self) -> bool:

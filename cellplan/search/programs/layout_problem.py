@@ -22,19 +22,12 @@ from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutProblem:
-    """See ``Problem``.
+    """See ``Problem``."""
 
-    Attributes:
-        job: The job at its nodes.
-        variables: What may vary.
-        bodies: The bodies of the cell.
-        acceleration: See ``Problem``.
-    """
-
-    job: Job
-    variables: KernelVariables
+    job: Job  # the job at its nodes
+    variables: KernelVariables  # what may vary
     bodies: CellDistances
-    acceleration: Array
+    acceleration: Array  # see ``Problem``
     names: tuple[str, ...] = field(init=False)
     lower: Array = field(init=False)
     upper: Array = field(init=False)

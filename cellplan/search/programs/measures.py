@@ -38,35 +38,25 @@ class Measures:
     """Figures of one point; see ``Problem.is_dense`` for extremes between nodes.
 
     Attributes:
-        point: The point.
-        lower: Distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq).
-        upper: Likewise from their upper limits.
         speeds: Speeds as shares of their limits, shape (N, nq); of a retimed motion those of its shortest cycle, as if
             it lasted as long as the nodes do.
         accelerations: Accelerations likewise, shape (N, nq): the motion must last as many times as long as the nodes do
             as the root of them says.
-        distances: Near pairs at the keys.
-        lacks: By how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,).
-        within: Distance in [m] beyond what is demanded, from which on pairs are not near.
-        factor: How many times as long as the nodes the motion must last for all speeds and accelerations.
-        cycle: Shortest cycle in [s].
-        arms: Least singular values of the arms; None where none are demanded.
-        singular: Shares of what is demanded of them that they miss, negative where they keep it, shape (N, A).
         pace: The motion as fast as the limits allow everywhere; None where it is timed by the laws of the cell.
     """
 
     point: Point
-    lower: Crests
-    upper: Crests
+    lower: Crests  # distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq)
+    upper: Crests  # likewise from their upper limits
     speeds: Crests
     accelerations: Crests
-    distances: Distances
-    lacks: Array
-    within: float
-    factor: float
-    cycle: float
-    arms: ArmValues | None
-    singular: Crests
+    distances: Distances  # near pairs at the keys
+    lacks: Array  # by how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,)
+    within: float  # distance in [m] beyond what is demanded, from which on pairs are not near
+    factor: float  # how many times as long as the nodes the motion must last for all speeds and accelerations
+    cycle: float  # shortest cycle in [s]
+    arms: ArmValues | None  # least singular values of the arms; None where none are demanded
+    singular: Crests  # shares of what is demanded of them that they miss, negative where they keep it, shape (N, A)
     pace: Pace | None = None
 
     @classmethod
@@ -167,15 +157,10 @@ class Measures:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Missed:
-    """What joints and pairs miss at their worst, in usual units.
+    """What joints and pairs miss at their worst, in usual units."""
 
-    Attributes:
-        lacks: With the whole room, negative where kept, shape (F,).
-        allowed: What of it counts as kept, shape (F,).
-    """
-
-    lacks: Array
-    allowed: Array
+    lacks: Array  # with the whole room, negative where kept, shape (F,)
+    allowed: Array  # what of it counts as kept, shape (F,)
 
     @property
     def violation(self) -> float:

@@ -9,15 +9,10 @@ from cellplan.search.programs.problem import Distances
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NearPairs:
-    """Near pairs and the nodes that their keys are.
+    """Near pairs and the nodes that their keys are."""
 
-    Attributes:
-        near: The pairs.
-        nodes: The nodes, shape (K,).
-    """
-
-    near: LayoutDistances
-    nodes: Indices
+    near: LayoutDistances  # the pairs
+    nodes: Indices  # the nodes, shape (K,)
 
     @classmethod
     def of(cls, distances: Distances) -> "NearPairs":

@@ -29,22 +29,18 @@ class Demands:
     """What is demanded of a point.
 
     Attributes:
-        objective: What is improved.
-        margin: Smallest distances of the joints from their limits in [rad] or [m], shape (nq,).
         duration: Cycle in [s] that the limits of speed and acceleration must allow; None where any will do. The
             objectives clearance and change need one.
-        timing: How the motion is timed.
-        clearance: Added to what the cell demands of every pair but those of one robot's own bodies, in [m].
         singular: Least singular values of the arms in [m] and [rad], shape (A,), see ``Problem``; None for any.
         beyond: Distances in [m] that pairs keep beyond all that, as something that is not known may take as much away,
             shape (pairs,); None for nothing.
     """
 
-    objective: Objective
-    margin: Array
+    objective: Objective  # what is improved
+    margin: Array  # smallest distances of the joints from their limits in [rad] or [m], shape (nq,)
     duration: float | None = None
-    timing: Timing = Timing.LAWS
-    clearance: float = 0.0
+    timing: Timing = Timing.LAWS  # how the motion is timed
+    clearance: float = 0.0  # added to what the cell demands of every pair but those of one robot's own bodies, in [m]
     singular: Array | None = None
     beyond: Array | None = None
 
@@ -61,20 +57,13 @@ class Room:
     """By how much more than demanded the rows of a program ask for, so that what a step bends does not break a demand.
 
     Half of it counts as kept at a point.
-
-    Attributes:
-        margin: In [rad] or [m].
-        distance: In [m].
-        own: Likewise of a robot's own bodies: little, as their distances are often its design.
-        time: Share of the duration.
-        singular: Share of the singular values that are demanded.
     """
 
-    margin: float = float(np.radians(0.15))
-    distance: float = 0.0025
-    own: float = 0.0001
-    time: float = 0.002
-    singular: float = 0.02
+    margin: float = float(np.radians(0.15))  # in [rad] or [m]
+    distance: float = 0.0025  # in [m]
+    own: float = 0.0001  # likewise of a robot's own bodies: little, as their distances are often its design
+    time: float = 0.002  # share of the duration
+    singular: float = 0.02  # share of the singular values that are demanded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,21 +71,14 @@ class Effort:
     """How much work a local optimisation may do: counts only, so that equal inputs give equal answers.
 
     Attributes:
-        iterations: Linear programs at most.
-        keys: Configurations at which distances are asked, evenly over the motion.
-        also_at: Times in [s] along the nodes at which they are asked as well.
-        within: Distance in [m] above what is demanded, within which pairs become rows.
-        trust: First radius of the trust region, in usual steps of the variables.
-        room: What the rows ask for beyond the demands.
-        least_gain: Share of the objective that ``LOOKS_BACK`` programs must gain to go on.
         give_up_above: Objective above which it is given up after ``GIVE_UP_AFTER`` programs; None for never.
     """
 
-    iterations: int = 60
-    keys: int = 9
-    also_at: tuple[float, ...] = ()
-    within: float = 0.06
-    trust: float = 0.5
-    room: Room = field(default_factory=Room)
-    least_gain: float = 3e-3
+    iterations: int = 60  # linear programs at most
+    keys: int = 9  # configurations at which distances are asked, evenly over the motion
+    also_at: tuple[float, ...] = ()  # times in [s] along the nodes at which they are asked as well
+    within: float = 0.06  # distance in [m] above what is demanded, within which pairs become rows
+    trust: float = 0.5  # first radius of the trust region, in usual steps of the variables
+    room: Room = field(default_factory=Room)  # what the rows ask for beyond the demands
+    least_gain: float = 3e-3  # share of the objective that ``LOOKS_BACK`` programs must gain to go on
     give_up_above: float | None = None

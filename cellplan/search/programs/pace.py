@@ -25,21 +25,13 @@ FEWEST_NODES: Final = 4  # [-] of a stretch: an end at rest takes its direction 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stretch:
-    """Nodes from one rest of the path to the next, M of them.
+    """Nodes from one rest of the path to the next, M of them."""
 
-    Attributes:
-        nodes: The nodes, shape (M,).
-        rates: Derivatives of the length by the nominal time there, shape (M,); 1 instead of 0 at a rest.
-        bends: Second derivatives, shape (M,).
-        steps: Lengths between the nodes, positive, shape (M - 1,).
-        at_rest: Whether all joints rest over the nominal time at the first and at the last node.
-    """
-
-    nodes: Indices
-    rates: Array
-    bends: Array
-    steps: Array
-    at_rest: tuple[bool, bool]
+    nodes: Indices  # the nodes, shape (M,)
+    rates: Array  # derivatives of the length by the nominal time there, shape (M,); 1 instead of 0 at a rest
+    bends: Array  # second derivatives, shape (M,)
+    steps: Array  # lengths between the nodes, positive, shape (M - 1,)
+    at_rest: tuple[bool, bool]  # whether all joints rest over the nominal time at the first and at the last node
 
     def directions(self, qd: Array) -> Array:
         """Derivatives of the joints by the length, of all (N, ...) the (M, ...); at a rest those beside it go on."""
@@ -64,41 +56,27 @@ class Places:
     """Where loads are limited, E places: at ``directions[at] * by_direction + curvatures[at] * by_curvature``.
 
     Attributes:
-        at: Places along all stretches, shape (E,).
-        is_speed: Whether it is about speeds, not accelerations, shape (E,).
-        by_direction: Speed or acceleration of the path, shape (E,).
-        by_curvature: Square of its speed, 0 for speeds, shape (E,).
-        around: Places of the squares that these depend on, shape (E, 2).
         changes: Derivatives of both by relative changes of these squares, shape (E, 2, 2): first of ``by_direction``.
     """
 
-    at: Indices
-    is_speed: Flags
-    by_direction: Array
-    by_curvature: Array
-    around: Indices
+    at: Indices  # places along all stretches, shape (E,)
+    is_speed: Flags  # whether it is about speeds, not accelerations, shape (E,)
+    by_direction: Array  # speed or acceleration of the path, shape (E,)
+    by_curvature: Array  # square of its speed, 0 for speeds, shape (E,)
+    around: Indices  # places of the squares that these depend on, shape (E, 2)
     changes: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pace:
-    """The fastest motion along the path of a point; P places along all its stretches, m of them not at their ends.
+    """The fastest motion along the path of a point; P places along all its stretches, m of them not at their ends."""
 
-    Attributes:
-        stretches: Its stretches from rest to rest.
-        velocity: Limits of the speeds in [rad/s] or [m/s], shape (nq,).
-        acceleration: Limits of the accelerations in [rad/s^2] or [m/s^2], inf for none, shape (nq,).
-        squares: Squares c of the speed, 0 at the ends of stretches, shape (P,).
-        seconds: Time that it takes.
-        shares: Shares of this time: where a square rises by a share y it falls by y / 2 of them, shape (P,).
-    """
-
-    stretches: tuple[Stretch, ...]
-    velocity: Array
-    acceleration: Array
-    squares: Array
-    seconds: float
-    shares: Array
+    stretches: tuple[Stretch, ...]  # its stretches from rest to rest
+    velocity: Array  # limits of the speeds in [rad/s] or [m/s], shape (nq,)
+    acceleration: Array  # limits of the accelerations in [rad/s^2] or [m/s^2], inf for none, shape (nq,)
+    squares: Array  # squares c of the speed, 0 at the ends of stretches, shape (P,)
+    seconds: float  # time that it takes
+    shares: Array  # shares of this time: where a square rises by a share y it falls by y / 2 of them, shape (P,)
 
     @classmethod
     def of(cls, problem: Problem, point: Point) -> Self:

@@ -13,58 +13,37 @@ class Point:
     """Values of the variables and the motion that comes of them.
 
     Attributes:
-        x: The variables, shape (n,).
-        start: Start posture of all joints in [rad] or [m], shape (nq,).
-        q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
-        qd: Their speeds, shape (N, nq).
-        qdd: Their accelerations, shape (N, nq).
         rates: How the speeds change with the joints at their node, shape (N, nq, nq); None where that is not known.
     """
 
-    x: Array
-    start: Array
-    q: Array
-    qd: Array
-    qdd: Array
+    x: Array  # the variables, shape (n,)
+    start: Array  # start posture of all joints in [rad] or [m], shape (nq,)
+    q: Array  # joint positions at the nodes in [rad] or [m], shape (N, nq)
+    qd: Array  # their speeds, shape (N, nq)
+    qdd: Array  # their accelerations, shape (N, nq)
     rates: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PointDerivatives:
-    """Derivatives of a motion by the n variables.
+    """Derivatives of a motion by the n variables."""
 
-    Attributes:
-        q: Of the joint positions at the nodes, shape (N, nq, n).
-        qd: Of their speeds, shape (N, nq, n).
-        qdd: Of their accelerations, shape (N, nq, n); None where no joint has a limit of acceleration.
-        rates: See ``Point``.
-    """
-
-    q: Array
-    qd: Array
-    qdd: Array | None
-    rates: Array | None = None
+    q: Array  # of the joint positions at the nodes, shape (N, nq, n)
+    qd: Array  # of their speeds, shape (N, nq, n)
+    qdd: Array | None  # of their accelerations, shape (N, nq, n); None where no joint has a limit of acceleration
+    rates: Array | None = None  # see ``Point``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Distances:
-    """Distances of near pairs of bodies at some nodes, M of them.
+    """Distances of near pairs of bodies at some nodes, M of them."""
 
-    Attributes:
-        pairs: Numbers of the pairs, the same at every point, shape (M,).
-        nodes: Nodes of the motion, shape (M,).
-        values: Signed distances in [m], shape (M,).
-        demands: What the cell demands of them in [m], shape (M,).
-        is_own: Whether both bodies belong to one robot, so that its design may set the distance, shape (M,).
-        found: What the problem needs for their derivatives.
-    """
-
-    pairs: Indices
-    nodes: Indices
-    values: Array
-    demands: Array
-    is_own: Flags
-    found: object
+    pairs: Indices  # numbers of the pairs, the same at every point, shape (M,)
+    nodes: Indices  # nodes of the motion, shape (M,)
+    values: Array  # signed distances in [m], shape (M,)
+    demands: Array  # what the cell demands of them in [m], shape (M,)
+    is_own: Flags  # whether both bodies belong to one robot, so that its design may set the distance, shape (M,)
+    found: object  # what the problem needs for their derivatives
 
 
 class ArmValues(Protocol):

@@ -29,17 +29,13 @@ class Step:
 
     Attributes:
         z: The step in usual steps of the variables, then relative changes of the squares of a retimed motion, (n + m,).
-        expected: What it is expected to gain.
-        left: What is still missed after it, by the rows, in usual units.
-        before: What is missed before it.
-        solved: The whole solution.
     """
 
     z: Array
-    expected: float
-    left: float
-    before: float
-    solved: Solved
+    expected: float  # what it is expected to gain
+    left: float  # what is still missed after it, by the rows, in usual units
+    before: float  # what is missed before it
+    solved: Solved  # the whole solution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,22 +44,14 @@ class Program:
 
     The time of a retimed motion is convex in the squares of its speed, which are part of the step: it is quadratic in
     them, so that they do not change from one bound to the other.
-
-    Attributes:
-        rows: The rows, stacked.
-        box: Lower and upper ends of the step in usual steps, shape (n + m,) each.
-        demands: What is demanded.
-        changed: Cost of the present change and of one usual step of each variable, shape (n,) each.
-        curved: Second derivatives of the objective by the step, shape (n + m,).
-        price: What a slack of one unit costs.
     """
 
-    rows: Sequence[Rows]
-    box: tuple[Array, Array]
-    demands: Demands
-    changed: tuple[Array, Array]
-    curved: Array
-    price: float = 1.0
+    rows: Sequence[Rows]  # the rows, stacked
+    box: tuple[Array, Array]  # lower and upper ends of the step in usual steps, shape (n + m,) each
+    demands: Demands  # what is demanded
+    changed: tuple[Array, Array]  # cost of the present change and of one usual step of each variable, shape (n,) each
+    curved: Array  # second derivatives of the objective by the step, shape (n + m,)
+    price: float = 1.0  # what a slack of one unit costs
 
     @classmethod
     def of(cls, linear: Linear, demands: Demands, room: Room, trust: float) -> "Program":

@@ -19,27 +19,16 @@ LEAST_LOAD: Final = 0.5  # [-] shares of limits of a retimed motion from which o
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Rows:
-    """Rows ``lack + gradient z <= aim t``, of a step z in usual steps of the variables and the objective t.
+    """Rows ``lack + gradient z <= aim t``, of a step z in usual steps of the variables and the objective t."""
 
-    Attributes:
-        kind: What they are about.
-        subjects: Columns of joints, or numbers of pairs, shape (M,).
-        nodes: Nodes of the motion, shape (M,).
-        lacks: By how much the demand and the room are missed now, in usual units, negative where kept, shape (M,).
-        gradients: Derivatives of the lacks by z, shape (M, n).
-        allowed: What of the lacks counts as kept at a point, shape (M,).
-        units: Usual units of what is measured, see ``Measures.values``, shape (M,).
-        aim: 1 where the row bounds the objective, 0 where it must be kept.
-    """
-
-    kind: Kind
-    subjects: Indices
-    nodes: Indices
-    lacks: Array
-    gradients: Array
-    allowed: Array
-    units: Array
-    aim: float = 0.0
+    kind: Kind  # what they are about
+    subjects: Indices  # columns of joints, or numbers of pairs, shape (M,)
+    nodes: Indices  # nodes of the motion, shape (M,)
+    lacks: Array  # by how much the demand and the room are missed now, in usual units, negative where kept, shape (M,)
+    gradients: Array  # derivatives of the lacks by z, shape (M, n)
+    allowed: Array  # what of the lacks counts as kept at a point, shape (M,)
+    units: Array  # usual units of what is measured, see ``Measures.values``, shape (M,)
+    aim: float = 0.0  # 1 where the row bounds the objective, 0 where it must be kept
 
     def that_can_bind(self, box: Array) -> Self:
         """Those that a step within ``+-box`` can bring to their bounds."""
@@ -71,17 +60,11 @@ class Rows:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PacedRows(Rows):
-    """Rows about speeds or accelerations of a retimed motion; the squares of the path's speed are unknowns as well.
+    """Rows about speeds or accelerations of a retimed motion; the squares of the path's speed are unknowns as well."""
 
-    Attributes:
-        pace: The motion.
-        places: Numbers of the loads, see ``Pace.loads``, shape (M,).
-        signs: Signs of the loads, shape (M,).
-    """
-
-    pace: Pace
-    places: Indices
-    signs: Array
+    pace: Pace  # the motion
+    places: Indices  # numbers of the loads, see ``Pace.loads``, shape (M,)
+    signs: Array  # signs of the loads, shape (M,)
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
         """See ``Rows``: with the squares that the step was to have."""

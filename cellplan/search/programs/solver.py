@@ -15,17 +15,11 @@ PROVED: Final = 1e-6  # [-] by which an answer may miss a row of length 1
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solved:
-    """The least point of a program.
+    """The least point of a program."""
 
-    Attributes:
-        at: The point, shape (n,).
-        multipliers: How fast the least value falls as a row's bound rises, shape (M,), none negative.
-        of_bounds: The same of the bounds of the variables, negative at lower ones, shape (n,).
-    """
-
-    at: Array
-    multipliers: Array
-    of_bounds: Array
+    at: Array  # the point, shape (n,)
+    multipliers: Array  # how fast the least value falls as a row's bound rises, shape (M,), none negative
+    of_bounds: Array  # the same of the bounds of the variables, negative at lower ones, shape (n,)
 
 
 def least(cost: Array, weights: Array, rows: Array, highest: Array, bounds: tuple[Array, Array]) -> Solved | None:

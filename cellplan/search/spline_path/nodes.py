@@ -28,22 +28,17 @@ class PathNodes:
     node of its own, which sees the desired motion from inside.
 
     Attributes:
-        job: The job; the joints of the positioner are given, not resolved.
-        columns: Place of the positioner's joints in the stacked joint vector.
-        operators: Columns of the joints of each relation's robot, shape (T, 6).
-        count: Number of coefficients.
-        degree: Degree of the spline.
         shares: What each coefficient contributes to a joint, its speed in [1/s] and its acceleration in [1/s^2] at the
             nodes, shape (3, N, count).
         rates: Derivatives by time in [1/s] at the nodes, of what is given at them: of the polynomial through the nodes
             of a stretch, shape (N, N).
     """
 
-    job: Job
-    columns: slice
-    operators: Indices
-    count: int
-    degree: int
+    job: Job  # the job; the joints of the positioner are given, not resolved
+    columns: slice  # place of the positioner's joints in the stacked joint vector
+    operators: Indices  # columns of the joints of each relation's robot, shape (T, 6)
+    count: int  # number of coefficients
+    degree: int  # degree of the spline
     shares: Array
     rates: Array
 

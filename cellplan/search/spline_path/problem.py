@@ -29,21 +29,13 @@ class WrittenVariables(KernelVariables, Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathProblem:
-    """See ``Problem``: the coefficients of the path are the first variables, those of the layout the others.
+    """See ``Problem``: the coefficients of the path are the first variables, those of the layout the others."""
 
-    Attributes:
-        nodes: The job at its nodes.
-        path: The coefficients.
-        layout: What else may vary.
-        bodies: The bodies of the cell.
-        acceleration: See ``Problem``.
-    """
-
-    nodes: PathNodes
-    path: PathVariables
-    layout: WrittenVariables
+    nodes: PathNodes  # the job at its nodes
+    path: PathVariables  # the coefficients
+    layout: WrittenVariables  # what else may vary
     bodies: CellDistances
-    acceleration: Array
+    acceleration: Array  # see ``Problem``
     names: tuple[str, ...] = field(init=False)
     lower: Array = field(init=False)
     upper: Array = field(init=False)

@@ -19,25 +19,15 @@ FARTHEST: Final = float(np.radians(1080.0))  # [rad] or [m] of a coefficient of 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathVariables:
-    """The coefficients, one configuration after the other.
+    """The coefficients, one configuration after the other."""
 
-    Attributes:
-        robot: Name of the positioner.
-        given: The path that is searched from.
-        names: Addresses in the cell file, n of them.
-        lower: Lowest values in [rad] or [m], shape (n,).
-        upper: Highest values, shape (n,).
-        scale: A usual step of each, shape (n,).
-        cost: Cost of a change by one unit of each, shape (n,): 1 for a change of the whole path by a usual step.
-    """
-
-    robot: str
-    given: JointSpline
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    scale: Array
-    cost: Array
+    robot: str  # name of the positioner
+    given: JointSpline  # the path that is searched from
+    names: tuple[str, ...]  # addresses in the cell file, n of them
+    lower: Array  # lowest values in [rad] or [m], shape (n,)
+    upper: Array  # highest values, shape (n,)
+    scale: Array  # A usual step of each, shape (n,)
+    cost: Array  # cost of a change by one unit of each, shape (n,): 1 for a change of the whole path by a usual step
 
     @classmethod
     def of(cls, cell: Cell, robot: str, given: JointSpline) -> "PathVariables":

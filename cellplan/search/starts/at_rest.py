@@ -32,40 +32,24 @@ ROOMY: Final = 0.7  # [rad, m] a margin above which more of it is worth no more
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
-    """Where the part rests.
+    """Where the part rests."""
 
-    Attributes:
-        x: The variables; those of operators as given, shape (n,).
-        start: Start postures; those of operators as given, shape (nq,).
-        X_WB: Base of every robot, shape (robots, 4, 4).
-        X_WP: The part, shape (4, 4).
-    """
-
-    x: Array
-    start: Array
-    X_WB: Array
-    X_WP: Array
+    x: Array  # the variables; those of operators as given, shape (n,)
+    start: Array  # start postures; those of operators as given, shape (nq,)
+    X_WB: Array  # base of every robot, shape (robots, 4, 4)
+    X_WP: Array  # the part, shape (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Pool:
-    """Bases of an operator, or of several tied ones, that follow with the part at rest, the best first; M of them.
+    """Bases of an operator, or of several tied ones, that follow with the part at rest, the best first; M of them."""
 
-    Attributes:
-        x: The variables, shape (M, n).
-        columns: Those that count.
-        q: Start configurations in [rad] or [m], shape (M, j).
-        joints: Columns of these joints among all, shape (j,).
-        cost: What following costs in speed and margin, shape (M,).
-        drops: How many draws failed by what.
-    """
-
-    x: Array
-    columns: Indices
-    q: Array
-    joints: Indices
-    cost: Array
-    drops: Counter[str]
+    x: Array  # the variables, shape (M, n)
+    columns: Indices  # those that count
+    q: Array  # start configurations in [rad] or [m], shape (M, j)
+    joints: Indices  # columns of these joints among all, shape (j,)
+    cost: Array  # what following costs in speed and margin, shape (M,)
+    drops: Counter[str]  # how many draws failed by what
 
 
 def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tuple[list[Setting], Counter[str]]:

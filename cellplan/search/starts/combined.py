@@ -27,23 +27,14 @@ LENGTH: Final = 0.01  # [m] of a distance too short
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Judged:
-    """Candidates and what is left of them, the best first; F of them.
+    """Candidates and what is left of them, the best first; F of them."""
 
-    Attributes:
-        x: The variables, shape (F, n).
-        start: Start postures with the tools on their paths, shape (F, nq).
-        violation: 0 for those that keep all limits and distances that were asked, shape (F,).
-        cycle: Shortest time in [s] of the same motion that keeps speeds and accelerations, shape (F,).
-        picks: What was picked of each pool, shape (F, pools).
-        drops: How many candidates failed by what.
-    """
-
-    x: Array
-    start: Array
-    violation: Array
-    cycle: Array
-    picks: Indices
-    drops: Counter[str]
+    x: Array  # the variables, shape (F, n)
+    start: Array  # start postures with the tools on their paths, shape (F, nq)
+    violation: Array  # 0 for those that keep all limits and distances that were asked, shape (F,)
+    cycle: Array  # shortest time in [s] of the same motion that keeps speeds and accelerations, shape (F,)
+    picks: Indices  # what was picked of each pool, shape (F, pools)
+    drops: Counter[str]  # how many candidates failed by what
 
 
 def combined(

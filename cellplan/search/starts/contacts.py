@@ -22,11 +22,10 @@ class Shortfalls:
     """By how much S configurations fall short of what is demanded.
 
     Attributes:
-        worst: Largest shortfall of any pair in [m]; 0 or less where all keep their distance, shape (S,).
         pair: Names of the two bodies that fall short most, None where all keep their distance.
     """
 
-    worst: Array
+    worst: Array  # largest shortfall of any pair in [m]; 0 or less where all keep their distance, shape (S,)
     pair: tuple[tuple[str, str] | None, ...]
 
 

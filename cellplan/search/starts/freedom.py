@@ -29,18 +29,16 @@ class Freedom:
             move other operators after it as well.
         base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
             shape (robots, 4).
-        columns: Column of the start position of each joint; ``FIXED`` where there is none, shape (nq,).
         shared: Columns of the variables that place the first holder and others: equal or mirrored ones; those of
             weights are in none of these.
-        part: Columns of the variables that place a part at rest.
         leaders: By robot, the one whose own variables move it too: equal or mirrored ones; itself without any.
     """
 
     own: tuple[Indices, ...]
     base: Indices
-    columns: Indices
+    columns: Indices  # column of the start position of each joint; ``FIXED`` where there is none, shape (nq,)
     shared: Indices
-    part: Indices
+    part: Indices  # columns of the variables that place a part at rest
     leaders: tuple[int, ...]
 
     @classmethod

@@ -40,36 +40,22 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
-    """A layout from which a search may go on: all tools follow their paths.
+    """A layout from which a search may go on: all tools follow their paths."""
 
-    Attributes:
-        x: Values of the variables in [m] or [rad], shape (n,).
-        start: Start posture with the tools on their paths in [rad] or [m], shape (nq,).
-        origin: Where it comes from.
-        text: The same in words.
-        violation: 0 where limits, speeds and the distances that were asked are kept; larger the farther off.
-        cycle: Shortest time in [s] of the same motion that keeps speeds and accelerations.
-    """
-
-    x: Array
-    start: Array
-    origin: Origin
-    text: str
-    violation: float
-    cycle: float
+    x: Array  # values of the variables in [m] or [rad], shape (n,)
+    start: Array  # start posture with the tools on their paths in [rad] or [m], shape (nq,)
+    origin: Origin  # where it comes from
+    text: str  # the same in words
+    violation: float  # 0 where limits, speeds and the distances that were asked are kept; larger the farther off
+    cycle: float  # shortest time in [s] of the same motion that keeps speeds and accelerations
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Starts:
-    """The starts of one number, the best first, each far from those before it where that could be had.
-
-    Attributes:
-        found: The starts.
-        reason: Why there is none, or why draws failed that were tried before.
-    """
+    """The starts of one number, the best first, each far from those before it where that could be had."""
 
     found: tuple[Start, ...]
-    reason: str
+    reason: str  # why there is none, or why draws failed that were tried before
 
     def __iter__(self) -> Iterator[Start]:
         """The starts, the best first."""

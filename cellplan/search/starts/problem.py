@@ -34,40 +34,26 @@ class StartProblem:
     """A cell whose layout is searched.
 
     Attributes:
-        cell: The cell.
-        variables: What is varied.
-        freedom: Which of it places which robot.
-        paths: Path of every task on the common clock, by its name.
-        start: Start postures of the given layout, in mid-range where none is given, in [rad] or [m], shape (nq,).
-        margin: Demanded distance of each joint from its limits in [rad] or [m], shape (nq,).
         acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
-        job: The tasks at the nodes of a motion.
-        at_rest: The tasks at fewer nodes, for paths with the part at rest.
-        at_rest_fine: The same at more of them.
-        scene: The bodies.
-        arms: Kinematics of each robot, base and tool left open.
-        distances: What each layout is judged by in the end.
-        all_contacts: All pairs.
         contacts: Pairs of each robot with itself, the surroundings and the first holder with the part.
-        is_part_placed: Whether the part stands where a setting has it, not where the file has it.
     """
 
     cell: Cell
-    variables: StartVariables
-    freedom: Freedom
-    paths: Mapping[str, ClockedPath]
-    start: Array
-    margin: Array
+    variables: StartVariables  # what is varied
+    freedom: Freedom  # which of it places which robot
+    paths: Mapping[str, ClockedPath]  # path of every task on the common clock, by its name
+    start: Array  # start postures of the given layout, in mid-range where none is given, in [rad] or [m], shape (nq,)
+    margin: Array  # demanded distance of each joint from its limits in [rad] or [m], shape (nq,)
     acceleration: Array
-    job: Job
-    at_rest: Job
-    at_rest_fine: Job
-    scene: Scene
-    arms: tuple[FreeArm, ...]
-    distances: CellDistances
-    all_contacts: Contacts
+    job: Job  # the tasks at the nodes of a motion
+    at_rest: Job  # the tasks at fewer nodes, for paths with the part at rest
+    at_rest_fine: Job  # the same at more of them
+    scene: Scene  # the bodies
+    arms: tuple[FreeArm, ...]  # kinematics of each robot, base and tool left open
+    distances: CellDistances  # what each layout is judged by in the end
+    all_contacts: Contacts  # all pairs
     contacts: tuple[Contacts, ...]
-    is_part_placed: bool = False
+    is_part_placed: bool = False  # whether the part stands where a setting has it, not where the file has it
 
     @classmethod
     def of(cls, cell: Cell, variables: StartVariables, *, margin: Array | float = 0.0) -> "StartProblem":

@@ -51,32 +51,20 @@ class FreeArm:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Goal:
-    """Where a tool is to be.
+    """Where a tool is to be."""
 
-    Attributes:
-        relation: Its task or grasp.
-        X_RT: Its desired poses at the nodes in the frame R of the relation, shape (N, 4, 4).
-        X_WR: That frame in the world, at rest, shape (4, 4).
-    """
-
-    relation: Relation
-    X_RT: Array
-    X_WR: Array
+    relation: Relation  # its task or grasp
+    X_RT: Array  # its desired poses at the nodes in the frame R of the relation, shape (N, 4, 4)
+    X_WR: Array  # that frame in the world, at rest, shape (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Placed:
-    """Draws of one robot: B of them.
+    """Draws of one robot: B of them."""
 
-    Attributes:
-        q: Configurations in [rad] or [m], shape (B, n).
-        X_WB: Bases, shape (B, 4, 4).
-        X_FT: Tool tips in the flange frames, shape (B, 4, 4).
-    """
-
-    q: Array
-    X_WB: Array
-    X_FT: Array
+    q: Array  # configurations in [rad] or [m], shape (B, n)
+    X_WB: Array  # bases, shape (B, 4, 4)
+    X_FT: Array  # tool tips in the flange frames, shape (B, 4, 4)
 
     def of_places(self, places: Indices | Flags) -> "Placed":
         """Some of the draws."""
@@ -85,17 +73,11 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BaseBounds:
-    """How far the base of a robot may be moved.
+    """How far the base of a robot may be moved."""
 
-    Attributes:
-        is_free: Whether x, y, z and yaw are free, shape (4,).
-        lower: Lower bounds of x, y, z in [m], shape (3,); those of what is fixed are not used.
-        upper: Upper bounds likewise.
-    """
-
-    is_free: Flags
-    lower: Array
-    upper: Array
+    is_free: Flags  # whether x, y, z and yaw are free, shape (4,)
+    lower: Array  # lower bounds of x, y, z in [m], shape (3,); those of what is fixed are not used
+    upper: Array  # upper bounds likewise
 
     def clipped(self, p: Array) -> Array:
         """Places of bases in [m], shape (B, 3), brought within the bounds; what is fixed is left as it is."""

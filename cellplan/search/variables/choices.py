@@ -12,17 +12,11 @@ from cellplan.model.layout import Choice, ChoiceKind
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Choices:
-    """The discrete choices that a cell file gives.
-
-    Attributes:
-        cell: The cell.
-        chosen: Choices between robots and between modes.
-        branches: Names of the robots of which all branches of the start posture are tried.
-    """
+    """The discrete choices that a cell file gives."""
 
     cell: Cell
-    chosen: tuple[Choice, ...]
-    branches: tuple[str, ...]
+    chosen: tuple[Choice, ...]  # choices between robots and between modes
+    branches: tuple[str, ...]  # names of the robots of which all branches of the start posture are tried
 
     @classmethod
     def of(cls, cell: Cell) -> "Choices":

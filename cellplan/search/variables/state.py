@@ -20,25 +20,15 @@ ROBOTS = (VariableKind.BASE, VariableKind.TOOL, VariableKind.WEIGHT, VariableKin
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
-    """What the numbers of a layout make of a cell.
+    """What the numbers of a layout make of a cell."""
 
-    Attributes:
-        bases: Position in [m] and roll, pitch, yaw in [rad] of each base, shape (robots, 6).
-        grasps: Likewise of each holder's tool tip in the part frame, shape (holders, 6).
-        part: Likewise of the part at rest in the world, shape (6,); zero for a part that is held.
-        rods: Rods of the tools by robot; None for a tool without one.
-        spins: Spins in [rad] by task.
-        weights: Weights of all joints, shape (nq,).
-        starts: Start posture as far as it is among the numbers, NaN elsewhere, shape (nq,).
-    """
-
-    bases: Array
-    grasps: Array
-    part: Array
-    rods: tuple[Rod | None, ...]
-    spins: Array
-    weights: Array
-    starts: Array
+    bases: Array  # position in [m] and roll, pitch, yaw in [rad] of each base, shape (robots, 6)
+    grasps: Array  # likewise of each holder's tool tip in the part frame, shape (holders, 6)
+    part: Array  # likewise of the part at rest in the world, shape (6,); zero for a part that is held
+    rods: tuple[Rod | None, ...]  # rods of the tools by robot; None for a tool without one
+    spins: Array  # spins in [rad] by task
+    weights: Array  # weights of all joints, shape (nq,)
+    starts: Array  # start posture as far as it is among the numbers, NaN elsewhere, shape (nq,)
 
     @classmethod
     def given(cls, cell: Cell) -> "State":

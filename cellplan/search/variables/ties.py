@@ -23,30 +23,18 @@ class Tied:
     """The variables, n of them, and the m numbers that follow from them: ``numbers = factors x + terms``.
 
     Numbers and variables are in [m] and [rad]; of a weight they are the natural logarithm.
-
-    Attributes:
-        ranges: The numbers.
-        factors: Shape (m, n), one entry of 1 or -1 in each row.
-        terms: Shape (m,).
-        names: Address of the first number that each variable stands for.
-        lower: Lowest values, shape (n,).
-        upper: Highest values, shape (n,).
-        given: Values in the file, brought into the bounds, shape (n,).
-        scale: Usual steps, shape (n,).
-        cost: Costs of a change by one unit, shape (n,).
-        remarks: What was brought into its bounds.
     """
 
-    ranges: tuple[VaryRange, ...]
-    factors: Array
-    terms: Array
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    given: Array
-    scale: Array
-    cost: Array
-    remarks: tuple[str, ...]
+    ranges: tuple[VaryRange, ...]  # the numbers
+    factors: Array  # shape (m, n), one entry of 1 or -1 in each row
+    terms: Array  # shape (m,)
+    names: tuple[str, ...]  # address of the first number that each variable stands for
+    lower: Array  # lowest values, shape (n,)
+    upper: Array  # highest values, shape (n,)
+    given: Array  # values in the file, brought into the bounds, shape (n,)
+    scale: Array  # usual steps, shape (n,)
+    cost: Array  # costs of a change by one unit, shape (n,)
+    remarks: tuple[str, ...]  # what was brought into its bounds
 
     @classmethod
     def of(cls, settings: LayoutSettings) -> "Tied":

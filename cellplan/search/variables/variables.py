@@ -26,38 +26,22 @@ class Variables:
     """The continuous variables of a layout search, n of them, with what they do to a cell.
 
     Lengths are in [m], angles in [rad]; a variable of a joint weight is the weight's natural logarithm.
-
-    Attributes:
-        base: The cell that is searched: obstacles below varied bases are pedestals of these robots here.
-        names: Addresses in the file, of tied numbers that of the first, n of them.
-        lower: Lowest values, shape (n,).
-        upper: Highest values, shape (n,).
-        given: Values in the file, brought into the bounds, shape (n,).
-        scale: A usual step of each, shape (n,).
-        cost: Cost of a change by one unit of each, shape (n,).
-        margin: Distance from its limits that each joint is to keep, in [rad] or [m], shape (nq,).
-        remarks: What was converted, kept or brought into its bounds, for people.
-        settings: What may change, as the cell file says it.
-        tied: How the numbers of the file follow from the variables.
-        given_cell: The cell as it was given.
-        given_state: Its layout.
-        conversion: Values that turn the given cell into ``base``.
     """
 
-    base: Cell
-    names: tuple[str, ...]
-    lower: Array
-    upper: Array
-    given: Array
-    scale: Array
-    cost: Array
-    margin: Array
-    remarks: tuple[str, ...]
-    settings: LayoutSettings
-    tied: Tied
-    given_cell: Cell
-    given_state: State
-    conversion: Mapping[str, object]
+    base: Cell  # the cell that is searched: obstacles below varied bases are pedestals of these robots here
+    names: tuple[str, ...]  # addresses in the file, of tied numbers that of the first, n of them
+    lower: Array  # lowest values, shape (n,)
+    upper: Array  # highest values, shape (n,)
+    given: Array  # values in the file, brought into the bounds, shape (n,)
+    scale: Array  # A usual step of each, shape (n,)
+    cost: Array  # cost of a change by one unit of each, shape (n,)
+    margin: Array  # distance from its limits that each joint is to keep, in [rad] or [m], shape (nq,)
+    remarks: tuple[str, ...]  # what was converted, kept or brought into its bounds, for people
+    settings: LayoutSettings  # what may change, as the cell file says it
+    tied: Tied  # how the numbers of the file follow from the variables
+    given_cell: Cell  # the cell as it was given
+    given_state: State  # its layout
+    conversion: Mapping[str, object]  # values that turn the given cell into ``base``
 
     @classmethod
     def of(cls, cell: Cell, *, without: Container[str] = ()) -> "Variables":

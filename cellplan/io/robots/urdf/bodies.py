@@ -25,17 +25,13 @@ class MeshShelf:
     """Finds and reads the mesh files of one URDF, each once.
 
     Attributes:
-        folder: Folder of the URDF.
-        package_dirs: Folders that hold packages (or are one).
-        within: Folders that a mesh must lie in to be read; None for all.
-        files: Mesh files read so far, in the order of first use.
         remarks: Names of meshes that only some programs understand, one line for each kind.
     """
 
-    folder: Path
-    package_dirs: tuple[Path, ...]
-    within: AllowedFolders | None = None
-    files: list[Path] = field(default_factory=list)
+    folder: Path  # folder of the URDF
+    package_dirs: tuple[Path, ...]  # folders that hold packages (or are one)
+    within: AllowedFolders | None = None  # folders that a mesh must lie in to be read; None for all
+    files: list[Path] = field(default_factory=list)  # mesh files read so far, in the order of first use
     remarks: Remarks = field(default_factory=Remarks)
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 

@@ -69,21 +69,13 @@ class UrdfMimic:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfLimit:
-    """Limits as far as the file gives usable ones, in [rad] or [m].
+    """Limits as far as the file gives usable ones, in [rad] or [m]."""
 
-    Attributes:
-        lower: Lowest position.
-        upper: Highest position.
-        velocity: Largest velocity.
-        position_fault: What is wrong with the positions of the file, if they were not taken for that.
-        velocity_fault: What is wrong with its velocity, if it was not taken for that.
-    """
-
-    lower: float | None = None
-    upper: float | None = None
-    velocity: float | None = None
-    position_fault: str = ""
-    velocity_fault: str = ""
+    lower: float | None = None  # lowest position
+    upper: float | None = None  # highest position
+    velocity: float | None = None  # largest velocity
+    position_fault: str = ""  # what is wrong with the positions of the file, if they were not taken for that
+    velocity_fault: str = ""  # what is wrong with its velocity, if it was not taken for that
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -117,23 +109,14 @@ class UrdfJoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfDocument:
-    """All links and joints of a file by name, in its order.
+    """All links and joints of a file by name, in its order."""
 
-    Attributes:
-        file: Name of the file, without folders.
-        name: Name of the robot.
-        links: Links by name.
-        joints: Joints by name.
-        remarks: What was not read, one line for each kind.
-        included: Files that a xacro file includes, each once.
-    """
-
-    file: str
-    name: str
-    links: dict[str, UrdfLink]
-    joints: dict[str, UrdfJoint]
-    remarks: tuple[str, ...] = ()
-    included: tuple[Path, ...] = ()
+    file: str  # name of the file, without folders
+    name: str  # name of the robot
+    links: dict[str, UrdfLink]  # links by name
+    joints: dict[str, UrdfJoint]  # joints by name
+    remarks: tuple[str, ...] = ()  # what was not read, one line for each kind
+    included: tuple[Path, ...] = ()  # files that a xacro file includes, each once
 
 
 Named = TypeVar("Named", UrdfLink, UrdfJoint)

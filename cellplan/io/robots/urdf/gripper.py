@@ -24,14 +24,12 @@ class GripperState:
     """How far a cell opens the gripper of a URDF.
 
     Attributes:
-        joints: Joints that open it; none for the only movable one beyond the flange.
         opening: Travel of all sliding fingers together from their closed ends in [m]; None for an angle.
-        angle: Position of the one joint of turning fingers in [rad]; None for an opening.
     """
 
-    joints: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()  # joints that open it; none for the only movable one beyond the flange
     opening: float | None = None
-    angle: float | None = None
+    angle: float | None = None  # position of the one joint of turning fingers in [rad]; None for an opening
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,17 +31,11 @@ class Range:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Lacking:
-    """What a driven joint lacks.
-
-    Attributes:
-        joint: The joint.
-        keys: Keys of the limits that the cell has to state, such as ``velocity_deg_s``.
-        reason: What the URDF states instead.
-    """
+    """What a driven joint lacks."""
 
     joint: UrdfJoint
-    keys: tuple[str, ...]
-    reason: str
+    keys: tuple[str, ...]  # keys of the limits that the cell has to state, such as ``velocity_deg_s``
+    reason: str  # what the URDF states instead
 
 
 def lacking_limits(joints: Iterable[UrdfJoint], cell: Mapping[str, StatedLimits]) -> tuple[Lacking, ...]:

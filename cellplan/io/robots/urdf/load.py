@@ -38,26 +38,23 @@ class UrdfOptions:
 
     Attributes:
         flange: Link taken as the flange; None for the usual one (``tool0``, ``flange``, the only moving leaf).
-        package_dirs: Folders in which ``package://`` names are looked up.
         limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
         locked: Position in [rad] or [m] of joints that are held still, by name.
         locks_others: Whether all other movable joints that do not lead to the flange are held still where
             `rest_position` says.
         lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
         within: Folders that its meshes and the files that it includes must lie in; None for all.
-        xacro_args: Values of the arguments of a xacro file, by name.
-        gripper: How far its gripper is open; None to leave its joints to ``locked``.
     """
 
     flange: str | None = None
-    package_dirs: tuple[Path, ...] = ()
+    package_dirs: tuple[Path, ...] = ()  # folders in which ``package://`` names are looked up
     limits: Mapping[str, StatedLimits] = field(default_factory=dict)
     locked: Mapping[str, float] = field(default_factory=dict)
     locks_others: bool = False
     lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
-    xacro_args: Mapping[str, str] = field(default_factory=dict)
-    gripper: GripperState | None = None
+    xacro_args: Mapping[str, str] = field(default_factory=dict)  # values of the arguments of a xacro file, by name
+    gripper: GripperState | None = None  # how far its gripper is open; None to leave its joints to ``locked``
 
     @property
     def xacro(self) -> XacroSettings:
@@ -67,19 +64,12 @@ class UrdfOptions:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfRobot:
-    """A robot model, and what it was read from.
-
-    Attributes:
-        model: The model.
-        mesh_files: Mesh files, each once.
-        included: Files that a xacro file includes, each once.
-        remarks: What was not read, one line for each kind.
-    """
+    """A robot model, and what it was read from."""
 
     model: RobotModel
-    mesh_files: tuple[Path, ...]
-    included: tuple[Path, ...] = ()
-    remarks: tuple[str, ...] = ()
+    mesh_files: tuple[Path, ...]  # mesh files, each once
+    included: tuple[Path, ...] = ()  # files that a xacro file includes, each once
+    remarks: tuple[str, ...] = ()  # what was not read, one line for each kind
 
 
 def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
@@ -89,21 +79,13 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> RobotModel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfStructure:
-    """What each joint of a URDF does for one flange, before its limits and bodies are read.
+    """What each joint of a URDF does for one flange, before its limits and bodies are read."""
 
-    Attributes:
-        tree: Links and joints.
-        flange: Name of the flange link.
-        unlocked: Movable joints off the chain that are not locked by name, at rest.
-        roles: What each joint does.
-        configuration: Poses of all links while every driven joint reads zero.
-    """
-
-    tree: UrdfTree
-    flange: str
-    unlocked: tuple[UrdfJoint, ...]
-    roles: Roles
-    configuration: ZeroConfiguration
+    tree: UrdfTree  # links and joints
+    flange: str  # name of the flange link
+    unlocked: tuple[UrdfJoint, ...]  # movable joints off the chain that are not locked by name, at rest
+    roles: Roles  # what each joint does
+    configuration: ZeroConfiguration  # poses of all links while every driven joint reads zero
 
 
 def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:

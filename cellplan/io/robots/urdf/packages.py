@@ -19,17 +19,11 @@ LIKELY_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Packages:
-    """Where packages are looked up.
+    """Where packages are looked up."""
 
-    Attributes:
-        folder: Folder of the file that names them.
-        package_dirs: Folders that hold packages, or are one.
-        within: Folders that a package must lie in; None for all.
-    """
-
-    folder: Path
-    package_dirs: tuple[Path, ...] = ()
-    within: AllowedFolders | None = None
+    folder: Path  # folder of the file that names them
+    package_dirs: tuple[Path, ...] = ()  # folders that hold packages, or are one
+    within: AllowedFolders | None = None  # folders that a package must lie in; None for all
 
     def file(self, package: str, rest: str) -> tuple[Path, Path | None]:
         """A file of a package, and the folder that stands in for the package if none has its name.

@@ -33,16 +33,10 @@ class NamedConfiguration:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Srdf:
-    """What is used of an SRDF.
+    """What is used of an SRDF."""
 
-    Attributes:
-        file: Name in messages.
-        pairs: Pairs of links that are disabled.
-        configurations: Named configurations.
-    """
-
-    file: str
-    pairs: tuple[DisabledPair, ...]
+    file: str  # name in messages
+    pairs: tuple[DisabledPair, ...]  # pairs of links that are disabled
     configurations: tuple[NamedConfiguration, ...]
 
     @property

@@ -21,19 +21,12 @@ MAX_DRIVEN: Final = 64  # joints between base and flange: more are no arm
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class UrdfTree:
-    """A document whose links form one tree.
+    """A document whose links form one tree."""
 
-    Attributes:
-        document: Links and joints.
-        root: Name of the link that carries all others: the base frame B.
-        joints: Every joint after the one that carries it.
-        above: The joint that carries each link but the root.
-    """
-
-    document: UrdfDocument
-    root: str
-    joints: tuple[UrdfJoint, ...]
-    above: Mapping[str, UrdfJoint]
+    document: UrdfDocument  # links and joints
+    root: str  # name of the link that carries all others: the base frame B
+    joints: tuple[UrdfJoint, ...]  # every joint after the one that carries it
+    above: Mapping[str, UrdfJoint]  # the joint that carries each link but the root
 
     def path_to(self, link: str) -> list[UrdfJoint]:
         """Joints from the root to a link."""
@@ -46,32 +39,20 @@ class UrdfTree:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Roles:
-    """What each joint does.
+    """What each joint does."""
 
-    Attributes:
-        driven: The joints between base and flange that the planner moves, from the base on.
-        followers: Joints that a driven one moves through a linkage.
-        still: Position in [rad] or [m] of every other joint, by name; zero for fixed ones.
-    """
-
-    driven: tuple[UrdfJoint, ...]
-    followers: tuple[UrdfJoint, ...]
-    still: Mapping[str, float]
+    driven: tuple[UrdfJoint, ...]  # the joints between base and flange that the planner moves, from the base on
+    followers: tuple[UrdfJoint, ...]  # joints that a driven one moves through a linkage
+    still: Mapping[str, float]  # position in [rad] or [m] of every other joint, by name; zero for fixed ones
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ZeroConfiguration:
-    """Where everything is when all joints read zero.
+    """Where everything is when all joints read zero."""
 
-    Attributes:
-        X_BL: Pose of each link in the root link's frame, by link name.
-        X_BJ: Pose of each joint frame, by joint name.
-        carrier: Index of the driven or following joint that carries each link, by link name.
-    """
-
-    X_BL: Mapping[str, Array]
-    X_BJ: Mapping[str, Array]
-    carrier: Mapping[str, int]
+    X_BL: Mapping[str, Array]  # pose of each link in the root link's frame, by link name
+    X_BJ: Mapping[str, Array]  # pose of each joint frame, by joint name
+    carrier: Mapping[str, int]  # index of the driven or following joint that carries each link, by link name
 
 
 def build_tree(document: UrdfDocument) -> UrdfTree:

@@ -39,17 +39,11 @@ WARNING: Final = "warning: "  # how xacro begins one
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class XacroSettings:
-    """What the cell says about a xacro file.
+    """What the cell says about a xacro file."""
 
-    Attributes:
-        arguments: Values of its arguments by name.
-        package_dirs: Folders in which ``$(find NAME)`` looks for packages.
-        within: Folders that all files it reads must lie in; None for all.
-    """
-
-    arguments: Mapping[str, str] = field(default_factory=dict)
-    package_dirs: tuple[Path, ...] = ()
-    within: AllowedFolders | None = None
+    arguments: Mapping[str, str] = field(default_factory=dict)  # values of its arguments by name
+    package_dirs: tuple[Path, ...] = ()  # folders in which ``$(find NAME)`` looks for packages
+    within: AllowedFolders | None = None  # folders that all files it reads must lie in; None for all
 
 
 def expand_xacro(path: Path, settings: XacroSettings, remarks: Remarks) -> tuple[Element, tuple[Path, ...]]:

@@ -57,21 +57,13 @@ class Expansion:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Geometry:
-    """What of an expansion does not depend on the goal: a step of a search begins where the one before it ended.
+    """What of an expansion does not depend on the goal: a step of a search begins where the one before it ended."""
 
-    Attributes:
-        q: Stacked joint vector, shape (nq,).
-        signs: Signs of the joints in the tasks.
-        x: Points and directions that count, in the frames of their tasks, shape (m / 3, 3).
-        a: See ``Expansion``.
-        bends: Likewise.
-    """
-
-    q: Array
-    signs: Array
-    x: Array
-    a: Array
-    bends: tuple[Array, Array, Array]
+    q: Array  # stacked joint vector, shape (nq,)
+    signs: Array  # signs of the joints in the tasks
+    x: Array  # points and directions that count, in the frames of their tasks, shape (m / 3, 3)
+    a: Array  # see ``Expansion``
+    bends: tuple[Array, Array, Array]  # likewise
 
 
 class SearchCost:
