@@ -18,6 +18,9 @@ This page is made from the program by `docs/make_command_reference.py`; do not e
 Results go to standard output, progress and messages to standard error. With `--json` a command prints one JSON object
 and nothing else; with an error its `status` is `error` and its `exit` the exit status.
 
+An option that may be given once is refused when it is given twice, and so is one that another takes no notice of.
+What can be known from the files is refused before anything is planned, verified or drawn.
+
 | exit status | means |
 |---|---|
 | 0 | passed |

@@ -73,7 +73,7 @@ def fastest(  # noqa: PLR0913, PLR0917 - the options of the command
     folder of cellplan layout is written, with the fastest cell as best.yaml.
     """
     if free is not None:
-        words = read_words(free, {"--demand": demand, "--task": task})
+        words = read_words(free)
         chosen = [f"{key}={value}" for key, value in (("motion.mode", mode), ("solver.method", method)) if value]
         options: dict[str, Any] = {"timing": timing, "clearance": clearance, "margin": margin, "seed": seed}
         options |= {"free": words, "settings": (*(settings or ()), *chosen), "allow_dirs": tuple(allow_dir or ())}

@@ -9,19 +9,12 @@ from cellplan.cli.output import json_failure
 from cellplan.errors import InputError
 
 
-def read_words(text: str, not_meant: Mapping[str, object]) -> tuple[str, ...]:
-    """The words of ``--free``.
-
-    Args:
-        text: Words with commas between them.
-        not_meant: Values of options that do not go with it, by option; None where not given.
+def read_words(text: str) -> tuple[str, ...]:
+    """The words of ``--free``, with commas between them.
 
     Raises:
-        InputError: One of these options is given, or there is no word.
+        InputError: There is no word.
     """
-    for option, value in not_meant.items():
-        if value is not None:
-            raise InputError(f"{option}: expected not together with --free, which searches the whole job; leave it out")
     words = tuple(word.strip() for word in text.split(",") if word.strip())
     if not words:
         raise InputError("--free: expected some of start, weights, path, spin, got none")

@@ -21,6 +21,7 @@ from cellplan.cli.explain import explain
 from cellplan.cli.export import export
 from cellplan.cli.fastest import fastest
 from cellplan.cli.floor_plan import floor_plan
+from cellplan.cli.given_options import Command
 from cellplan.cli.init import init
 from cellplan.cli.layout import layout
 from cellplan.cli.output import say
@@ -83,7 +84,7 @@ def program(
 
 for group, commands in COMMANDS.items():
     for name, command in commands.items():
-        app.command(name, rich_help_panel=group, epilog=examples(name))(with_verbosity(command))
+        app.command(name, cls=Command, rich_help_panel=group, epilog=examples(name))(with_verbosity(command))
 get_completion_inspect_parameters()  # prepares the shells
 
 

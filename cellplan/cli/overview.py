@@ -5,6 +5,8 @@ from typing import Any, Final
 
 from typer.core import TyperGroup
 
+from cellplan.cli.given_options import refuse_ignored
+
 WIDEST: Final = 110  # [columns] of help; longer lines are hard to read
 FIRST_STEPS: Final = """\
 Usage: cellplan [OPTIONS] COMMAND [ARGS]...
@@ -48,6 +50,12 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
 
 class Overview(TyperGroup):
     """All commands, listed in groups."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words before the command; see ``Command.parse_args``."""
+        if not ctx.resilient_parsing:
+            refuse_ignored(self, ctx, args)
+        return super().parse_args(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a list for each group, in the order in which the commands were added."""

@@ -12,6 +12,8 @@ from cellplan.cli.options import AsJson
 from cellplan.cli.output import json_failure, say, say_json, show
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from cellplan.model.robot import RobotModel
 
 SCHEMA = "cellplan.robots/1"
@@ -64,7 +66,7 @@ def robots(
     with json_failure(SCHEMA, desired=as_json):
         if model is None and (flange or package_dir or xacro_arg):
             raise typer.BadParameter("expected a URDF with --flange, --package-dir and --xacro-arg")
-        arguments = dict(_argument(text) for text in xacro_arg or [])
+        arguments = _arguments(xacro_arg or [])
         records = _listed() if model is None else [_described(model, flange, package_dir or [], arguments)]
     if as_json:
         say_json({"schema": SCHEMA, "robots": records})
@@ -86,12 +88,17 @@ def _listed() -> list[dict[str, Any]]:
     return [_record(name, load_bundled(name)) for name in bundled_names()]
 
 
-def _argument(text: str) -> tuple[str, str]:
-    """Name and value of an argument of a xacro file."""
-    name, sign, value = text.partition("=")
-    if not name or not sign:
-        raise typer.BadParameter(f"--xacro-arg: expected NAME=VALUE, got '{text}'")
-    return name, value
+def _arguments(texts: Sequence[str]) -> dict[str, str]:
+    """Values of the arguments of a xacro file, by name."""
+    values: dict[str, str] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        if not name or not sign:
+            raise typer.BadParameter(f"--xacro-arg: expected NAME=VALUE, got '{text}'")
+        if name in values:
+            raise typer.BadParameter(f"--xacro-arg: expected every name once, got '{name}' again")
+        values[name] = value
+    return values
 
 
 def _described(model: str, flange: str | None, package_dirs: list[Path], xacro_args: dict[str, str]) -> dict[str, Any]:

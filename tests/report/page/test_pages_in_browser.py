@@ -51,7 +51,7 @@ def folder(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "fastest": ["fastest", cell],
         "map": ["map", cell, "--robot", "right", "--grid", "400", "--workers", "1"],
         "rehearsal": ["rehearse", cell, "--errors", str(errors)],
-        "repair": ["layout", str(crowded), "--repair", "--budget", "5s", "--workers", "1"],
+        "repair": ["layout", str(crowded), "--repair", "--workers", "1"],
     }.items():
         run([*command, "-q", "-o", str(folder / name)])
     crowded.unlink()
