@@ -1,6 +1,14 @@
 """A small arm in xacro: a file, a package with a macro and a YAML file of lengths."""
 
+from collections.abc import Mapping
 from pathlib import Path
+
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.io.input.allowed_folders import AllowedFolders
+from cellplan.io.robots.urdf.document import UrdfDocument, read_document
+from cellplan.io.robots.urdf.xacro import XacroSettings
 
 HEAD = '<robot name="rig" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 ARM = f"""\
@@ -38,3 +46,17 @@ def write_arm(folder: Path) -> Path:
     path = folder / "arm.urdf.xacro"
     path.write_text(ARM, encoding="utf-8")
     return path
+
+
+def expanded(folder: Path, *lines: str, args: Mapping[str, str] | None = None) -> UrdfDocument:
+    """A file of a robot whose elements stand in lines 2, 3, …, allowed to read its own folder."""
+    path = folder / "r.xacro"
+    path.write_text("\n".join([HEAD, *lines, "</robot>"]), encoding="utf-8")
+    return read_document(path, XacroSettings(arguments=args or {}, within=AllowedFolders(folder=folder)))
+
+
+def refused(folder: Path, *lines: str, args: Mapping[str, str] | None = None) -> str:
+    with pytest.raises(InputError) as caught:
+        expanded(folder, *lines, args=args)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)

@@ -210,7 +210,9 @@ class RobotEntry(Entry):
         "as FOLDER/NAME/....",
     )
     xacro_args: dict[str, XacroArgument] = Field(
-        default={}, description="Values of the arguments of a xacro file, by name; its own defaults where absent."
+        default={},
+        description="Values of the arguments of a xacro file, by name; its own defaults where absent. Paths count "
+        "from the cell file.",
     )
     flange: Text | None = Field(
         default=None,

@@ -1,5 +1,6 @@
 """Link bodies of a URDF: mesh files looked up and read, every collision element turned into one body."""
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Final
@@ -11,7 +12,7 @@ from cellplan.geometry.shapes import Mesh, Solid
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import listed, shown
 from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, UrdfSolid
-from cellplan.io.robots.urdf.packages import LEVELS_UP, Packages
+from cellplan.io.robots.urdf.packages import Packages, is_file
 from cellplan.io.robots.urdf.remarks import Remarks
 from cellplan.io.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.io.robots.urdf.xml import Element
@@ -83,85 +84,45 @@ def find_mesh(
 ) -> tuple[Path, str | None]:
     """File that a mesh name means, and a remark where other programs may read the name otherwise.
 
-    ``package://NAME/rest`` is looked up as ``DIR/NAME/rest``, then in a DIR that is itself called NAME, then in the
-    folder of the URDF and those above it, in the same two ways; ``package:///NAME/rest`` likewise, and where no
-    package is named, ``rest`` below the same folders. Other names are relative to the URDF. Absolute paths and
-    ``file://`` count below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with
-    a slash is looked up below the first two. Nothing outside the folders ``within`` is accessed.
+    ``package://NAME/rest`` is looked up as `Packages` says; ``package:///NAME/rest`` likewise, and where no package is
+    named, ``rest`` below the same folders. Other names are relative to the URDF. Absolute paths and ``file://`` count
+    below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with a slash is looked
+    up below the first two. Nothing outside the folders ``within`` is accessed.
 
     Raises:
         InputError: There is no such file; the message names every place that was tried.
     """
-    cure = ": name the folder that holds the package in `package_dirs`"
     if uri.startswith(PACKAGE):
-        places, remark = _package_places(uri.removeprefix(PACKAGE), folder, package_dirs=package_dirs)
-        tried = dict.fromkeys(places, remark)
+        packages = Packages(folder=folder, package_dirs=package_dirs, within=within)
+        tried = _package_places(uri.removeprefix(PACKAGE), packages)
     else:
         tried = _plain_places(uri, folder, package_dirs=package_dirs, within=within)
-        cure = "" if len(tried) == 1 else cure
     inside = [place for place in tried if within is None or within.holds(place)]
     if tried and not inside:
         raise InputError(
             "expected a mesh below the folder of the cell file, got one elsewhere; allow it with --allow-dir"
         )
-    found = next((place for place in inside if _is_file(place)), None)
-    if found is None and uri.startswith(PACKAGE):
-        renamed = _in_renamed_package(uri, Packages(folder=folder, package_dirs=package_dirs, within=within))
-        if renamed is not None:
-            return renamed
-    if found is None:
-        raise InputError(f"no such mesh file, tried {listed(str(place) for place in inside)}{cure}")
-    return found, tried[found]
+    place = next((place for place in inside if is_file(place)), None)
+    if place is None:
+        cure = "" if len(tried) == 1 else ": name the folder that holds it in `package_dirs`"
+        raise InputError(f"no such mesh file, tried {listed(map(str, inside))}{cure}")
+    return place, tried[place]
 
 
-def _in_renamed_package(uri: str, packages: Packages) -> tuple[Path, str | None] | None:
-    """A mesh of a package whose folder has another name, and a remark where nothing else states the name."""
-    package, _, rest = uri.removeprefix(PACKAGE).lstrip("/").partition("/")
-    try:
-        path, stand_in = packages.file(package, rest.lstrip("/"))
-    except InputError:
-        return None
-    remark = None if stand_in is None else f"no such package, read from the folder {shown(stand_in.resolve().name)}"
-    is_inside = packages.within is None or packages.within.holds(path)
-    return (path, remark) if is_inside and _is_file(path) else None
-
-
-def _is_file(place: Path) -> bool:
-    """Whether there is a file; false for names that the system cannot resolve."""
-    try:
-        return place.is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def _package_places(name: str, folder: Path, *, package_dirs: tuple[Path, ...]) -> tuple[list[Path], str | None]:
-    """Places where a file of a package may lie, and what is unusual about its name."""
+def _package_places(name: str, packages: Packages) -> dict[Path, str | None]:
+    """Places where a file of a package may lie, and what is unusual about its name at each."""
     package, _, rest = name.lstrip("/").partition("/")
     plain = rest.lstrip("/")
     if not package or package in (".", "..") or (not plain and not name.startswith("/")):
         raise InputError("expected package://NAME/path")
-    roots = _roots(folder, package_dirs)
     if not plain:
-        return [root / package for root in roots], "names no package, looked up without one"
-    places = [
-        place
-        for root in roots
-        for place in (root / package / plain, root / plain)
-        if _fits(root, place, package, plain)
-    ]
+        return dict.fromkeys((root / package for root in packages.roots), "names no package, looked up without one")
+    places, stand_in = packages.places(package, plain)
     is_usual = not name.startswith("/") and rest == plain
-    return list(dict.fromkeys(places)), None if is_usual else "has too many slashes, read as package://NAME/path"
-
-
-def _roots(folder: Path, package_dirs: tuple[Path, ...]) -> list[Path]:
-    """Folders in which packages are looked up."""
-    above = [folder, *folder.parents] if folder.is_absolute() else [folder, *folder.resolve().parents]
-    return [*package_dirs, *above[: LEVELS_UP + 1]]
-
-
-def _fits(root: Path, place: Path, package: str, rest: str) -> bool:
-    """A file straight below a folder belongs to the package only if the folder has its name."""
-    return place != root / rest or root.resolve().name == package
+    remark = None if is_usual else "has too many slashes, read as package://NAME/path"
+    if stand_in is not None:
+        remark = f"no such package, read from the folder {shown(stand_in.resolve().name)}"
+    return dict.fromkeys(places, remark)
 
 
 def _plain_places(
@@ -171,14 +132,14 @@ def _plain_places(
     scheme, mark, rest = uri.partition("://")
     if mark and scheme != "file":
         raise InputError(f"expected a path, package:// or file://, got {scheme}://")
-    path = Path(unquote(rest) if mark else uri)
+    path = Path(re.sub("^/+", "/", unquote(rest) if mark else uri))
     if not path.is_absolute():
         return {folder / path: None}
     allowed = [folder, *package_dirs, *(() if within is None else (within.folder, *within.allowed))]
     if any(path.resolve().is_relative_to(root.resolve()) for root in allowed):
         return {path: "is an absolute path, which other machines will not have"}
     below = [root / path.relative_to(path.anchor) for root in (*package_dirs, folder)]
-    if not any(_is_file(place) for place in below if within is None or within.holds(place)):
+    if not any(is_file(place) for place in below if within is None or within.holds(place)):
         raise InputError("expected an absolute path below the URDF's folder or one of `package_dirs`")
     return dict.fromkeys(below, "begins with a slash, looked up below the folders of the URDF and of packages")
 

@@ -1,6 +1,7 @@
 """Folders of packages, found without ROS: below those that the cell names, or above the file."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -25,54 +26,74 @@ class Packages:
     package_dirs: tuple[Path, ...] = ()  # folders that hold packages, or are one
     within: AllowedFolders | None = None  # folders that a package must lie in; None for all
 
-    def file(self, package: str, rest: str) -> tuple[Path, Path | None]:
-        """A file of a package, and the folder that stands in for the package if none has its name.
+    def places(self, package: str, rest: str) -> tuple[list[Path], Path | None]:
+        """Where a file of a package lies or would lie, and the folder that stands in for it if none has its name.
 
         In each of ``package_dirs``, then in ``folder`` and those above it, the package is a folder below with its name,
-        or the folder itself if its name or that in its ``package.xml`` is the right one. Where there is none, a folder
-        of another name counts that contains the file.
+        or the folder itself if it has the name. The name in a ``package.xml`` counts before that of the folder. Where
+        there is none, one of ``package_dirs`` that belongs to no package stands in for it if it contains the file.
+
+        Returns:
+            Paths within the allowed folders, at least one, those of existing files first; and the stand-in or None.
 
         Raises:
             InputError: There is no such package.
         """
-        found = self._named(package)
-        if found is not None:
-            return found / rest, None
-        for root in self._roots():
-            place = root / rest
-            if (self.within is None or self.within.holds(place)) and place.is_file():
-                return place, root
-        where = listed(shown(each.name) for each in self.package_dirs)
-        raise InputError(
-            f"no package {shown(package)} in package_dirs ({where}) or above the file: "
-            "name the folder that holds it in `package_dirs`"
-        )
+        places = [folder / rest for folder in dict.fromkeys(self._named(package))]
+        if places:
+            return sorted(places, key=lambda place: not self._holds_file(place)), None
+        for root in self.package_dirs:
+            if self._holds_file(root / rest) and not self._name_around(root):
+                return [root / rest], root
+        where = listed(dict.fromkeys(str(root.absolute()) for root in self.roots))
+        cure = "name the folder that holds it in `package_dirs`"
+        raise InputError(f"no package {shown(package)}, looked through {where}: {cure}")
 
-    def _named(self, package: str) -> Path | None:
-        """Folder of a package that is recognised by its name; None for none."""
-        if not LIKELY_NAME.fullmatch(package):
-            raise InputError(f"expected the name of a package, got {shown(package)}")
-        for root in self._roots():
-            if (root / package).is_dir():
-                return root / package
-            if root.resolve().name == package or _manifest_name(root) == package:
-                return root
-            for manifest in sorted(root.glob(f"*/{MANIFEST}")) if root in self.package_dirs else ():
-                if _manifest_name(manifest.parent) == package:
-                    return manifest.parent
-        return None
-
-    def _roots(self) -> list[Path]:
+    @property
+    def roots(self) -> list[Path]:
         """Folders that are searched, in this order."""
-        folder = self.folder.resolve()
-        roots = [*self.package_dirs, *[folder, *folder.parents][: LEVELS_UP + 1]]
+        chains = [[start, *start.parents][: LEVELS_UP + 1] for start in (self.folder.absolute(), self.folder.resolve())]
+        roots = [*self.package_dirs, *chains[0], *chains[1]]
         return [root for root in dict.fromkeys(roots) if self.within is None or self.within.holds(root)]
 
+    def _named(self, package: str) -> Iterator[Path]:
+        """Folders of a package that are recognised by its name."""
+        if not LIKELY_NAME.fullmatch(package):
+            raise InputError(f"expected the name of a package, got {shown(package)}")
+        for root in self.roots:
+            places = [root / package, root]
+            if root in self.package_dirs:
+                places += [manifest.parent for manifest in sorted(root.glob(f"*/{MANIFEST}"))]
+            yield from (place for place in places if place.is_dir() and _name_of(place) == package)
 
-def _manifest_name(folder: Path) -> str:
+    def _name_around(self, folder: Path) -> str:
+        """Name of the package that a folder belongs to; empty for none."""
+        above = [folder, *folder.resolve().parents][: LEVELS_UP + 1]
+        inside = (each for each in above if self.within is None or self.within.holds(each))
+        return next(filter(None, map(_stated_name, inside)), "")
+
+    def _holds_file(self, place: Path) -> bool:
+        """Whether there is such a file, within the allowed folders."""
+        return (self.within is None or self.within.holds(place)) and is_file(place)
+
+
+def is_file(place: Path) -> bool:
+    """Whether there is a file; false for names that the system cannot resolve."""
+    try:
+        return place.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def _name_of(folder: Path) -> str:
+    """Name of the package that a folder is: as its manifest states it, or as it is called itself."""
+    return _stated_name(folder) or folder.resolve().name
+
+
+def _stated_name(folder: Path) -> str:
     """Name that the manifest in a folder states; empty for none."""
     try:
-        found = PACKAGE_NAME.search(read_regular_file(folder / MANIFEST, file=MANIFEST, limit=MANIFEST_BYTES))
+        stated = PACKAGE_NAME.search(read_regular_file(folder / MANIFEST, file=MANIFEST, limit=MANIFEST_BYTES))
     except InputError:
         return ""
-    return found[1].decode(errors="replace") if found else ""
+    return stated[1].decode(errors="replace") if stated else ""

@@ -35,7 +35,7 @@ NEEDED_CHILDREN: Final = {
     "collision": ("origin", "geometry"),
 }
 ATTRIBUTES: Final = {
-    "origin": ("xyz", "rpy"),
+    "origin": ("xyz", "rpy", "quat_xyzw"),
     "axis": ("xyz",),
     "limit": ("lower", "upper", "velocity", "effort", "acceleration", "deceleration", "jerk"),
     "mimic": ("joint", "multiplier", "offset"),

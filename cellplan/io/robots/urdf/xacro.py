@@ -29,6 +29,7 @@ from cellplan.io.robots.urdf.xml import MAX_BYTES, MAX_DEPTH, Element, parse_xml
 
 INSTALL: Final = 'pip install "cellplan[xacro]"'
 PACKAGE: Final = "/:package:/"  # begins the path of a file in a package, until the file is read
+PACKAGE_PATH: Final = re.compile(f"(?:file:/*?)?{PACKAGE}")  # ``file://$(find NAME)/`` and ``file:///$(find NAME)/``
 PLACE: Final = "place"  # of a node in its file, kept by copies of the node
 LONGEST_REASON: Final = 200  # characters of what xacro says
 ARGUMENT: Final = re.compile(rb"\$\(arg\s+([^\s)]+)\s*\)")
@@ -79,7 +80,7 @@ class _Files:
             FileNotFoundError: There is none.
             InputError: It is elsewhere, or cannot be read.
         """
-        path = self._path_of(filename)
+        path = self.path_of(filename)
         if self._within is not None and not self._within.holds(path):
             what = "expected files below the folder of the cell file"
             raise InputError(f"{what}, got {shown(path.name)} from elsewhere; allow it with --allow-dir")
@@ -92,21 +93,21 @@ class _Files:
     def glob(self, pattern: str) -> list[str]:
         """Files that a pattern means; stands in for the function of Python."""
         start, wild = re.split(r"(?=[*?[])", pattern, maxsplit=1)
-        folder = self._path_of(start + "_").parent
+        folder = self.path_of(start + "_").parent
         if self._within is not None and not self._within.holds(folder):
             raise InputError(f"expected files below the folder of the cell file, got {shown(pattern)} from elsewhere")
         return glob.glob(f"{folder}/{start.rpartition('/')[2]}{wild}")  # noqa: PTH207 - it may lead into folders
 
-    def _path_of(self, filename: str) -> Path:
+    def path_of(self, filename: str) -> Path:
         """Path of a file, which may lie in a package."""
+        package, _, rest = filename.removeprefix(PACKAGE).partition("/")
         if not filename.startswith(PACKAGE):
             return Path(filename)
-        package, _, rest = filename.removeprefix(PACKAGE).partition("/")
-        path, stand_in = self._packages.file(package, rest)
+        places, stand_in = self._packages.places(package, rest)
         if stand_in is not None:
             text = f"no package {shown(package)} by name: its files were read from {shown(stand_in.resolve().name)}"
             self._remarks.add(text, f"{self._path.name}: {text}")
-        return path
+        return places[0]
 
 
 class _Handler:
@@ -132,6 +133,7 @@ class _Expansion:
         self._xacro, self._substitution = xacro, substitution_args
         self._files = _Files(path, settings, remarks)
         self._declared: set[str] = set()
+        self._paths: dict[str, Path] = {}  # of the files that were read, by the names that xacro has for them
 
     def run(self) -> tuple[Element, tuple[Path, ...]]:
         """The root element and the included files."""
@@ -161,6 +163,7 @@ class _Expansion:
         kept = {name: namespace[name] for name in REFUSED_SYMBOLS if name in namespace}
         changes: list[tuple[Any, str, Any]] = [
             (xacro, "parse", self._parse),
+            (xacro, "abs_filename_spec", self._absolute),
             (xacro, "open", self._open),
             (xacro, "safe_eval", evaluated),
             (xacro, "glob", SimpleNamespace(glob=self._files.glob)),
@@ -189,6 +192,9 @@ class _Expansion:
             raise InputError(f"expected at most {MAX_DEPTH} nested files, got one that includes itself, or more")
         try:
             path, data = self._files.read(filename)
+            if path in map(self._paths.get, self._xacro.filestack[:-1]):
+                raise InputError(f"expected no file that includes itself, got {shown(path.name)}")
+            self._paths[filename] = path
         except FileNotFoundError as error:
             self._xacro.filestack.pop()
             raise self._xacro.XacroException(str(error), exc=FileNotFoundError("")) from None  # may be optional
@@ -206,6 +212,29 @@ class _Expansion:
             if element.tag == "xacro:arg" and element.attributes.get("name") in self._settings.arguments:
                 node.setAttribute("default", element.attributes.get("default", ""))  # xacro demands one
         return document
+
+    def _absolute(self, filename: str) -> str:
+        """Path of a file as a macro names it; stands in for the function of xacro.
+
+        It counts from the file that names it, but from the cell where it begins with the value of an argument; what
+        does not lie there and lies beside the file is taken from there, with a remark.
+        """
+        if not filename.strip():
+            empty = [name for name, value in self._settings.arguments.items() if not value.strip()]
+            cure = f"state it as `xacro_args: {{{empty[0] if len(empty) == 1 else 'NAME'}: …}}`"
+            raise InputError(f"expected the path of a file, got an empty one: {cure}, counted from the cell file")
+        beside = Path(self._xacro.filestack[-1] or ".").parent / filename
+        if not any(
+            filename == value or filename.startswith(f"{value}/") for value in self._settings.arguments.values()
+        ):
+            return str(beside)
+        within = self._settings.within
+        place = (Path() if within is None else within.folder).absolute() / filename
+        if place.exists() or not self._files.path_of(str(beside)).exists():
+            return str(place)
+        text = f"no {shown(filename)} beside the cell file: it was read from the folder {shown(beside.parent.name)}"
+        self._remarks.add(text, f"{self._path.name}: xacro_args: {text}")
+        return str(beside)
 
     def _open(self, filename: str) -> io.StringIO:
         """Text of a YAML file; stands in for the function of Python."""
@@ -288,7 +317,7 @@ def _element(node: minidom.Element, file: str, depth: int = 1) -> Element:
 
 def _with_packages(text: str) -> str:
     """A text in which files of packages are named as URDFs do."""
-    return text.replace(f"file://{PACKAGE}", "package://").replace(PACKAGE, "package://")
+    return PACKAGE_PATH.sub("package://", text)
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

@@ -11,13 +11,14 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.numbers import plain_word
 from cellplan.geometry.mesh.strict_xml import parse_strictly
-from cellplan.geometry.transforms import Array, pose
+from cellplan.geometry.transforms import Array, pose, pose_from, quaternion_to_rotation
 from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.findings import shown
 
 MAX_BYTES: Final = 5_000_000
 MAX_DEPTH: Final = 64  # nesting of elements: a URDF needs seven
 MAX_TURN: Final = 4.0 * np.pi  # [rad] larger angles of a frame are a wrong unit
+UNIT_TOL: Final = 1e-3  # [-] of the length of a quaternion: numbers of four digits
 MAX_OFFSET: Final = 20.0  # [m] longer steps between frames are a wrong unit
 
 
@@ -102,17 +103,28 @@ def origin_of(element: Element, owner: str) -> Array:
     origin = element.one("origin", owner)
     if origin is None:
         return np.eye(4)
-    if "quat_xyzw" in origin.attributes:
-        raise origin.error(f"{owner}: expected 'rpy' in <origin>, got 'quat_xyzw', which is not supported")
     xyz = origin.numbers("xyz", 3, owner=owner, default=(0.0, 0.0, 0.0))
     if np.linalg.norm(xyz) > MAX_OFFSET:
         far = float(np.linalg.norm(xyz))
         raise origin.error(f"{owner}: expected an origin within {MAX_OFFSET:g} m, got {far:.6g} m: is the unit mm?")
+    if "quat_xyzw" in origin.attributes:
+        return pose_from(_rotation_of(origin, owner), xyz)
     rpy = origin.numbers("rpy", 3, owner=owner, default=(0.0, 0.0, 0.0))
     if np.max(np.abs(rpy)) > MAX_TURN:
         most = f"angles of at most two turns ({MAX_TURN:.4g} rad)"
         raise origin.error(f"{owner}: expected {most}, got {shown(origin.attributes['rpy'])}: is the unit deg?")
     return pose(xyz, rpy)
+
+
+def _rotation_of(origin: Element, owner: str) -> Array:
+    """Orientation that a quaternion of URDF 1.1 states, x y z w."""
+    if "rpy" in origin.attributes:
+        raise origin.error(f"{owner}: expected either 'rpy' or 'quat_xyzw' in <origin>, got both")
+    quaternion = origin.numbers("quat_xyzw", 4, owner=owner)
+    length = float(np.linalg.norm(quaternion))
+    if abs(length - 1.0) > UNIT_TOL:
+        raise origin.error(f"{owner}: expected 'quat_xyzw' of length 1, got one of length {length:.6g}")
+    return quaternion_to_rotation(np.roll(quaternion, 1))
 
 
 class _Builder:

@@ -280,3 +280,37 @@ def test_reading_the_same_file_twice_gives_the_same_numbers(shared_robots: Path)
         assert isinstance(b.shape, Mesh)
         assert np.array_equal(a.shape.vertices, b.shape.vertices)
         assert np.array_equal(a.shape.faces, b.shape.faces)
+
+
+def test_a_quaternion_turns_as_the_angles_do(tmp_path: Path) -> None:
+    """URDF 1.1 has ``quat_xyzw`` in place of ``rpy``: of joints and of bodies."""
+    rpy, xyz = np.array([0.3, -0.4, 2.0]), np.array([0.1, 0.2, 0.3])
+    quaternion = pin.Quaternion(pin.rpy.rpyToMatrix(rpy)).coeffs()
+    turned = " ".join(f"{value:.17g}" for value in quaternion)
+    origin = f'<origin xyz="0.1 0.2 0.3" quat_xyzw="{turned}"/>'
+    path = write(
+        tmp_path,
+        link("base", collision('<box size="1 2 3"/>', origin)),
+        link("tip"),
+        joint("a1", "base", "tip", origin + LIMIT),
+    )
+    model = read_urdf(path)
+
+    assert np.abs(model.X_BF - pose(xyz, rpy)).max() < 1e-15  # rounding
+    assert np.abs(model.bodies[0].X_BS - pose(xyz, rpy)).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("origin", "message"),
+    [
+        ('rpy="0 0 0" quat_xyzw="0 0 0 1"', "expected either 'rpy' or 'quat_xyzw' in <origin>, got both"),
+        ('quat_xyzw="0 0 0 2"', "expected 'quat_xyzw' of length 1, got one of length 2"),
+        ('quat_xyzw="0 0 1"', "expected 4 finite numbers in 'quat_xyzw', got '0 0 1'"),
+        ('quat_xyz="0 0 0 1"', "unknown attribute 'quat_xyz' in <origin>, did you mean 'quat_xyzw'?"),
+    ],
+)
+def test_a_quaternion_that_is_none_is_refused(tmp_path: Path, origin: str, message: str) -> None:
+    path = write(tmp_path, *arm()[:2], joint("a1", "base", "tip", f"<origin {origin}/>{LIMIT}"))
+    with pytest.raises(InputError) as caught:
+        read_urdf(path)
+    assert str(caught.value) == f"robot.urdf:5: joint 'a1': {message}"

@@ -48,9 +48,16 @@ def test_missing_meshes_name_every_place_that_was_tried(tmp_path: Path) -> None:
     )
     packages = UrdfOptions(package_dirs=(tmp_path / "ros",))
     message = refused(tmp_path, collision('<mesh filename="package://arm/a.stl"/>'), *ARM[1:], options=packages)
-    first = f"{start} 'package://arm/a.stl': no such mesh file, tried {tmp_path}/ros/arm/a.stl, {tmp_path}/arm/a.stl, "
-    assert message.startswith(first)
-    assert message.endswith(": name the folder that holds the package in `package_dirs`")
+    assert message.startswith(
+        f"{start} 'package://arm/a.stl': no package 'arm', looked through {tmp_path}/ros, {tmp_path}, "
+    )
+    assert message.endswith(": name the folder that holds it in `package_dirs`")
+    for folder in (tmp_path / "ros" / "arm", tmp_path / "arm"):
+        folder.mkdir(parents=True)
+    message = refused(tmp_path, collision('<mesh filename="package://arm/a.stl"/>'), *ARM[1:], options=packages)
+    assert message.startswith(
+        f"{start} 'package://arm/a.stl': no such mesh file, tried {tmp_path}/ros/arm/a.stl, {tmp_path}/arm/a.stl: "
+    )
 
 
 @pytest.mark.parametrize(
