@@ -1,14 +1,19 @@
 """The scene of one run: the rule of a pair depends on which robots work, and some searches need a few pairs only."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Final
 
+import numpy as np
+
+from cellplan.geometry.arrays import Array
 from cellplan.model.idle import idle_robots
-from cellplan.model.left_out import LeftOutKind
 from cellplan.model.robot import BASE
-from cellplan.scene.bodies import Kind, SceneBody
-from cellplan.scene.pairs import Excluded, Rule, ScenePair
+from cellplan.scene.bodies import Kind
+from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
+
+SAME_WAY: Final = 1e-12  # [m] rounding of a distance along a straight move
 
 
 def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
@@ -33,23 +38,37 @@ def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:
     return replace(scene, pairs=tuple(scene.pairs[row] for row in rows))
 
 
-def scene_with_contact(scene: Scene, is_allowed: Callable[[SceneBody, SceneBody], bool], reason: str) -> Scene:
-    """The scene while some pairs may touch, as a part and what grips it or what it is put on; they are listed as such.
+def with_straight_move(scene: Scene, times: Array, q: Array) -> tuple[Scene, Array, Array]:
+    """The scene with the pairs of its straight move, each with the rows between which it is watched.
+
+    Where a pair begins or ends to be watched between two rows, a row is added there: joints move linearly.
 
     Args:
         scene: The scene.
-        is_allowed: Whether two bodies may touch.
-        reason: Why they may.
+        times: Times of the rows in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+
+    Returns:
+        The scene, and the times and positions with the added rows.
     """
-    ends = [(scene.bodies[pair.first], scene.bodies[pair.second]) for pair in scene.pairs]
-    may_touch = [is_allowed(*both) or is_allowed(*both[::-1]) for both in ends]
-    excluded = tuple(
-        Excluded(pair.first, pair.second, reason, LeftOutKind.PUT_DOWN)
-        for pair, allowed in zip(scene.pairs, may_touch, strict=True)
-        if allowed
-    )
-    kept = [row for row, allowed in enumerate(may_touch) if not allowed]
-    return replace(scene_of_rows(scene, kept), excluded=(*scene.excluded, *excluded))
+    move = scene.straight
+    if move is None:
+        return scene, times, q
+    tips = scene.chains[move.robot].tool_poses(q[:, scene.cell.columns(move.robot)])[:, :3, 3]
+    way, rows = np.linalg.norm(tips - move.p_WT, axis=1), np.arange(len(q), dtype=float)
+    added = [rows]
+    for edge in sorted({edge for _, *edges in move.pairs for edge in edges}):
+        before = np.flatnonzero((way[:-1] - edge) * (way[1:] - edge) < 0.0)
+        added.append(before + (way[before] - edge) / (way[before] - way[before + 1]))
+    at = np.unique(np.concatenate(added))
+    way = np.interp(at, rows, way)
+    pairs = list(scene.pairs)
+    for pair, low, high in move.pairs:
+        inside = np.flatnonzero((way >= low - SAME_WAY) & (way <= high + SAME_WAY))
+        if len(inside) > 1:
+            pairs.append(replace(pair, samples=(int(inside[0]), int(inside[-1]))))
+    fine = np.stack([np.interp(at, rows, column) for column in q.T], axis=1)
+    return replace(scene, pairs=tuple(pairs)), np.interp(at, rows, times), fine
 
 
 def rows_moved_by(scene: Scene, robot: str) -> list[int]:

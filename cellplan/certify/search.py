@@ -134,6 +134,7 @@ class StretchSearch:
             gaps = np.sqrt(x * x + (y * y + z * z)) - (engine.radii[a] + engine.radii[b])[:, None]
             low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
             self._low()[self._scene.solid_rows[first : first + step]] = low
+        self._low()[self._survey.is_ignored[:, self._first : self._last]] = np.inf
 
     def _first_readings(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
         """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.

@@ -7,6 +7,7 @@ class or among the nearest of the cell; the others keep the bounds they have.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Final
 
 import numpy as np
@@ -40,6 +41,7 @@ class Survey:
         edges: Samples at which blocks begin and end, ascending from 0 to N - 1, shape (K + 1,).
         low: No distance of a pair is below this in a block, in [m], shape (pairs, K); see ``PairBound.low``.
         states: State of the search of each pair.
+        is_ignored: Blocks in which a pair is not watched, shape (pairs, K).
         at_work: Indices of pairs of a tool at work and the part.
         at_surface: First and last sample at which a tool at work is at the surface of the part, by index of the pair.
     """
@@ -53,8 +55,13 @@ class Survey:
         """
         count = len(scene.pairs)
         self.scene, self._q = scene, q
-        self.edges = np.unique(np.linspace(0, len(q) - 1, min(MAX_BLOCKS, len(q) - 1) + 1).round().astype(np.intp))
+        even = np.linspace(0, len(q) - 1, min(MAX_BLOCKS, len(q) - 1) + 1).round().astype(np.intp)
+        parts = {row: pair.samples for row, pair in enumerate(scene.pairs) if pair.samples is not None}
+        self.edges = np.unique([*even, *chain.from_iterable(parts.values())])
         self.low = np.full((count, len(self.edges) - 1), np.inf)
+        self.is_ignored = np.zeros(self.low.shape, dtype=bool)
+        for row, (first, last) in parts.items():
+            self.is_ignored[row] = (self.edges[:-1] < first) | (self.edges[1:] > last)
         self.states = [_initial_state(pair) for pair in scene.pairs]
         self.at_surface: dict[int, tuple[int, int]] = {}
         self.at_work = [row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS]

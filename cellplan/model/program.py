@@ -24,15 +24,27 @@ class PartPlace:
 
     Attributes:
         X_WP: The part frame in the world, shape (4, 4).
-        rests_on: Name of the obstacle that it may touch there; None for a part that touches nothing.
+        rests_on: Name of the obstacle that it rests on, and touches there, or names of several; None without any.
+        rest_gap: Largest distance in [m] from each of them.
+        is_clamped: Whether a nest, magnet or hook holds it there, so that it need not touch anything.
         approach: Distance in [m] of the holder's straight move along its tool axis to the part, or away from it.
         lift: Height in [m] over which the part is moved straight up from the place, or down to it.
+        contact: Distance in [m] from the grip within which holder and part, part and support may touch; None for the
+            depth of the grip.
     """
 
     X_WP: Array
-    rests_on: str | None = None
+    rests_on: str | tuple[str, ...] | None = None
+    rest_gap: float = 0.001
+    is_clamped: bool = False
     approach: float = 0.05
     lift: float = 0.05
+    contact: float | None = None
+
+    @property
+    def supports(self) -> tuple[str, ...]:
+        """Names of the obstacles that the part rests on."""
+        return (self.rests_on,) if isinstance(self.rests_on, str) else self.rests_on or ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

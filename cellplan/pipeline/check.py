@@ -12,6 +12,7 @@ from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.plan.path_depths import depths_on_paths
+from cellplan.pipeline.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solve import with_start
 from cellplan.planning.modes import plan_phases, standing
@@ -62,6 +63,8 @@ def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent
 def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     """The checks of each block of tasks of a program from home to home, at its begin."""
     scenes, blocks = StageScenes.of(cell), [stage for stage in program_stages(cell) if stage.cell.tasks]
+    refuse_sunk_parts(scenes)
+    refuse_hanging_parts(scenes)
     made = {
         stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
     }

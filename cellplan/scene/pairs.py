@@ -7,6 +7,7 @@ from enum import StrEnum
 from itertools import combinations
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.check_settings import CheckSettings
 from cellplan.model.left_out import LeftOutKind
@@ -46,6 +47,22 @@ class ScenePair:
     rule: Rule  # what is demanded of them
     reason: str = ""  # why less than the clearance is demanded; empty for the rule ``clearance``
     demand: float = 0.0  # distance in [m] that a pair with the rule ``clearance`` is to keep
+    samples: tuple[int, int] | None = None  # between which it is watched, two solids only; None for all of a motion
+    where: str = ""  # where it must not touch, added to the words on a contact of it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StraightMove:
+    """A straight move of a tool to a place or away from it, in which some pairs are watched on a part of the way only.
+
+    Attributes:
+        p_WT: The place of the tool tip in the world in [m], shape (3,).
+        pairs: Each pair with the two distances of the tool from the place, in [m], between which it is watched.
+    """
+
+    robot: str  # whose tool it is
+    p_WT: Array
+    pairs: tuple[tuple[ScenePair, float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
-from cellplan.certify.run_pairs import scene_of_run
+from cellplan.certify.run_pairs import scene_of_run, with_straight_move
 from cellplan.certify.survey import CLOSEST_COUNT
 from cellplan.checks.clearance.contacts import EXACT_TOL, clearance_check, collision_checks, find_contacts, time_of
 from cellplan.geometry.arrays import Array
@@ -51,10 +51,11 @@ def check_clearance(
     """
     scene = scene_of_run(scene, [scheduled.task.name for scheduled in schedule.tasks])
     queries = replace(scene.engine.queries)
+    judged, times, q = with_straight_move(scene, schedule.times, q)
     bound = certify(
-        scene, q, with_curves=with_curves, progress=lambda fraction: progress(STAGE, CERTIFY_FRACTION * fraction)
+        judged, q, with_curves=with_curves, progress=lambda fraction: progress(STAGE, CERTIFY_FRACTION * fraction)
     )
-    times, contacts = schedule.times, find_contacts(bound, schedule.times)
+    contacts = find_contacts(bound, times)
     minima = {kind: _minimum(bound, times, kind) for kind in ClearanceClass}
     curve_times, curves = _curves(bound, times, minima)
     report = ClearanceReport(
@@ -161,4 +162,4 @@ def _curves(
 
 def _stated(bound: Bound) -> list[tuple[str, str, str]]:
     """Pairs of which less is demanded than the full clearance, with the reason."""
-    return [(*bound.names(pair), pair.pair.reason) for pair in bound.pairs if not pair.keeps_clearance]
+    return [(*bound.names(pair), pair.pair.reason) for pair in bound.pairs if pair.pair.reason]

@@ -96,7 +96,7 @@ def _of_pair(bound: Bound, times: Array, pair: PairBound) -> list[Contact]:
             first_s=first,
             last_s=last,
             is_allowed=False,
-            reason=OUTSIDE_ZONE.get(pair.pair.rule, ""),
+            reason=pair.pair.where or OUTSIDE_ZONE.get(pair.pair.rule, ""),
         )
         for first, last in _spans(touches, times)
     ]

@@ -43,6 +43,9 @@ def _place(entry: PartPlaceEntry | None) -> PartPlace | None:
     return PartPlace(
         X_WP=pose_from_entry(entry.at),
         rests_on=entry.rests_on,
+        rest_gap=entry.rest_gap_mm.si,
+        is_clamped=entry.clamped,
         approach=entry.approach_mm.si,
         lift=entry.lift_mm.si,
+        contact=None if entry.contact_mm is None else entry.contact_mm.si,
     )

@@ -173,9 +173,15 @@ def _places(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
         if not holders:
             text = "unexpected key, no robot holds the part (part.held_by): remove it, or let a robot hold the part"
             yield document.key_finding(("program", key), text)
-        if place.rests_on is not None and place.rests_on not in valid.names["environment"]:
-            text = unknown_name("a body of the environment", place.rests_on, valid.names["environment"])
-            yield document.finding(("program", key, "rests_on"), text)
+        for index, name in enumerate(place.supports):
+            path: KeyPath = (
+                ("program", key, "rests_on") if name == place.rests_on else ("program", key, "rests_on", index)
+            )
+            if name not in valid.names["environment"]:
+                text = unknown_name("a body of the environment", name, valid.names["environment"])
+                yield document.finding(path, text)
+            elif name in place.supports[:index]:
+                yield document.finding(path, f"expected each body once, got '{name}' twice")
     given = [key for key, place in places.items() if place is not None]
     if valid.program.cycles > 1 and len(given) == 1:
         missing = "detach" if given == ["attach"] else "attach"

@@ -27,13 +27,37 @@ MarkChoice = Annotated[
     by_kind(MARK_WORDS, mapping=dict),
 ]
 
+WIDEST_REST_MM: Final = 10.0  # a part farther from what it rests on would fall
+SUPPORT_LIMIT: Final = 20
+SUPPORT_WORDS: Final = "the name of a body or a list of them"
+Supports = Annotated[
+    Annotated[Name, Tag(f"<{SUPPORT_WORDS}>")]
+    | Annotated[tuple[Name, ...], Field(min_length=1, max_length=SUPPORT_LIMIT), Tag("<list>")],
+    by_kind(SUPPORT_WORDS, list=tuple),
+]
+
 
 class PartPlaceEntry(Entry):
     """A place at which the part lies without a robot that holds it."""
 
     at: PoseEntry = Field(description="Pose of the part frame in the world.")
-    rests_on: Name | None = Field(
-        default=None, description="Body of the environment that the part may touch there; none when absent."
+    rests_on: Supports | None = Field(
+        default=None,
+        description="Body of the environment, or list of bodies, that the part rests on: it touches each of them.",
+    )
+    rest_gap_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_REST_MM)] = Field(
+        default=Mm(1.0), description="Largest distance of the part from each body that it rests on."
+    )
+    clamped: bool = Field(
+        default=False,
+        description="Whether a nest, magnet or hook holds the part there: it need not touch what it rests on, or name "
+        "anything.",
+    )
+    contact_mm: Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
+        default=None,
+        description="Length of the end of the approach in which what grips may touch the part, and of the beginning of "
+        "the lift in which the part may touch what it rests on; likewise when it is put down. The depth of the grip "
+        "when absent.",
     )
     approach_mm: StraightMove = Field(
         default=Mm(50.0),
@@ -44,6 +68,11 @@ class PartPlaceEntry(Entry):
         default=Mm(50.0),
         description="Height over which the part is moved straight up from its place, or down to it.",
     )
+
+    @property
+    def supports(self) -> tuple[str, ...]:
+        """Names of the bodies that the part rests on."""
+        return (self.rests_on,) if isinstance(self.rests_on, str) else self.rests_on or ()
 
 
 class ProgramEntry(Entry):

@@ -3,23 +3,30 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.collision.distance import measure
+from cellplan.collision.separation import heights
 from cellplan.errors import HomeNotFoundError, InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
+from cellplan.model.program import PartPlace
+from cellplan.model.units import MM
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage
 from cellplan.planning.start.given import home_key, home_place
 from cellplan.planning.transfer.reasons import nearest_words
-from cellplan.scene.bodies import Kind
+from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import Mount
 from cellplan.scene.scene import Scene
+
+GAP_TOL: Final = 1e-4  # [m] distances are worked out to that
 
 
 def _key(stage: Stage) -> str:
@@ -34,16 +41,60 @@ def refuse_sunk_parts(scenes: StageScenes) -> None:
         InputError: With the body and the depth.
     """
     cell = scenes.cell
-    places = {"attach": cell.program.attach, "detach": cell.program.detach} if cell.program is not None else {}
-    for key, place in places.items():
-        if place is None:
-            continue
-        scene = scenes.with_part_at(place)
+    for key, _, scene in _places(scenes):
         parts = {body.name for body in scene.bodies if body.kind is Kind.PART}
         standing = [pair for pair in scene.mounted if pair.mount is Mount.STANDING]
         for check in check_mounting(replace(scene, mounted=tuple(standing)), np.zeros((1, cell.joint_count))):
             if not check.passed and parts & {*check.subject.split(" - ")}:
                 raise InputError(f"{cell.origin.at(f'program.{key}.at')}: {check.message}")
+
+
+def refuse_hanging_parts(scenes: StageScenes) -> None:
+    """Refuse places at which the part would fall: it touches nothing that it rests on, and is not clamped.
+
+    Raises:
+        InputError: With the body and the distance.
+    """
+    for key, place, scene in _places(scenes):
+        gaps = {} if place.is_clamped else _gaps(scene)
+        where = scenes.cell.origin.at(f"program.{key}.rests_on")
+        cure = "move the place or the body, or state clamped: true for a nest, magnet or hook that holds it"
+        for name in place.supports if gaps else ():
+            if gaps[name] > place.rest_gap + GAP_TOL:
+                raise InputError(
+                    f"{where}: expected a part that touches '{name}' where it lies, within rest_gap_mm = "
+                    f"{MM * place.rest_gap:g}, got one {MM * gaps[name]:.4g} mm away, which would fall: {cure}"
+                )
+        if not place.is_clamped and not place.supports and min(gaps.values(), default=np.inf) > place.rest_gap:
+            nearest = min(gaps, key=lambda name: gaps[name], default="")
+            got = f"'{nearest}', the nearest, {MM * gaps[nearest]:.4g} mm away" if nearest else "no surroundings"
+            raise InputError(
+                f"{where}: expected a body that the part rests on, got none ({got}), so that it would fall: "
+                f"name one, {cure}"
+            )
+
+
+def _places(scenes: StageScenes) -> Iterator[tuple[str, PartPlace, Scene]]:
+    """Places at which the part lies, with their keys and the scene there."""
+    program = scenes.cell.program
+    for key, place in {} if program is None else {"attach": program.attach, "detach": program.detach}.items():
+        if place is not None:
+            yield key, place, scenes.with_part_at(place)
+
+
+def _gaps(scene: Scene) -> dict[str, float]:
+    """Distance in [m] of a part at rest from each body of the environment; zero where they touch."""
+    part = next(index for index, body in enumerate(scene.bodies) if body.kind is Kind.PART)
+    poses, gaps = scene.body_poses(np.zeros((1, scene.cell.joint_count))), {}
+    for index, body in enumerate(scene.bodies):
+        if body.kind is not Kind.OBSTACLE:
+            continue
+        if is_ground(body):
+            above = heights(scene.engine.bodies[part].hull, poses.R[part], poses.p[part], X_WS=body.X_BS)
+            gaps[body.name] = max(0.0, float(above[0]))
+        else:
+            gaps[body.name] = measure(scene.engine, (part, index), poses, sample=0).bound
+    return gaps
 
 
 def refuse_unnamed_support(stage: Stage, scene: Scene, q: Array) -> None:

@@ -19,6 +19,7 @@ from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_home
 from cellplan.pipeline.plan.program_faults import (
     located,
     refuse_crowded_homes,
+    refuse_hanging_parts,
     refuse_sunk_parts,
     refuse_unnamed_support,
 )
@@ -80,6 +81,7 @@ def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
     """
     scenes = StageScenes.of(cell)
     refuse_sunk_parts(scenes)
+    refuse_hanging_parts(scenes)
     search = _Worked(cell, scenes, progress)
     runs = search.runs()
     started = search.cell

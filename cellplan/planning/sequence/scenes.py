@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass, field, replace
 
-from cellplan.certify.run_pairs import scene_with_contact
 from cellplan.model.cell import Cell
 from cellplan.model.program import PartPlace
 from cellplan.planning.sequence.part_moves import PartMove, part_lying
 from cellplan.planning.sequence.stages import Stage
-from cellplan.scene.bodies import Kind, SceneBody
-from cellplan.scene.mounting import is_rigid_with_flange
+from cellplan.scene.part_contact import PartContact
 from cellplan.scene.scene import Scene
 
 
@@ -35,24 +33,11 @@ class StageScenes:
         scene = replace(scene, cell=stage.cell)
         if stage.move is None:
             return scene
-        if stage.place is not None:
-            grasp = self.cell.part.held_by[0]
-
-            def grips(body: SceneBody, other: SceneBody) -> bool:
-                is_named = grasp.bodies is None or body.name in grasp.bodies
-                is_gripper = body.robot == grasp.robot and is_named and is_rigid_with_flange(body, self.cell)
-                return other.kind is Kind.PART and is_gripper
-
-            return scene_with_contact(scene, grips, f"{grasp.robot} grips the part here or lets it go")
-        program = self.cell.program
-        places = {} if program is None else {PartMove.LIFT: program.attach, PartMove.LOWER: program.detach}
-        place = places.get(stage.move)
-        support = None if place is None else place.rests_on
-
-        def rests(body: SceneBody, other: SceneBody) -> bool:
-            return other.kind is Kind.PART and body.kind is Kind.OBSTACLE and body.name == support
-
-        return scene_with_contact(scene, rests, "the part is taken from it here or put on it")
+        key = "attach" if stage.move in (PartMove.GRIP, PartMove.LIFT) else "detach"
+        place, is_lying = getattr(self.cell.program, key), stage.place is not None
+        grasp = self.cell.part.held_by[0]
+        contact = PartContact(key=f"program.{key}", place=place, grasp=grasp, is_lying=is_lying)
+        return contact.with_contacts(scene)
 
     def with_part_at(self, place: PartPlace) -> Scene:
         """The scene with the part lying at a place."""
