@@ -65,6 +65,14 @@ class PairBound:
         return self.pair.rule is Rule.CLEARANCE
 
     @property
+    def is_compared(self) -> bool:
+        """Whether it counts for the smallest distance: where it is watched on a part of a way, only if it falls short.
+
+        Otherwise its smallest distance is that at the end of that part, which says nothing of the cell.
+        """
+        return self.keeps_clearance and (self.pair.samples is None or not self.is_kept)
+
+    @property
     def is_open(self) -> bool:
         """Whether the pair was neither found to touch or to come too near, nor proved not to."""
         return bool(self.unproved and not self.touches and self.lowest < self.needed)

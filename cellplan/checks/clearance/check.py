@@ -62,7 +62,7 @@ def check_clearance(
         minima=minima,
         contacts=contacts,
         exclusions=(*scene.exclusions, *_stated(bound)),
-        pair_count=len(bound.pairs),
+        pair_count=len({(pair.pair.first, pair.pair.second) for pair in bound.pairs}),
         curve_times=curve_times,
         curves=curves,
         closest=_closest(bound, times),
@@ -93,7 +93,7 @@ def _minimum(bound: Bound, times: Array, kind: ClearanceClass) -> ClearanceMinim
             certified=True,
             accuracies=_accuracies(bound, pair),
         )
-    candidates = [pair for pair in watched if pair.keeps_clearance or pair.is_open]
+    candidates = [pair for pair in watched if pair.is_compared or pair.is_open]
     if not candidates:
         return ClearanceMinimum()
     is_certified = not any(pair.is_open for pair in watched)
@@ -127,7 +127,7 @@ def _point(p: Array) -> tuple[float, float, float]:
 
 def _closest(bound: Bound, times: Array) -> tuple[ClosePair, ...]:
     """The closest pairs of the cell, nearest first; those that touch have the distance 0."""
-    known = (pair for pair in bound.pairs if pair.keeps_clearance and np.isfinite(pair.nearest))
+    known = (pair for pair in bound.pairs if pair.is_compared and np.isfinite(pair.nearest))
     return tuple(
         ClosePair(
             pair=bound.names(pair),
@@ -154,8 +154,8 @@ def _curves(
     curves = {}
     for kind in ClearanceClass:
         watched = bound.of_class(kind)
-        if any(pair.keeps_clearance for pair in watched):
-            drawn = [pair for pair in watched if pair.keeps_clearance or pair.touches or pair.unproved]
+        if any(pair.is_compared for pair in watched):
+            drawn = [pair for pair in watched if pair.is_compared or pair.touches or pair.unproved]
             curves[kind] = np.maximum(bound.lowest_bounds(drawn), 0.0)[block]
     return curve_times, curves
 

@@ -27,7 +27,12 @@ def find_contacts(bound: Bound, times: Array) -> tuple[Contact, ...]:
         bound: What is proved of all pairs.
         times: Times of the samples in [s], shape (N,).
     """
-    forbidden = [contact for pair in bound.pairs if pair.touches for contact in _of_pair(bound, times, pair)]
+    touching: dict[tuple[tuple[str, str], str], list[PairBound]] = {}
+    for pair in bound.pairs:
+        if pair.touches:
+            reason = pair.pair.where or OUTSIDE_ZONE.get(pair.pair.rule, "")
+            touching.setdefault((bound.names(pair), reason), []).append(pair)
+    forbidden = [contact for key, pairs in touching.items() for contact in _of_pairs(*key, times, pairs)]
     return (*forbidden, *_at_work(bound, times))
 
 
@@ -61,7 +66,7 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
         kind: The class.
         found: Its smallest distance; zero where a pair touches.
     """
-    checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.keeps_clearance]
+    checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]
     names, at_s, distance = found.pair or ("", ""), found.at_s or 0.0, float(found.minimum or 0.0)
     demand, reason, is_exact = checks.clearance, "", found.exact
     if checks.adds_accuracy and distance > 0.0 and kept:
@@ -86,19 +91,19 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
     )
 
 
-def _of_pair(bound: Bound, times: Array, pair: PairBound) -> list[Contact]:
-    """Contacts of one pair in the order of time."""
-    touches = np.interp(np.unique(pair.touches), np.arange(len(times)), times)
+def _of_pairs(names: tuple[str, str], reason: str, times: Array, pairs: Sequence[PairBound]) -> list[Contact]:
+    """Contacts of two bodies in the order of time, watched as one pair or as several, each on a part of the way."""
+    rows = np.unique(np.concatenate([pair.touches for pair in pairs]))
     return [
         Contact(
-            pair=bound.names(pair),
-            clearance_class=pair.pair.clearance_class,
+            pair=names,
+            clearance_class=pairs[0].pair.clearance_class,
             first_s=first,
             last_s=last,
             is_allowed=False,
-            reason=pair.pair.where or OUTSIDE_ZONE.get(pair.pair.rule, ""),
+            reason=reason,
         )
-        for first, last in _spans(touches, times)
+        for first, last in _spans(np.interp(rows, np.arange(len(times)), times), times)
     ]
 
 
