@@ -120,5 +120,9 @@ class SelfTestError(CellplanError):
     """A start-up test of the collision engine failed: no verdict can be trusted."""
 
 
+class NotFiniteError(CellplanError):
+    """A figure that a search compares is no finite number: no search can go on with it."""
+
+
 class MissingPackageError(InputError, ImportError):
     """An optional package is not installed; the message has the line that installs it."""

@@ -14,7 +14,7 @@ from typing import Any, Final, Self
 import numpy as np
 
 import cellplan
-from cellplan.errors import InputError, StudyStoppedError
+from cellplan.errors import InputError, NotFiniteError, StudyStoppedError
 from cellplan.study.workers import Lost
 
 CONNECT_S: Final = 10.0  # [s] within which the scheduler answers at the start
@@ -106,7 +106,7 @@ class Cluster(Executor):
             outer.set_result(inner.result())
         elif type(error).__name__ == "KilledWorker":
             outer.set_result(Lost("the workers of the cluster that worked it out ended"))
-        elif isinstance(error, StudyStoppedError):
+        elif isinstance(error, StudyStoppedError | NotFiniteError):
             outer.set_exception(error)
         else:
             said = (str(error).splitlines() or [""])[0]

@@ -14,7 +14,7 @@ from importlib import import_module
 from types import TracebackType
 from typing import Any, Final, NamedTuple, TypeVar
 
-from cellplan.errors import CellplanError, OverrunError, StudyStoppedError, TimeLimitError
+from cellplan.errors import CellplanError, NotFiniteError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
 from cellplan.study.trial import Outcome, TrialStatus, Variant
 
@@ -169,11 +169,12 @@ def evaluated(evaluate: bytes, variant: Variant) -> str:
 
     Raises:
         StudyStoppedError: The evaluator says that no trial can be worked out any more.
+        NotFiniteError: A figure of the trial is no number: what it judges by is wrong.
         MemoryError: There is not enough of it.
     """
     try:
         return _text(_unpacked(evaluate)(variant))
-    except (StudyStoppedError, MemoryError):
+    except (StudyStoppedError, NotFiniteError, MemoryError):
         raise
     except Exception as error:  # noqa: BLE001 - the trial's own
         said = (str(error).splitlines() or [""])[0]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cellplan.errors import StudyStoppedError
+from cellplan.errors import NotFiniteError, StudyStoppedError
 from cellplan.study.status import Best
 from cellplan.study.study import Study
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
@@ -52,6 +52,13 @@ def product_until_5(variant: Variant) -> Outcome:
     """As ``product``; the disk is full from number 5 on."""
     if variant.number == 5:
         raise StudyStoppedError("no more")
+    return product(variant)
+
+
+def not_finite_at_5(variant: Variant) -> Outcome:
+    """As ``product``; a figure that number 5 compares is no number."""
+    if variant.number == 5:
+        raise NotFiniteError("table/turn: expected a finite speed in the search, got nan")
     return product(variant)
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from builders.study_trials import InThisProcess, product, product_until_5
+from builders.study_trials import InThisProcess, not_finite_at_5, product, product_until_5
 
-from cellplan.errors import InputError, StudyStoppedError
+from cellplan.errors import InputError, NotFiniteError, StudyStoppedError
 from cellplan.study.folder import AHEAD, JOURNAL, run_folder, write_results
 from cellplan.study.study import Study
 from cellplan.study.variants import Axis, combinations
@@ -93,6 +93,12 @@ def test_a_finished_study_evaluates_nothing_again(tmp_path: Path) -> None:
 def test_a_study_that_cannot_go_on_keeps_what_is_recorded(tmp_path: Path) -> None:
     with pytest.raises(StudyStoppedError, match="no more"):
         run(tmp_path / "study", product_until_5)
+    assert len((tmp_path / "study" / JOURNAL).read_text().splitlines()) == 6
+
+
+def test_a_figure_that_is_no_number_ends_the_study_and_is_no_lost_trial(tmp_path: Path) -> None:
+    with pytest.raises(NotFiniteError, match="table/turn: expected a finite speed"):
+        run(tmp_path / "study", not_finite_at_5)
     assert len((tmp_path / "study" / JOURNAL).read_text().splitlines()) == 6
 
 

@@ -91,10 +91,10 @@ def _figures(asked: MapJob, found: PlaceVerdict) -> dict[str, Any]:
     """Figures of a place; none where there is no motion."""
     if found.cycle is None or found.speed is None or found.acceleration is None or found.fast is None:
         return {}
-    value, unit = _margin(asked, found)
+    value, unit = (None, "") if found.joint is None else _margin(asked, found)
     return {
         "cycle_s": round(found.cycle, FINE),
-        "margin": round(value, FINE),
+        "margin": None if value is None else round(value, FINE),
         "margin_unit": unit,
         "margin_joint": "/".join(found.joint or ()),
         "max_velocity_ratio": round(found.speed, FINE),

@@ -39,11 +39,10 @@ class Standing:
 
     @property
     def margin(self) -> float | None:
-        """Smallest distance of a turning joint from its limits in [deg]; None without such a joint."""
+        """Smallest distance of a turning joint from its limits in [deg]; None without such limits."""
         turning = self.problem.limits.is_revolute
-        if not turning.any():
-            return None
-        return DEG * float((self.demands.margin - self._beyond)[turning].min())
+        least = float((self.demands.margin - self._beyond)[turning].min(initial=np.inf))
+        return DEG * least if least < np.inf else None
 
     @property
     def clearance(self) -> float | None:

@@ -273,7 +273,7 @@ def _whole_turns(cell: Cell, q: Array) -> Array:
             lower, upper = robot.model.lower, robot.model.upper
             motion = q[:, cell.columns(robot.name)]
             turning = np.isfinite(upper - lower) & np.array([joint.is_revolute for joint in robot.model.joints])
-            middle = 0.5 * np.where(turning, lower + upper, 0.0)
+            middle = 0.5 * np.add(lower, upper, out=np.zeros_like(lower), where=turning)
             own = -2 * np.pi * np.round((0.5 * (motion.min(axis=0) + motion.max(axis=0)) - middle) / (2 * np.pi))
             start = motion[0] + own
             turns[cell.columns(robot.name)] = np.where(turning & (start >= lower) & (start <= upper), own, 0.0)

@@ -22,9 +22,11 @@ def map_lines(record: Record, folder: Path) -> list[str]:
     for each in record["best"][:1]:
         place = record["places"][each["place"]]
         figures, options = place["figures"], " ".join(f"--set '{option}'" for option in each["options"])
+        margin = "no joint with limits"
+        if figures["margin"] is not None:
+            margin = f"margin {figures['margin']:.1f} {figures['margin_unit']} ({figures['margin_joint']})"
         lines += [
-            f"  best: x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: cycle {figures['cycle_s']:.3f} s, margin "
-            f"{figures['margin']:.1f} {figures['margin_unit']} ({figures['margin_joint']})",
+            f"  best: x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: cycle {figures['cycle_s']:.3f} s, {margin}",
             f"  to solve it: {options}",
         ]
     outcomes = [each["certified"] for each in record["best"] if each["certified"] is not None]

@@ -40,14 +40,15 @@ class PlaceVerdict:
     """One place.
 
     Attributes:
-        margin: Its smallest distance from a limit of a turning joint in [rad], of a sliding one in [m].
+        joint: Robot and joint that is beyond a limit, or that leaves least; None where no joint has limits.
+        margin: Its smallest distance from a limit of a turning joint in [rad], of a sliding one in [m]; likewise.
         pair: Bodies that are too near each other, and their distance in [m]; None where none are.
     """
 
     verdict: Verdict  # what becomes of it
     start: Array | None = None  # start posture of the robot in [rad] or [m], shape (n,); None where there is none
     lost_at: float | None = None  # time in [s] at which a tool could not follow; None where all did
-    joint: tuple[str, str] | None = None  # robot and joint that is beyond a limit, or that leaves least
+    joint: tuple[str, str] | None = None
     margin: float | None = None
     fast: tuple[str, str] | None = None  # robot and joint that is fastest against its limits of speed and acceleration
     speed: float | None = None  # largest speed of any joint as a share of its limit; None where there is no motion
@@ -179,8 +180,8 @@ def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Ar
     known = PlaceVerdict(
         verdict=Verdict.PASSES,
         start=start,
-        joint=joint_at(cell, tight),
-        margin=float(margins[tight]),
+        joint=joint_at(cell, tight) if margins[tight] < np.inf else None,
+        margin=float(margins[tight]) if margins[tight] < np.inf else None,
         fast=joint_at(cell, fastest),
         speed=float(speeds.max()),
         acceleration=float(rates.max()),

@@ -1,12 +1,18 @@
 """Figures of motions: joint margins, speeds and accelerations at their worst, and their derivatives."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
+from cellplan.errors import NotFiniteError
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.model.cell import joint_at
 from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import Motions
+
+FIGURES: Final = ("distance from its lower limit", "distance from its upper limit", "speed", "acceleration")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -38,7 +44,7 @@ class Peaks:
             shares = _parabola(np.where(is_inside, offset, 0.0), back, ahead)
         best = np.eye(3)[np.argmax(near, axis=1)]
         shares = np.where(is_inside[..., None], shares, best)
-        value = np.einsum("kni,kin->kn", shares, near)
+        value = _weighted(shares, np.moveaxis(near, 1, -1))
         if in_magnitude:
             signed = np.take_along_axis(values, np.moveaxis(around, -1, 1), axis=1)
             shares = shares * np.moveaxis(np.sign(signed), 1, -1)
@@ -78,7 +84,7 @@ class Crests:
             is_inside = (rise >= 0.0) & (fall >= 0.0) & (rise + fall > 0.0) & (back > 0.0) & (ahead > 0.0)
             curved = _parabola(np.where(is_inside, offset, 0.0), back, ahead)
         shares[1:-1] = np.where(is_inside[..., None], curved, shares[1:-1])
-        value = np.einsum("kni,kni->kn", shares, near)
+        value = _weighted(shares, near)
         if in_magnitude:
             signs = np.sign(values)
             shares *= np.stack([np.roll(signs, 1, axis=0), signs, np.roll(signs, -1, axis=0)], axis=-1)
@@ -111,19 +117,51 @@ class Figures:
 
     @classmethod
     def of(cls, job: Job, motions: Motions) -> "Figures":
-        """The figures of motions."""
+        """The figures of motions; of those that lost a path they are not valid.
+
+        Raises:
+            NotFiniteError: A figure of a motion that follows all paths is no finite number.
+        """
         limits, times = job.limits, job.times
-        return cls(
+        found = cls(
             beyond_lower=Peaks.of(times, limits.lower - motions.q),
             beyond_upper=Peaks.of(times, motions.q - limits.upper),
             speeds=Peaks.of(times, motions.qd / limits.velocity, in_magnitude=True),
             accelerations=Peaks.of(times, job.rates @ (motions.qd / limits.acceleration), in_magnitude=True),
         )
+        peaks = (found.beyond_lower, found.beyond_upper, found.speeds, found.accelerations)
+        for name, peak in zip(FIGURES, peaks, strict=True):
+            refuse_not_finite(name, peak.value[motions.is_followed], lambda column: joint_at(job.cell, column))
+        return found
 
     @property
     def margins(self) -> Array:
         """Smallest distance of each joint from its limits in [rad] or [m], negative beyond, shape (K, nq)."""
         return -np.maximum(self.beyond_lower.value, self.beyond_upper.value)
+
+
+def refuse_not_finite(name: str, values: Array, joint_names: Callable[[int], tuple[str, str]]) -> None:
+    """Refuse figures of joints that are no numbers, or infinite; an infinite margin is one.
+
+    Args:
+        name: What they are, one of ``FIGURES``.
+        values: The figures, shape (K, nq); negative where margin is left.
+        joint_names: Names of the robot and the joint of a column.
+
+    Raises:
+        NotFiniteError: With the joint of the first one.
+    """
+    bad = ~(values < np.inf)
+    if bad.any():
+        place, column = np.argwhere(bad)[0].tolist()
+        raise NotFiniteError(
+            f"{'/'.join(joint_names(column))}: expected a finite {name} in the search, got {values[place, column]}"
+        )
+
+
+def _weighted(shares: Array, near: Array) -> Array:
+    """Sums of shares of three values; no share of an infinite one, as the margin of an endless joint is, is nothing."""
+    return np.multiply(shares, near, out=np.zeros_like(near), where=shares != 0.0).sum(axis=-1)
 
 
 def _parabola(offset: Array, back: Array, ahead: Array) -> Array:

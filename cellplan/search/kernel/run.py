@@ -98,7 +98,8 @@ class _March:
             if node and job.is_begin[node - 1]:  # the first step of a stretch looks back on nothing: once more
                 at = q[node - 1] + 0.5 * (times[node] - times[node - 1]) * (qd[node - 1] + qd[node])
                 q[node], qd[node], errors = self._corrected(node, at)
-            lost_at[~(errors <= LOST) & np.isposinf(lost_at)] = times[node]
+            is_on_path = (errors <= LOST) & np.isfinite(q[node] + qd[node]).all(axis=0)
+            lost_at[~is_on_path & np.isposinf(lost_at)] = times[node]
             if node + 1 < len(times):
                 at = q[node] + sum(
                     weight * qd[node - back] for back, weight in enumerate(job.steps[node].tolist()) if weight

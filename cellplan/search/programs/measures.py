@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.search.kernel.figures import Crests
+from cellplan.search.kernel.figures import FIGURES, Crests, refuse_not_finite
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import ArmValues, Distances, Point, Problem
@@ -61,7 +61,11 @@ class Measures:
 
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
-        """Measure a point."""
+        """Measure a point.
+
+        Raises:
+            NotFiniteError: A figure of a joint is no finite number.
+        """
         times, limits, beyond = problem.times, problem.limits, demands.beyond
         pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
@@ -71,10 +75,14 @@ class Measures:
         if beyond is not None:
             added = added + beyond[distances.pairs]
         arms = None if demands.singular is None else problem.arms(point)
+        lower = _crests(problem, limits.lower + demands.margin - point.q)
+        upper = _crests(problem, point.q - limits.upper + demands.margin)
+        for name, crests in zip(FIGURES, (lower, upper, speeds, accelerations), strict=True):
+            refuse_not_finite(name, crests.value, problem.joint_names)
         return cls(
             point=point,
-            lower=_crests(problem, limits.lower + demands.margin - point.q),
-            upper=_crests(problem, point.q - limits.upper + demands.margin),
+            lower=lower,
+            upper=upper,
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
