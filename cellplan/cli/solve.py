@@ -30,6 +30,7 @@ from cellplan.errors import ExitStatus
 if TYPE_CHECKING:
     from cellplan.model.cell import Cell
     from cellplan.pipeline.solution import Solution
+    from cellplan.planning.transfer.best_try import BlockedTransferError
     from cellplan.report.record.common import Record
 
 SCHEMA = "cellplan.solve/1"
@@ -117,6 +118,7 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
     from cellplan.io.run.folder import refuse_unless_replaceable
     from cellplan.pipeline.overrides import require_task, with_overrides
     from cellplan.pipeline.parallel import solve_in_parallel
+    from cellplan.planning.transfer.best_try import BlockedTransferError
     from cellplan.report.plots.rendering import require_formats
 
     require_formats(request.plot_formats)
@@ -126,9 +128,21 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
     require_task(changed, request.task)
     folder = request.output or Path("outputs") / changed.name
     refuse_unless_replaceable(folder)
-    solution = solve_in_parallel(changed, task=request.task, progress=progress)
+    try:
+        solution = solve_in_parallel(changed, task=request.task, progress=progress)
+    except BlockedTransferError as error:
+        raise _with_page(error, folder) from error
     record = _written(solution, folder, request, progress)
     return _result(request, changed, solution, record, folder)
+
+
+def _with_page(error: "BlockedTransferError", folder: Path) -> "BlockedTransferError":
+    """The error with the 3-D page of the best try, which is written beside the run folder."""
+    from cellplan.pipeline.view.write import write_view_of_blocked
+
+    page = folder.with_name(f"{folder.name}-{error.name or 'transfer'}.html")
+    shown = f"; 3-D page of the best try: {page}" if write_view_of_blocked(error, page) else ""
+    return type(error)(error.place, f"{error.what}{shown}", name=error.name)
 
 
 def _result(request: _Request, changed: "Cell", solution: "Solution", record: "Record", folder: Path) -> Result:

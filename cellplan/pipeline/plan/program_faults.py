@@ -1,6 +1,6 @@
 """Faults of a program from home to home that are known before its moves are planned, each at its place in the cell."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
@@ -19,8 +19,9 @@ from cellplan.model.program import PartPlace
 from cellplan.model.units import MM
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
-from cellplan.planning.sequence.stages import Stage
+from cellplan.planning.sequence.stages import HOME, Stage
 from cellplan.planning.start.given import home_key, home_place
+from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.planning.transfer.reasons import nearest_words
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import Mount
@@ -168,3 +169,31 @@ def located(stage: Stage, cell: Cell, given: Cell) -> Iterator[None]:
                 f"robots.{first}.start_deg, or holder_deg of these tasks"
             ) from error
         raise type(error)(f"{cell.origin.at(f'{_key(stage)}.at')}: the move '{stage.move}' fails: {error}") from error
+
+
+@contextmanager
+def named_transfer(stages: Sequence[Stage], number: int) -> Iterator[None]:
+    """Errors of transfer moves with their name, and the tasks between which they are.
+
+    Args:
+        stages: The stages of a program.
+        number: Place of the transfer moves among them.
+
+    Raises:
+        BlockedTransferError: With the name.
+    """
+    try:
+        yield
+    except BlockedTransferError as error:
+        before, after = stages[:number][-1:], stages[number + 1 :][:1]
+        between = f"from {_words(before)} to {_words(after)}"
+        raise error.of_phase(stages[number].phase.name, between) from error
+
+
+def _words(stages: Sequence[Stage]) -> str:
+    """A stage with its tasks; the homes where there is none."""
+    if not stages:
+        return HOME
+    phase = stages[0].phase
+    tasks = ", ".join(phase.tasks) if stages[0].move is None else ""
+    return f"{phase.name} ({tasks})" if tasks else phase.name

@@ -18,6 +18,7 @@ from cellplan.model.task import Task
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program_faults import (
     located,
+    named_transfer,
     refuse_crowded_homes,
     refuse_hanging_parts,
     refuse_sunk_parts,
@@ -233,7 +234,8 @@ def _joined(
         else:
             progress("planning transfer moves", number / len(stages))
             goal = standing(cell, stages[number + 1].phase, left[0].motion.q[0]) if left else home
-            made = _transferred(stage, scene, last, goal, progress)
+            with named_transfer(stages, number):
+                made = _transferred(stage, scene, last, goal, progress)
         yield made
         last = made.motion.q[-1]
 
@@ -258,7 +260,7 @@ def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress
 
     Raises:
         InputError: Co-holders would have to move by themselves.
-        TransferNotFoundError: No way was found.
+        BlockedTransferError: No way was found.
     """
     cell = scene.cell
     for name in cell.positioners if len(cell.positioners) > 1 else ():

@@ -20,8 +20,10 @@ from cellplan.pipeline.view.describe import (
     visual_records,
 )
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.nearest import Stretch, nearest_record, touching_pairs
+from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows, touching_pairs
 from cellplan.pipeline.view.run_scene import motion_record
+from cellplan.planning.transfer.best_try import STEP as TRY_STEP
+from cellplan.planning.transfer.best_try import BlockedTry
 from cellplan.report.record.view import FailureRecord, SceneViewRecord
 from cellplan.scene.scene import Scene
 
@@ -68,13 +70,46 @@ def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> It
             yield {**_failure(message), "bodies": bodies}
 
 
+def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> SceneViewRecord:
+    """The scene of the best try of a transfer move that was not found, in nominal time.
+
+    Args:
+        blocked: The try.
+        what: What is in its way, in words.
+        geometries: Takes the shapes.
+    """
+    q, names = blocked.tried.q, [body.name for body in blocked.scene.bodies]
+    times: Array = TRY_STEP * np.arange(len(q), dtype=np.float64)
+    at = float(times[blocked.row])
+    bodies = [names.index(name) for name in blocked.bodies if name in names]
+    return {
+        **_scene(blocked.scene, times, q, geometries),
+        "facts": [["best try", blocked.tried.words]],
+        "remarks": ["time is nominal: no time law was found"],
+        "passed": False,
+        "nearest": nearest_record([Stretch(blocked.scene, 0, len(q))], times, q, sampled_rows(times, [at])),
+        "failures": [{**_failure(what), "bodies": bodies, "at": at}],
+    }
+
+
 def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
     """The scene of a cell whose robots stand still at their starts."""
-    cell = scene.cell
-    q = np.concatenate([standing(robot) for robot in cell.robots])
+    q = np.concatenate([standing(robot) for robot in scene.cell.robots])
     touching = touching_pairs(scene, q)
+    return {
+        **_scene(scene, np.zeros(1), q[None], geometries),
+        "contacts": [
+            {"bodies": list(pair), "first": 0.0, "last": 0.0, "allowed": False, "text": _pair_text(scene, pair)}
+            for pair in touching
+        ],
+        "failures": [{**_failure(_pair_text(scene, pair)), "bodies": list(pair), "at": 0.0} for pair in touching],
+    }
+
+
+def _scene(scene: Scene, times: Array, q: Array, geometries: Geometries) -> SceneViewRecord:
+    """Robots, bodies and paths of a cell at times of shape (K,), in configurations of shape (K, nq)."""
+    cell = scene.cell
     tasks, faults = task_records(cell)
-    times = np.zeros(1)
     return {
         "name": cell.name,
         "facts": [],
@@ -85,14 +120,11 @@ def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
         "visuals": visual_records(cell, geometries),
         "part": [place_record(cell, 0.0)],
         "tasks": tasks,
-        "motion": motion_record(times, q[None], []),
-        "nearest": nearest_record([Stretch(scene, 0, 1)], times, q[None], np.zeros(1, dtype=np.intp)),
+        "motion": motion_record(times, q, []),
+        "nearest": nearest_record([Stretch(scene, 0, 1)], times[:1], q[:1], np.zeros(1, dtype=np.intp)),
         "certified": {"times": [], "distances": []},
-        "contacts": [
-            {"bodies": list(pair), "first": 0.0, "last": 0.0, "allowed": False, "text": _pair_text(scene, pair)}
-            for pair in touching
-        ],
-        "failures": [{**_failure(_pair_text(scene, pair)), "bodies": list(pair), "at": 0.0} for pair in touching],
+        "contacts": [],
+        "failures": [],
         "excluded": excluded_records(scene),
         "bases": [],
     }

@@ -17,10 +17,11 @@ from cellplan.model.report import CAUTION
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.overrides import with_overrides
-from cellplan.pipeline.view.cell_scene import unsolved_scene
+from cellplan.pipeline.view.cell_scene import blocked_scene, unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.run_scene import run_scene
 from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
+from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.view import is_view_page, view_page
 from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
@@ -94,6 +95,25 @@ def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) 
     progress("making the 3-D page", 0.0)
     write_view(_record_of_run(read_stored_run(folder), cell), folder / VIEW_PAGE)
     return folder / VIEW_PAGE
+
+
+def write_view_of_blocked(error: BlockedTransferError, target: Path) -> bool:
+    """Write the 3-D page of the best try of a transfer move that was not found; False where it is not known.
+
+    Args:
+        error: What was in the way.
+        target: The page; an older one there is replaced.
+
+    Raises:
+        InputError: The place holds something else, or cannot be written.
+    """
+    if error.best is None:
+        return False
+    geometries, cell = Geometries(), error.best.scene.cell
+    target.parent.mkdir(parents=True, exist_ok=True)
+    scene = blocked_scene(error.best, str(error), geometries)
+    write_view(_record("cell", cell, geometries, [scene]), target)
+    return True
 
 
 def write_view(record: ViewRecord, target: Path) -> int:

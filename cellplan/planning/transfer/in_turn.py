@@ -14,6 +14,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.model.progress import Progress
 from cellplan.model.seeds import generator
+from cellplan.planning.transfer.best_try import Try, one_by_one, rows_through
 from cellplan.planning.transfer.blended_lines import BlendedLine
 from cellplan.planning.transfer.move_check import MoveCheck, Others
 from cellplan.planning.transfer.query import STAGE, TransferQuery
@@ -23,6 +24,7 @@ from cellplan.planning.transfer.trees import connected
 
 MOST_ORDERS: Final = 120  # orders of the robots that are tried
 DRAWN: Final = 1000  # configurations drawn for one robot among others that stand
+MOST_SHOWN: Final = 24  # orders of which the best is shown where none is free
 MOST_FAILED: Final = 6  # searches by trees that fail before no further one is begun
 
 
@@ -43,6 +45,7 @@ class InTurn:
     """Moves of one robot after the other.
 
     Attributes:
+        query: Who moves from where to where.
         tried: What was tried in vain.
     """
 
@@ -55,19 +58,46 @@ class InTurn:
             reserve: Distance in [m] beyond the demanded one while planning.
             progress: Called with the stage and the fraction done.
         """
-        self.tried, self._query, self._reserve, self._progress = tried, query, reserve, progress
+        self.tried, self.query, self._reserve, self._progress = tried, query, reserve, progress
         self._checks: dict[tuple[str, frozenset[str]], MoveCheck | None] = {}
         self._known: dict[tuple[str, frozenset[str], bool], RobotMove | None] = {}
+        self._over_gaps: dict[tuple[str, frozenset[str]], Array] = {}
 
     def moves(self) -> Iterator[list[RobotMove]]:
         """Moves of all robots in their order, one list for each order that is free."""
-        orders = list(permutations(self._query.movers))[:MOST_ORDERS]
+        orders = list(permutations(self.query.movers))[:MOST_ORDERS]
         for planned in (False, True):
             for order in orders:
                 self.tried.orders += not planned
                 moves = self._in_order(order, planned=planned)
                 if moves is not None:
                     yield moves
+
+    def tries(self) -> Iterator[Try]:
+        """Each order in which robots may move, as far as its moves are known; see ``best_try``."""
+        query, cell = self.query, self.query.scene.cell
+        velocity = np.concatenate([robot.model.velocity for robot in cell.robots])
+        for order in list(permutations(query.movers))[:MOST_SHOWN]:
+            legs = [(robot, frozenset(order[:place])) for place, robot in enumerate(order)]
+            ways = [(cell.columns(robot), self._known_way(robot, moved)) for robot, moved in legs]
+            names = [f"'{robot}'{self._manner(robot, moved)}" for robot, moved in legs]
+            yield Try(words=" then ".join(names), q=rows_through(one_by_one(query.start, ways), velocity))
+
+    def _known_move(self, robot: str, moved: frozenset[str]) -> RobotMove | None:
+        """The move that was found for a robot after some others have moved; None where none was."""
+        return self._known.get((robot, moved, True)) or self._known.get((robot, moved, False))
+
+    def _known_way(self, robot: str, moved: frozenset[str]) -> Array:
+        """Via points of a robot after some others have moved: those that were found, over the gap, or straight."""
+        move = self._known_move(robot, moved)
+        straight = np.array(self.query.ends_of(robot))
+        return self._over_gaps.get((robot, moved), straight) if move is None else move.line.q
+
+    def _manner(self, robot: str, moved: frozenset[str]) -> str:
+        """How a robot moves in a try."""
+        if self._known_move(robot, moved) is not None:
+            return ""
+        return ", straight over the gap between its trees" if (robot, moved) in self._over_gaps else " straight"
 
     def _in_order(self, order: tuple[str, ...], *, planned: bool) -> list[RobotMove] | None:
         moves: list[RobotMove] = []
@@ -87,7 +117,7 @@ class InTurn:
         return self._known[key]
 
     def _plan(self, robot: str, moved: frozenset[str], *, planned: bool) -> RobotMove | None:
-        query, check = self._query, self._check(robot, moved)
+        query, check = self.query, self._check(robot, moved)
         if check is None:
             return None
         ends, box = query.ends_of(robot), query.box(robot)
@@ -99,12 +129,14 @@ class InTurn:
         found = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
         if found.way is None:
             self.tried.failed(robot, DRAWN, found.reached)
+            if found.over_gap is not None:
+                self._over_gaps[robot, moved] = found.over_gap
             return None
         return self._rounded(check, shortened(check, found.way, box.velocity, rng))
 
     def _rounded(self, check: MoveCheck, way: Array) -> RobotMove:
         """A way through via points, shape (K, n), as a smooth move."""
-        cell = self._query.scene.cell
+        cell = self.query.scene.cell
         velocity = cell.robot(check.robot).model.velocity
         return RobotMove(robot=check.robot, line=rounded_line(check, way, cell.columns(check.robot), velocity))
 
@@ -112,7 +144,7 @@ class InTurn:
         """The check among robots that stand; None where an end of the move is blocked by one of them."""
         key = (robot, moved)
         if key not in self._checks:
-            query = self._query
+            query = self.query
             standing = query.standing(moved)
             check = MoveCheck(query.scene, robot, Others.moving(query.scene, standing[None]), reserve=self._reserve)
             check.refused = self.tried.refused

@@ -17,6 +17,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.rung import Rung
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
+from cellplan.planning.transfer.best_try import Try
 from cellplan.planning.transfer.blended_lines import joint_path
 from cellplan.planning.transfer.in_time import InTime
 from cellplan.planning.transfer.in_turn import InTurn, RobotMove
@@ -78,19 +79,23 @@ def plan_transfer(
         if found is not None:
             return found
     in_turn, in_time = Tried(), Tried() if len(query.movers) > 1 else None
-    found = _in_turn(query, retimer, in_turn, progress)
+    search = InTurn(query, in_turn, reserve=RESERVES[0], progress=progress)
+    found = _in_turn(search, retimer, progress)
     if found is None and in_time is not None:
         found = _in_time(query, retimer, in_time, progress)
     if found is None:
-        raise not_found(query, straight, in_turn, in_time)
+        tries = [Try(words="all at once, straight" if in_time else "straight", q=straight), *search.tries()]
+        raise not_found(query, tries, in_turn, in_time)
     return found
 
 
-def _in_turn(query: TransferQuery, retimer: Retimer, tried: Tried, progress: Progress) -> PlannedTransfer | None:
+def _in_turn(search: InTurn, retimer: Retimer, progress: Progress) -> PlannedTransfer | None:
     """One robot after the other; None where no order is found, or none is certified."""
+    query, tried = search.query, search.tried
     for reserve in RESERVES:
         before = tried.uncertified
-        for moves in islice(InTurn(query, tried, reserve=reserve, progress=progress).moves(), MOST_RETIMED):
+        again = InTurn(query, tried, reserve=reserve, progress=progress) if reserve > RESERVES[0] else search
+        for moves in islice(again.moves(), MOST_RETIMED):
             rows = [query.start[None]]
             for move in moves:
                 rows.append(_rows_of(move, rows[-1][-1], retimer)[1:])

@@ -1,14 +1,15 @@
 """Transfer reasons: why no transfer move was found, in one line: what was tried, and what was too close most often."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 from cellplan.certify.certify import certify
-from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.arrays import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import MM
+from cellplan.planning.transfer.best_try import BlockedTransferError, Try, best_try, in_the_way
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.scene.scene import Scene
 
@@ -42,28 +43,32 @@ def require_free_ends(query: TransferQuery) -> None:
     """Refuse a start or a goal that keeps less distance than is demanded.
 
     Raises:
-        TransferNotFoundError: With the pair of bodies, their distance and what is demanded.
+        BlockedTransferError: With the pair of bodies, their distance and what is demanded.
     """
     for name, q in (("start", query.start), ("goal", query.goal)):
         at_rest = q[None].repeat(2, axis=0)
         if not certify(query.scene, at_rest, with_minimum=False).is_kept:
-            raise TransferNotFoundError(
-                f"{query.place}: the {name} of the transfer move of {query.named} comes too close: "
-                f"{nearest_words(query.scene, at_rest)[0]}: let approach and retract leave more room, or move one of "
-                "the two"
+            blocked = in_the_way(query.scene, Try(words=f"at its {name}", q=at_rest))
+            raise BlockedTransferError(
+                query.place,
+                f"the {name} of the transfer move of {query.named} comes too close: {blocked.words}: let approach and "
+                "retract leave more room, or move one of the two",
+                blocked,
             )
 
 
-def not_found(query: TransferQuery, straight: Array, in_turn: Tried, in_time: Tried | None) -> TransferNotFoundError:
+def not_found(
+    query: TransferQuery, tries: Sequence[Try], in_turn: Tried, in_time: Tried | None
+) -> BlockedTransferError:
     """The error of a query for which no way was found.
 
     Args:
         query: What was asked for.
-        straight: Some rows of the straight move, shape (K, nq).
+        tries: What was tried; the straight move of all robots first.
         in_turn: What was tried of one robot after the other.
         in_time: What was tried of all robots at once; None where a single one moves.
     """
-    words = [f"straight, {nearest_words(query.scene, straight)[0]}"]
+    words = [f"straight, {nearest_words(query.scene, tries[0].q)[0]}"]
     name = "one robot after the other" if in_time is not None else "by trees in its joint space"
     words.append(f"{name}, {_tried_words(in_turn)}")
     refused = in_turn.refused
@@ -72,9 +77,12 @@ def not_found(query: TransferQuery, straight: Array, in_turn: Tried, in_time: Tr
         refused = refused + in_time.refused
     often = [f"'{a}' too close to '{b}' ({count} times)" for (a, b), count in refused.most_common(SHOWN)]
     most = f"; most often {' and '.join(often)}" if often else ""
-    return TransferNotFoundError(
-        f"{query.place}: found no transfer move of {query.named}: {'; '.join(words)}{most}: "
-        "give another home or start, move what is in the way, or lower the clearance"
+    best = best_try(query.scene, tries)
+    return BlockedTransferError(
+        query.place,
+        f"found no transfer move of {query.named}: at the best try ({best.tried.words}) {best.words}; tried were: "
+        f"{'; '.join(words)}{most}: give another home or start, move what is in the way, or lower the clearance",
+        best,
     )
 
 

@@ -63,6 +63,7 @@ class Found:
 
     way: Array | None  # via points in [rad] or [m] from start to goal, shape (K, n); None where none was found
     reached: tuple[int, int]  # configurations reached from the start and from the goal
+    over_gap: Array | None = None  # where none was found, the way along both trees and straight from one to the other
 
 
 def connected(
@@ -99,7 +100,7 @@ def connected(
             found = np.array(way) * scale
             found[0], found[-1] = start, goal
             return Found(way=found, reached=(trees[0].count, trees[1].count))
-    return Found(way=None, reached=(trees[0].count, trees[1].count))
+    return Found(way=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,6 +117,14 @@ class JointBox:
         low = np.maximum(self.lower, np.minimum(start, goal) - beside)
         high = np.minimum(self.upper, np.maximum(start, goal) + beside)
         return rng.uniform(low, high)
+
+
+def _over_gap(trees: list[Tree]) -> Array:
+    """The way along both trees to their nearest nodes and straight from the one to the other, shape (K, n)."""
+    ahead, back = (tree.nodes[: tree.count] for tree in trees)
+    nearest = [trees[1].nearest(x) for x in ahead]
+    node = int(np.argmin(np.linalg.norm(ahead - back[nearest], axis=1)))
+    return np.array(trees[0].way_to(node) + trees[1].way_to(nearest[node])[::-1])
 
 
 def _extended(check: MoveCheck, tree: Tree, x: Array, scale: Array) -> int | None:

@@ -16,9 +16,10 @@ from cellplan.errors import (
     TransferNotFoundError,
 )
 from cellplan.model.cell import Cell
-from cellplan.pipeline.plan.program_faults import located
+from cellplan.pipeline.plan.program_faults import located, named_transfer
 from cellplan.pipeline.plan.sequence import plan_program
 from cellplan.planning.sequence.stages import Stage, program_stages
+from cellplan.planning.transfer.best_try import BlockedTransferError
 
 ATTACH = "attach: {at: {xyz_mm: [0, -1000, 600]}, rests_on: table_in}"
 ONE_TASK = (
@@ -130,3 +131,19 @@ def test_only_tasks_of_the_cell_are_to_close_their_cycle(moves: tuple[Cell, dict
     closing = [stage.phase.name for stage in program_stages(cyclic) if stage.cell.motion.cyclic]
 
     assert closing == ["work-1", "work-2"]
+
+
+def test_a_transfer_move_that_fails_is_named_with_the_tasks_at_its_ends(tmp_path: Path) -> None:
+    file = tmp_path / "cell.yaml"
+    file.write_text(PICK_AND_PLACE, encoding="utf-8")
+    stages = program_stages(load_cell(file))
+    said = {}
+    for number, stage in enumerate(stages):
+        if stage.is_transfer:
+            with pytest.raises(BlockedTransferError) as error, named_transfer(stages, number):
+                raise BlockedTransferError("cell.yaml:3: robots", "found none")
+            said[error.value.name] = str(error.value)
+
+    assert said["transfer-3"] == "cell.yaml:3: robots: transfer-3, from work-1 (seam) to work-2 (ring): found none"
+    assert said["transfer-1"] == "cell.yaml:3: robots: transfer-1, from home to grip: found none"
+    assert said["transfer-5"] == "cell.yaml:3: robots: transfer-5, from release to home: found none"

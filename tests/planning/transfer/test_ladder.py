@@ -19,6 +19,7 @@ from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.rung import Rung
+from cellplan.planning.transfer.best_try import Try, best_try, in_the_way
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
 from cellplan.scene.scene import Scene
 
@@ -194,7 +195,9 @@ def test_a_wall_without_a_gap_is_refused_with_what_was_tried(monkeypatch: pytest
         transfer(scene, [-0.5, 0.0], [0.5, 0.0])
 
     assert str(refused.value) == (
-        "<cell>: robots.a: found no transfer move of 'a': straight, 'a/disc' touches 'wall', 5 mm are demanded; by "
+        "<cell>: robots.a: found no transfer move of 'a': at the best try ('a', straight over the gap between its "
+        "trees) 'a/disc' is 124 mm deep in 'wall', 5 mm are demanded; tried were: straight, 'a/disc' touches 'wall', "
+        "5 mm are demanded; by "
         "trees in its joint space, 200 configurations drawn (41 reached from the start of 'a' and 36 from its goal); "
         "most often 'a/disc' too close to 'wall' (201 times): give another home or start, move what is in the way, or "
         "lower the clearance"
@@ -211,7 +214,33 @@ def test_discs_that_cannot_pass_each_other_are_refused(monkeypatch: pytest.Monke
 
     words = str(refused.value)
     assert words.startswith(
-        "<cell>: robots: found no transfer move of 'a', 'b': straight, 'a/disc' touches 'b/disc', 5 mm are demanded; "
-        "one robot after the other, in 2 orders; all at once in joint space and time, in 4 orders "
+        "<cell>: robots: found no transfer move of 'a', 'b': at the best try (all at once, straight) 'a/disc' is 50 mm "
+        "deep in 'b/disc', 5 mm are demanded; tried were: straight, 'a/disc' touches 'b/disc', 5 mm are demanded; one "
+        "robot after the other, in 2 orders; all at once in joint space and time, in 4 orders "
     )
     assert "'a/disc' too close to 'b/disc'" in words
+
+
+@pytest.mark.parametrize("x", [0.0, 0.31])
+def test_a_pair_in_the_way_is_as_deep_as_the_closed_form_says(x: float) -> None:
+    """A disc pushed straight through a wall is deepest where its way out is half the wall and its own radius."""
+    scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0), (x, 0.0))], step=STEP)
+    way = np.linspace([-0.9, 0.0], [0.9, 0.0], 40)
+
+    blocked = in_the_way(scene, Try(words="straight", q=way))
+
+    assert blocked.missing == pytest.approx(RADIUS + 0.025 + CLEARANCE, abs=2e-3)  # 25 samples about the deepest row
+    assert blocked.bodies == ("a/disc", "wall")
+
+
+def test_the_try_that_misses_least_is_the_best() -> None:
+    """A disc that passes 3 mm from the end of a wall is nearer to being free than one that goes through it."""
+    scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 0.4))], step=STEP)
+    through = Try(words="through", q=np.linspace([-0.5, 0.0], [0.5, 0.0], 20))
+    beside = Try(words="beside", q=np.linspace([-0.5, 0.303], [0.5, 0.303], 20))
+
+    blocked = best_try(scene, [through, beside])
+
+    assert blocked.tried is beside
+    assert blocked.words == "'a/disc' is 3 mm from 'wall', 5 mm are demanded"
+    assert blocked.missing == pytest.approx(0.002, abs=1e-4)

@@ -1,0 +1,140 @@
+"""Best try: of the transfer moves tried in vain, the one that comes nearest to being free, and what is in its way.
+
+Tried are the straight move of all robots at once, and each order of robots one after the other: each of them on the way
+that was found for it, else along both trees with a straight line from the one to the other where they came nearest,
+else straight.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.bound import Bound, PairBound
+from cellplan.certify.certify import certify
+from cellplan.collision.overlap.depth import ground_depth, overlap_depth
+from cellplan.errors import TransferNotFoundError
+from cellplan.geometry.arrays import Array
+from cellplan.model.units import MM
+from cellplan.scene.pairs import ScenePair
+from cellplan.scene.scene import Scene
+
+STEP: Final = 0.05  # [s] between two rows of a try at top speed: some 5 deg of an arm
+DEPTHS: Final = (
+    24  # [-] configurations of a try at which the depth of a pair that touches is measured, and as many at the deepest
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Try:
+    """A transfer move that is not free."""
+
+    words: str  # how the robots move
+    q: Array  # stacked joint positions in [rad] or [m], shape (K, nq)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BlockedTry:
+    """A try with the pair that falls short of its demand most."""
+
+    scene: Scene
+    tried: Try
+    bodies: tuple[str, str]  # names of the pair
+    missing: float  # by how much the pair falls short of its demand in [m], its depth included
+    row: int  # row of the try at which it does
+    words: str  # the pair and the amount
+
+
+class BlockedTransferError(TransferNotFoundError):
+    """No transfer move was found, or it begins or ends too close to something.
+
+    Attributes:
+        place: Where in the cell file the robots stand.
+        what: What is in the way.
+        best: The best try; None once the error was sent to another process.
+        name: Name of the phase; empty where it is not known.
+    """
+
+    def __init__(self, place: str, what: str, best: BlockedTry | None = None, *, name: str = "") -> None:
+        """Join place and words."""
+        super().__init__(f"{place}: {what}")
+        self.place, self.what, self.best, self.name = place, what, best, name
+
+    def __reduce__(self) -> tuple[type["BlockedTransferError"], tuple[str, str]]:
+        """Cross to another process as words."""
+        return BlockedTransferError, (self.place, self.what)
+
+    def of_phase(self, name: str, between: str) -> "BlockedTransferError":
+        """The same with the name of the phase, and between what it is."""
+        return BlockedTransferError(self.place, f"{name}, {between}: {self.what}", self.best, name=name)
+
+
+def best_try(scene: Scene, tries: Iterable[Try]) -> BlockedTry:
+    """The try whose worst pair falls short of its demand least; the first of equal ones."""
+    return min((in_the_way(scene, each) for each in tries), key=lambda blocked: round(blocked.missing, 6))
+
+
+def in_the_way(scene: Scene, tried: Try) -> BlockedTry:
+    """The pair that falls short of its demand most in a try, and by how much."""
+    bound = certify(scene, tried.q, with_curves=False)
+    short = [_shortfall(bound, pair) for pair in bound.pairs if not pair.is_kept]
+    if not short:  # free at last: only more rows were refused
+        return BlockedTry(scene=scene, tried=tried, bodies=("", ""), missing=0.0, row=0, words="nothing is in the way")
+    missing, depth, row, pair = max(short, key=lambda each: each[0])
+    first, second = bound.names(pair)
+    held = f"is {depth * MM:.3g} mm deep in" if depth > 0.0 else f"is {pair.proved * MM:.3g} mm from"
+    held = "touches" if pair.touches and not depth > 0.0 else held
+    demand = f", {pair.demand * MM:g} mm are demanded" if pair.keeps_clearance else ""
+    words = f"'{first}' {held} '{second}'{demand}"
+    return BlockedTry(scene=scene, tried=tried, bodies=(first, second), missing=missing, row=row, words=words)
+
+
+def _shortfall(bound: Bound, pair: PairBound) -> tuple[float, float, int, PairBound]:
+    """By how much a pair falls short of its demand in [m], its depth, and the row at which that is."""
+    if not pair.touches:
+        return pair.demand - pair.proved, 0.0, round(pair.at), pair
+    last = len(bound.q) - 1
+    rows = np.unique(np.clip(np.rint(pair.touches), 0, last).astype(np.intp))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, DEPTHS).round().astype(np.intp))]
+    deepest = int(rows[np.argmax(_depths(bound.scene, pair.pair, bound.q[rows]))])
+    at = np.linspace(max(0, deepest - 1), min(last, deepest + 1), DEPTHS + 1)
+    near = np.array([np.interp(at, np.arange(last + 1), column) for column in bound.q.T]).T
+    depth = float(_depths(bound.scene, pair.pair, near).max())
+    return pair.demand + depth, depth, deepest, pair
+
+
+def _depths(scene: Scene, pair: ScenePair, q: Array) -> Array:
+    """Depth of a pair at some configurations of shape (K, nq), in [m], shape (K,)."""
+    if pair.solids is None:
+        poses = scene.pair_poses((pair.first, pair.first), q)
+        X_WS = scene.bodies[pair.second].X_BS
+        return ground_depth(scene.engine.bodies[pair.first], poses, pair.first, X_WS=X_WS)
+    poses = scene.pair_poses(pair.solids, q)
+    return np.array([overlap_depth(scene.engine, pair.solids, poses, sample=k) for k in range(len(q))])
+
+
+def rows_through(via: Array, velocity: Array) -> Array:
+    """Rows along straight lines through via points, shape (K, nq), so dense that top speed takes ``STEP`` for each."""
+    rows = [via[:1]]
+    for before, after in pairwise(via):
+        count = max(1, int(np.ceil(float((np.abs(after - before) / velocity).max()) / STEP)))
+        rows.append(before + np.linspace(0.0, 1.0, count + 1)[1:, None] * (after - before))
+    return np.concatenate(rows)
+
+
+def one_by_one(start: Array, ways: Sequence[tuple[slice, Array]]) -> Array:
+    """Via points of robots that move one after the other, shape (K, nq).
+
+    Args:
+        start: Stacked joint positions in [rad] or [m], shape (nq,).
+        ways: Columns of each robot in their order, and its via points, shape (k, n).
+    """
+    via, q = [start], start
+    for columns, way in ways:
+        for point in way[1:]:
+            q = q.copy()
+            q[columns] = point
+            via.append(q)
+    return np.array(via)
