@@ -32,6 +32,7 @@ class TaskSchedule:
             components together, one per cycle; none when it does not come back.
         stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
         demanded: Stretches of time in [s] in which the feed of a process is demanded, as (from, to).
+        bulge: Largest distance in [m] of a smooth path from the straight lines between its points, else None.
     """
 
     task: Task
@@ -43,6 +44,7 @@ class TaskSchedule:
     cycle_ends: tuple[float, ...] = ()
     stops: tuple[float, ...] = ()
     demanded: tuple[tuple[float, float], ...] = ()
+    bulge: float | None = None
 
     @property
     def begin(self) -> float:

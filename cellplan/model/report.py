@@ -93,6 +93,7 @@ class TaskAccuracy:
         position_error: Position error in P in [m], shape (N, 3); unconstrained components are zero.
         orientation_error: Rotation vector of ``R_PT,desired R_PT^T`` in P in [rad], shape (N, 3); likewise.
         path_length: Length of the path on the surface in [m].
+        path_bulge: Largest distance in [m] of a smooth path from the straight lines between its points, else None.
         start_s: Instant at which the path begins.
         end_s: Instant at which the path is done.
         between: Errors between the rows; None where they were not evaluated.
@@ -106,6 +107,7 @@ class TaskAccuracy:
     start_s: float
     end_s: float
     between: BetweenRows | None = None
+    path_bulge: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

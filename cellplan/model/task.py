@@ -82,6 +82,8 @@ class SampledPath:
         rotations: Tool orientations, shape (N, 3, 3), or None; at most one of axes and rotations is given.
         is_smooth: Whether a curve is interpolated through the points instead of straight sides.
         is_closed: Whether the last point is joined to the first.
+        join: Distance in [m] within which points of the file were joined to the point before; 0 for none.
+        lines: Line of each point in the file, for messages; empty where they follow one another from line 2.
     """
 
     source: str
@@ -90,6 +92,8 @@ class SampledPath:
     rotations: Array | None
     is_smooth: bool
     is_closed: bool
+    join: float = 0.0
+    lines: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -30,6 +30,8 @@ class Toolpath:
         stand_off: Distance in [m], against the tool's axis, from which the tool comes to its start.
         is_timed: Whether the parameter of both curves is the time in [s] since the start: a trajectory keeps its own
             times and may stand still.
+        bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
+            projected; None for other curves.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Toolpath:
     runs_on: bool = False
     stand_off: float = 0.0
     is_timed: bool = False
+    bulge: float | None = None
 
     def __repr__(self) -> str:
         """One line without arrays."""

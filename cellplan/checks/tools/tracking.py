@@ -50,6 +50,7 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
         position_error=error[:, :3],
         orientation_error=error[:, 3:],
         path_length=scheduled.length,
+        path_bulge=scheduled.bulge,
         start_s=task.start,
         end_s=scheduled.end,
     )

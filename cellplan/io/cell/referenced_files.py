@@ -82,7 +82,11 @@ class Sources:
             return None
         try:
             sampled = read_toolpath_csv(
-                place, is_smooth=settings.smooth, is_closed=settings.closed, source=settings.file
+                place,
+                is_smooth=settings.smooth,
+                is_closed=settings.closed,
+                source=settings.file,
+                join=settings.join_mm.si,
             )
             self.inputs[settings.file] = digest_of_file(place, file=settings.file)
         except InputError as error:

@@ -9,9 +9,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.geometry.arrays import Flags
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
 from cellplan.io.input.files import read_regular_file
-from cellplan.io.input.findings import Finding, did_you_mean, listed, raise_findings, shown
+from cellplan.io.input.findings import Finding, did_you_mean, kind_of, listed, raise_findings, shown
 from cellplan.model.task import SampledPath, TimedPath
 
 TIME: Final = "t_s"
@@ -22,8 +23,10 @@ COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
-FINDING_LIMIT: Final = 20  # lines with findings that are reported; more are counted only
-UNIT_ROOM: Final = 1e-3  # [-] room for axes and quaternions written with four digits
+FINDING_LIMIT: Final = 20  # different findings that are reported
+UNIT_ROOM: Final = 1e-3  # [-] room for quaternions written with four digits
+SHORTEST_AXIS: Final = 1e-6  # [-] a shorter vector has no direction
+LONGEST_AXIS: Final = 1e6  # [-] of a component of a direction, as in a cell file
 FARTHEST: Final = 100_000.0  # [mm] no part is that large: a wrong unit
 SHORTEST_S: Final = 1e-6  # [s] between two times, halved for rounding; no controller resolves less
 LATEST: Final = 1e6  # [s] eleven days: a wrong unit
@@ -31,7 +34,9 @@ CLOSING_ROOM: Final = 1e-3  # [mm] room for a return to the start written with t
 FEWEST_CLOSED: Final = 4  # rows of a trajectory that encloses something and repeats its start
 METRES_PER_MM: Final = 1e-3
 
-_LIMITS: Final = {TIME: (LATEST, " s")} | dict.fromkeys(POSITION, (FARTHEST, " mm"))
+_LIMITS: Final = (
+    {TIME: (LATEST, " s")} | dict.fromkeys(POSITION, (FARTHEST, " mm")) | dict.fromkeys(AXIS, (LONGEST_AXIS, ""))
+)
 _NUMBER: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\x85\u2028\u2029]|\r(?!\n)")
 _TIME_WORDS: Final = ("t", "time", "time_s", "t_ms", "time_ms", "t[s]", "t [s]", "s", "seconds")
@@ -40,33 +45,38 @@ _LENGTH_UNITS: Final = ("", "_m", "_cm", "_in", "_inch", "_um", "[mm]", " mm", "
 
 @dataclass(slots=True)
 class _Findings:
-    """Findings gathered while reading; beyond a limit they are only counted."""
+    """Findings gathered while reading."""
 
     found: list[Finding] = field(default_factory=list)
+    kinds: set[tuple[str, ...]] = field(default_factory=set)
 
     def add(self, line: int, text: str, *, column: str = "") -> None:
         """Note a finding about a line, or about one value of it."""
-        self.found.append(Finding(line=line, key=f"column '{column}'" if column else "", text=text))
+        finding = Finding(line=line, key=f"column '{column}'" if column else "", text=text)
+        self.found.append(finding)
+        self.kinds.add(kind_of(finding))
 
     @property
     def is_enough(self) -> bool:
         """Whether reading on would not help."""
-        return len(self.found) >= FINDING_LIMIT
+        return len(self.kinds) >= FINDING_LIMIT
 
 
 def read_toolpath_csv(
-    path: Path, *, is_smooth: bool, is_closed: bool, source: str | None = None
+    path: Path, *, is_smooth: bool, is_closed: bool, source: str | None = None, join: float = 0.0
 ) -> SampledPath | TimedPath:
     """Read tool targets: ``x_mm, y_mm, z_mm`` and, where the file has them, ``i, j, k`` or ``qw, qx, qy, qz``.
 
     The header names the columns, in any order. Axes point into the part; quaternions turn the tool's axes into the
-    part frame. Both are brought to length one. A column ``t_s`` makes the path a trajectory.
+    part frame. Axes of any length and quaternions of nearly one are brought to length one. A column ``t_s`` makes the
+    path a trajectory.
 
     Args:
         path: The file.
         is_smooth: Whether a smooth curve joins the points instead of straight sides; a trajectory is smooth.
         is_closed: Whether the last point is joined to the first; a closed trajectory repeats its start at its end.
         source: Name of the file for messages; by default its last part.
+        join: Distance in [m]: points nearer to the point before than this are left out; 0 for none.
 
     Raises:
         InvalidFileError: All that is wrong with the content, with line and column.
@@ -95,8 +105,16 @@ def read_toolpath_csv(
     points = values[:, [columns.index(column) for column in POSITION]] * METRES_PER_MM
     rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
     if times is None:
+        is_kept = _apart(points, join, is_closed=is_closed)
         return SampledPath(
-            source=name, points=points, axes=axes, rotations=rotations, is_smooth=is_smooth, is_closed=is_closed
+            source=name,
+            points=points[is_kept],
+            axes=None if axes is None else axes[is_kept],
+            rotations=None if rotations is None else rotations[is_kept],
+            is_smooth=is_smooth,
+            is_closed=is_closed,
+            join=join,
+            lines=tuple((np.flatnonzero(is_kept) + 2).tolist()),
         )
     return TimedPath(source=name, times=times, points=points, axes=axes, rotations=rotations, is_closed=is_closed)
 
@@ -212,11 +230,25 @@ def _units(
         return None
     vectors = values[:, [columns.index(column) for column in desired]]
     norms = np.linalg.norm(vectors, axis=1)
-    for row in np.flatnonzero(~(np.abs(norms - 1.0) <= UNIT_ROOM))[:FINDING_LIMIT]:
-        text = f"expected a {what} ({listed(desired)}) of length 1, got {norms[row]:.6g}"
-        findings.add(int(row) + 2, text)
+    length = "length 1" if desired == QUATERNION else "a length"
+    is_bad = ~(np.abs(norms - 1.0) <= UNIT_ROOM) if desired == QUATERNION else ~(norms >= SHORTEST_AXIS)
+    for row in np.flatnonzero(is_bad):
+        findings.add(int(row) + 2, f"expected a {what} ({listed(desired)}) of {length}, got {norms[row]:.6g}")
     unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
     return unit
+
+
+def _apart(points: Array, least: float, *, is_closed: bool) -> Flags:
+    """Which points are at least a distance from the one kept before, of a closed path also from the first one."""
+    is_kept = np.ones(len(points), dtype=bool)
+    last = 0
+    for k in range(1, len(points) if least > 0.0 else 0):
+        is_kept[k] = np.linalg.norm(points[k] - points[last]) >= least
+        last = k if is_kept[k] else last
+    while is_closed and last > 0 and np.linalg.norm(points[last] - points[0]) < least:
+        is_kept[last] = False
+        last = int(np.flatnonzero(is_kept)[-1])
+    return is_kept
 
 
 def _examine_times(times: Array, findings: _Findings) -> None:

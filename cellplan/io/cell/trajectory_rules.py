@@ -54,6 +54,9 @@ def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Findi
     if isinstance(task.path.csv, CsvEntry) and not task.path.csv.smooth:
         text = "expected true for a file with a column t_s: straight sides would jump in speed, got false"
         yield document.finding(("tasks", name, "path", "csv", "smooth"), text)
+    if isinstance(task.path.csv, CsvEntry) and task.path.csv.join_mm:
+        text = "unexpected key, rows of a file with a column t_s are apart in time: leave one out in the file"
+        yield document.key_finding(("tasks", name, "path", "csv", "join_mm"), text)
 
 
 def _end(

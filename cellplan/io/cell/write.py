@@ -115,6 +115,8 @@ def _task(entry: Mapping[str, Any], task: Task) -> dict[str, Any]:
         written["duration_s"] = task.duration
     if isinstance(task.path, SampledPath | TimedPath):
         settings = {"file": task.path.source, "smooth": task.path.is_smooth, "closed": task.path.is_closed}
+        if isinstance(task.path, SampledPath) and task.path.join:
+            settings["join_mm"] = MM * task.path.join
         written["path"] = {**entry["path"], "csv": settings}
     return written
 

@@ -1,7 +1,8 @@
 """Findings about a file: where, what, got, allowed, in the order of the file."""
 
+import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from typing import Final
 
@@ -32,12 +33,12 @@ class Finding:
 
 
 def raise_findings(file: str, findings: Iterable[Finding], others: Sequence[InputError] = ()) -> None:
-    """Raise all findings about a file at once, sorted by line, then those about the files it names.
+    """Raise all findings about a file at once, equal ones as one, sorted by line, then those about the files it names.
 
     Raises:
         InvalidFileError: When there is at least one finding.
     """
-    ordered = sorted(dict.fromkeys(findings), key=lambda finding: finding.line)
+    ordered = _equal_ones_joined(sorted(dict.fromkeys(findings), key=lambda finding: finding.line))
     errors = [finding.to_error(file) for finding in ordered[:FINDING_LIMIT]]
     if len(ordered) > FINDING_LIMIT:
         errors.append(InputError(f"{file}: and more than {len(ordered) - FINDING_LIMIT - 1} other findings"))
@@ -45,6 +46,24 @@ def raise_findings(file: str, findings: Iterable[Finding], others: Sequence[Inpu
         errors.extend(other.findings if isinstance(other, InvalidFileError) else [other])
     if errors:
         raise InvalidFileError(errors)
+
+
+def kind_of(finding: Finding) -> tuple[str, ...]:
+    """What equal findings have in common: all but the line and the places in lists."""
+    return re.sub(r"\[\d+\]", "[]", finding.key), finding.text, finding.changes
+
+
+def _equal_ones_joined(ordered: Sequence[Finding]) -> list[Finding]:
+    """The first finding of each kind, with the number of those like it and the line of the last one."""
+    kinds: dict[tuple[str, ...], list[Finding]] = {}
+    for finding in ordered:
+        kinds.setdefault(kind_of(finding), []).append(finding)
+    return [
+        replace(equal[0], text=f"{equal[0].text} ({len(equal)} times, the last in line {equal[-1].line})")
+        if len(equal) > 1
+        else equal[0]
+        for equal in kinds.values()
+    ]
 
 
 def key_text(path: KeyPath) -> str:

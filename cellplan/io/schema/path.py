@@ -15,10 +15,12 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
+from cellplan.io.schema.units import Mm, Within
 
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
+MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
 
 
 class PolylineEntry(Entry):
@@ -74,6 +76,11 @@ class CsvEntry(Entry):
     closed: bool = Field(
         default=False,
         description="Whether the last point is joined to the first; a closed trajectory ends with its first row again.",
+    )
+    join_mm: Annotated[Mm, Within(ge=0.0, le=MOST_JOINED_MM)] = Field(
+        default=Mm(0.0),
+        description="Points nearer to the point before than this are left out, and at the end of a closed path those "
+        "nearer to the first; not for a trajectory.",
     )
 
 

@@ -60,6 +60,7 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         runs_on=curve.runs_on,
         stand_off=task.approach.distance if task.approach else 0.0,
         is_timed=is_timed,
+        bulge=curve.bulge,
     )
     if not is_rigid(toolpath.spread(PROBES)):
         raise CellplanError(f"toolpath '{task.name}': a tool pose is not finite or not rigid")

@@ -22,6 +22,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.path_direction import outside_of, plane_axes
 from cellplan.model.task import CirclePath, PolygonPath, RunDirection, SampledPath, SpacePolylinePath, Task, TimedPath
 from cellplan.planning.path.formatting import direction_name, in_mm, length
+from cellplan.planning.path.point_spacing import largest_bulge, named_points, refuse_near_points, refuse_near_times
 
 SAME_POINT: Final = 1e-9  # [m] points nearer than this are one point written twice
 STRAIGHT_ON: Final = 1e-9  # [rad] a change of direction below this is no corner
@@ -35,6 +36,8 @@ class PathCurve:
 
     Attributes:
         patch: The smooth patch of the part that the curve lies on; None on a mesh or where it is not projected.
+        bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
+            projected; None for other curves.
     """
 
     curve: Curve
@@ -44,6 +47,7 @@ class PathCurve:
     runs_on: bool = False  # whether a closed curve passes its start without a corner
     patch: Patch | None = None
     inward: BezierCurve | None = None  # inward normals of a mesh along the curve; None elsewhere
+    bulge: float | None = None
 
 
 def path_curve(task: Task) -> PathCurve:
@@ -65,10 +69,11 @@ def path_curve(task: Task) -> PathCurve:
             _refuse_poor_points(np.asarray(path.points), path.is_closed, where=where)
             return _sides(_closed(np.asarray(path.points, dtype=float), path.is_closed), task)
         case SampledPath():
-            _refuse_poor_points(path.points, path.is_closed, where=where, source=path.source)
+            _refuse_poor_points(path.points, path.is_closed, where=where, path=path)
             points = _closed(path.points, path.is_closed)
             return _smooth(points, path.is_closed) if path.is_smooth else _sides(points, task)
         case TimedPath():
+            refuse_near_times(path, where)
             return _timed(path)
 
 
@@ -114,8 +119,8 @@ def _outside(task: Task, normal: Array, where: str) -> Array:
     return outside_of(task, normal)
 
 
-def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, source: str = "") -> None:
-    """Refuse too few points, points that are not finite and points written twice in a row."""
+def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, path: SampledPath | None = None) -> None:
+    """Refuse too few points, points that are not finite and points that are written twice, exactly or nearly."""
     fewest = 3 if is_closed else 2
     if len(points) < fewest:
         kind = "a closed path" if is_closed else "a path"
@@ -125,9 +130,8 @@ def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, source: s
     repeated = np.linalg.norm(np.diff(points, axis=0), axis=1) <= SAME_POINT
     if np.any(repeated):
         k = _first(repeated)
-        rows = f" ({source}, lines {k + 1} and {k + 2})" if source else ""
         raise InputError(
-            f"{where}: expected points that differ, but points {k} and {k + 1}{rows} are both at "
+            f"{where}: expected points that differ, but {named_points(k - 1, len(points), path)} are both at "
             f"{in_mm(points[k])}; leave one out"
         )
     if is_closed and np.linalg.norm(points[-1] - points[0]) <= SAME_POINT:
@@ -135,6 +139,7 @@ def _refuse_poor_points(points: Array, is_closed: bool, *, where: str, source: s
             f"{where}: expected a closed path to be listed without its return, but the last point repeats the first "
             f"at {in_mm(points[0])}; leave the last point out"
         )
+    refuse_near_points(points, path, where=where, is_closed=is_closed, is_smooth=path is not None and path.is_smooth)
 
 
 def _first(marks: NDArray[np.bool_]) -> int:
@@ -153,7 +158,14 @@ def _smooth(points: Array, is_closed: bool) -> PathCurve:
     breaks = np.zeros(len(points), dtype=bool)
     breaks[[0, -1]] = not is_closed
     curve = smooth_through(given, points, breaks=breaks)
-    return PathCurve(curve=curve, stops=given[[0, -1]], given=given, is_closed=is_closed, runs_on=is_closed)
+    return PathCurve(
+        curve=curve,
+        stops=given[[0, -1]],
+        given=given,
+        is_closed=is_closed,
+        runs_on=is_closed,
+        bulge=largest_bulge(curve),
+    )
 
 
 def _timed(path: TimedPath) -> PathCurve:
@@ -165,6 +177,7 @@ def _timed(path: TimedPath) -> PathCurve:
         given=path.times,
         is_closed=path.is_closed,
         runs_on=path.is_closed,
+        bulge=largest_bulge(curve),
     )
 
 

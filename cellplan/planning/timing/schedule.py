@@ -200,6 +200,7 @@ def _on_clock(times: Array, path: ClockedPath) -> TaskSchedule:
         V_PT_P=V_PT_P,
         travelled=travelled,
         length=path.toolpath.length,
+        bulge=path.toolpath.bulge,
         end=path.end,
         cycle_ends=_cycle_ends(path, corners),
         stops=tuple(corners.tolist()),

@@ -92,6 +92,9 @@ class TaskRecord(BetweenRowsRecord, DepthRecord, DirectionRecord):
     tolerance: Annotated[ToleranceRecord, "admissible errors"]
     axes: Annotated[list[str], "constrained components"]
     path_length_mm: Annotated[Number, "length of the path on the surface"]
+    path_bulge_mm: Annotated[
+        Number, "largest distance of a smooth path from the straight lines between its points; null for other paths"
+    ]
     cycles: Annotated[int, "number of passes along the path"]
     start_s: Annotated[Number, "start of the path"]
     end_s: Annotated[Number, "end of the path"]
@@ -132,6 +135,7 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell, *, depth: T
         "tolerance": _tolerance_record(task, has_between=accuracy.between is not None),
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(MM * accuracy.path_length),
+        "path_bulge_mm": None if accuracy.path_bulge is None else number(MM * accuracy.path_bulge),
         "cycles": task.repeat,
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),

@@ -140,7 +140,7 @@ Refuse = Callable[..., list[str]]
             "c:19: tasks.ring.path.csv.file: missing, expected file with the header x_mm,y_mm,z_mm and "
             "optionally i,j,k or qw,qx,qy,qz, and t_s for a trajectory that brings its own "
             "clock\nc:19: tasks.ring.path.csv.fiel: unknown key, did you mean 'file'?; "
-            "allowed: file, smooth, closed",
+            "allowed: file, smooth, closed, join_mm",
         ),
         (
             "tool_axis: normal",

@@ -145,10 +145,9 @@ def test_an_empty_file_is_refused(read) -> None:
     assert findings_of(read, "")[0].startswith("weld.csv:1: unknown column ''")
 
 
-def test_axes_and_quaternions_that_are_not_of_length_one_are_refused(read) -> None:
-    assert findings_of(read, "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,0.9\n1,0,0,0,0,1\n2,0,0,0,0,0\n") == [
-        "weld.csv:2: expected a tool axis (i, j, k) of length 1, got 0.9",
-        "weld.csv:4: expected a tool axis (i, j, k) of length 1, got 0",
+def test_axes_without_a_direction_and_quaternions_that_are_not_of_length_one_are_refused(read) -> None:
+    assert findings_of(read, "x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,0,0\n1,0,0,0,0,1\n2,0,0,0,0,0\n") == [
+        "weld.csv:2: expected a tool axis (i, j, k) of a length, got 0 (2 times, the last in line 4)"
     ]
     assert findings_of(read, "x_mm,y_mm,z_mm,qw,qx,qy,qz\n0,0,0,1,1,0,0\n1,0,0,1,0,0,0\n") == [
         "weld.csv:2: expected a quaternion (qw, qx, qy, qz) of length 1, got 1.41421"
@@ -156,10 +155,42 @@ def test_axes_and_quaternions_that_are_not_of_length_one_are_refused(read) -> No
 
 
 def test_at_most_twenty_findings_are_listed(read) -> None:
-    lines = findings_of(read, HEADER + "a,0,0\n" * 100)
+    lines = findings_of(read, HEADER + "".join(f"a{k},0,0\n" for k in range(100)))
 
     assert len(lines) == 21
     assert lines[-1] == "weld.csv:22: and so on: stopped reading after 20 findings"
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "words"),
+    [
+        ("x_mm,y_mm,z_mm,qw,qx,qy,qz", "0,0,0,1,1,1,1", "expected a quaternion (qw, qx, qy, qz) of length 1, got 2"),
+        ("x_mm,y_mm,z_mm", "0,0,", "column 'z_mm': expected a number, got ''"),
+    ],
+)
+def test_equal_findings_are_one_line_with_their_number(read, header: str, row: str, words: str) -> None:
+    expected = [f"weld.csv:2: {words} (61 times, the last in line 62)"]
+
+    assert findings_of(read, f"{header}\n" + f"{row}\n" * 61) == expected
+
+
+@pytest.mark.parametrize("length", [1.00444, 0.9, 1.5, 1e-3])
+def test_axes_of_any_length_are_directions_as_in_a_cell_file(read, length: float) -> None:
+    path = read(f"x_mm,y_mm,z_mm,i,j,k\n0,0,0,0,{0.6 * length},{-0.8 * length}\n1,0,0,0,0,{-length}\n")
+
+    assert np.allclose(path.axes, [[0.0, 0.6, -0.8], [0.0, 0.0, -1.0]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("is_closed", "lines"), [(False, (2, 3, 5, 6, 7)), (True, (2, 3, 5, 6))])
+def test_points_within_the_stated_distance_are_joined_and_keep_their_lines(tmp_path, is_closed, lines) -> None:
+    rows = "0,0,0,0,0,-1\n10,0,0,0,0,-1\n10.001,0,0,1,0,0\n10,10,0,0,0,-1\n0,10,0,0,0,-1\n0,0.005,0,1,0,0\n"
+    (tmp_path / "weld.csv").write_text("x_mm,y_mm,z_mm,i,j,k\n" + rows, encoding="utf-8")
+
+    path = read_toolpath_csv(tmp_path / "weld.csv", is_smooth=True, is_closed=is_closed, join=1e-5)
+
+    assert path.lines == lines
+    assert path.join == 1e-5
+    assert len(path.points) == len(path.axes) == len(lines)
 
 
 def test_all_findings_come_as_one_error(read) -> None:
