@@ -1,5 +1,6 @@
 """All errors as one hierarchy; each class has the exit status with which it ends the program."""
 
+from collections.abc import Callable, Iterable, Iterator
 from enum import IntEnum
 
 
@@ -41,6 +42,28 @@ class InvalidFileError(InputError):
     def __reduce__(self) -> tuple[type["InvalidFileError"], tuple[list[InputError]]]:
         """Cross to another process with every finding."""
         return InvalidFileError, (self.findings,)
+
+
+def raise_findings(findings: Iterable[InputError]) -> None:
+    """Raise all findings at once, each of them once; a single one as it is, none not at all.
+
+    Raises:
+        InputError: There is one, or more.
+    """
+    single = list({str(finding): finding for finding in findings}.values())
+    if single:
+        raise single[0] if len(single) == 1 else InvalidFileError(single)
+
+
+def refusals(*demands: Callable[[], object]) -> Iterator[InputError]:
+    """The errors of all demands that are not met, in their order, instead of the first alone."""
+    for demand in demands:
+        try:
+            demand()
+        except InvalidFileError as error:
+            yield from error.findings
+        except InputError as error:
+            yield error
 
 
 class OverrunError(InputError):

@@ -51,7 +51,8 @@ class RegionBound:
     """What is proved of all pairs of bodies of two robots in a region.
 
     Attributes:
-        bodies: The pair that does not keep what is demanded of it, or else the nearest; None when neither is known.
+        bodies: The pair that does not keep what is demanded of it, or of which too little is proved, or else the
+            nearest; None when none is known.
         distance: Smallest distance measured in [m], that of these two, never above the truth; zero where they touch;
             inf where none was measured.
         proved: Distance in [m] that all pairs with the rule ``clearance`` are proved to keep; inf without such pairs.
@@ -65,6 +66,7 @@ class RegionBound:
     proved: float
     at: tuple[float, float] | None
     is_kept: bool  # whether every pair is proved to keep its demand, and not to touch where no more is demanded
+    demand: float = 0.0  # distance in [m] that is demanded of the two bodies
 
 
 def certify_regions(
@@ -280,15 +282,18 @@ class _RegionSearch:
     def _result(self, *, is_kept: bool) -> RegionBound:
         pairs, scene, boxes = self._pairs, self._motion.scene, Boxes.joined(self._boxes, self._groups)
         low = min(float(boxes.low[pairs.keeps[boxes.pair]].min(initial=np.inf)), self._given_up, self._nearest)
-        bodies = None if self._bodies is None else scene.names(scene.pairs[int(pairs.rows[self._bodies])])
+        pair = self._bodies
+        if pair is None and not is_kept and len(boxes):
+            pair = int(boxes.pair[int(np.argmin(boxes.low - pairs.demands[boxes.pair]))])
         return RegionBound(
             first=self._region.first,
             second=self._region.second,
-            bodies=bodies,
+            bodies=None if pair is None else scene.names(scene.pairs[int(pairs.rows[pair])]),
             distance=self._nearest,
             proved=max(0.0, low),
             at=self._at,
             is_kept=is_kept,
+            demand=0.0 if pair is None else float(pairs.demands[pair]),
         )
 
 

@@ -1,6 +1,7 @@
 """``cellplan export``: controller programs from a verified run."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -113,7 +114,7 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.run.folder import PROGRAMS
         from cellplan.pipeline.export.choice import Choice
         from cellplan.pipeline.export.program import default_folder, refuse_choice
-        from cellplan.pipeline.export.several import chosen_formats, refuse_unless_writable
+        from cellplan.pipeline.export.several import chosen_formats, refuse_unfit_run, refuse_unless_writable
         from cellplan.pipeline.gate.open_gate import open_gate
 
         formats = chosen_formats(form)
@@ -126,7 +127,8 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or (default_folder(run, single) if single else run / PROGRAMS)
         refuse_unless_writable([folder] if single else [folder / name for name in formats], run)
         with progress_listener(quiet=quiet) as progress:
-            verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), progress=progress)
+            unfit = partial(refuse_unfit_run, formats=formats, choice=Choice(**choice))
+            verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), refuse=unfit, progress=progress)
             if single:
                 result = _one(verified, folder, single, choice=choice, progress=progress)
             else:
@@ -160,7 +162,7 @@ def _several(
     found = export_programs(verified, folder, formats=forms, choice=Choice(**choice), progress=progress)
     status, written = _status(found), [each.form for each in found if each.refusal is None]
     word = "exported" if status == ExitStatus.PASSED else "refused"
-    about = {"status": word, "exit": int(status), "folder": str(folder), "run": verified.digest}
+    about = {"status": word, "exit": int(status), "folder": str(folder) if written else None, "run": verified.digest}
     record = {
         "schema": SCHEMA,
         **about,
@@ -172,7 +174,8 @@ def _several(
         lines += [f"  {each.form}: {'refused' if each.refusal else each.folder}"]
         lines_of_it = error_lines(each.refusal) if each.refusal else promise_lines(each.record or {"files": ()})
         lines += [f"  {line}" if each.record else f"    {line.removeprefix('error: ')}" for line in lines_of_it]
-    return Result(status=status, lines=[*lines, *_notes(verified), f"programs: {folder}"], record=record)
+    place = [f"programs: {folder}"] if written else []
+    return Result(status=status, lines=[*lines, *_notes(verified), *place], record=record)
 
 
 def _status(found: Sequence["Exported"]) -> ExitStatus:
@@ -187,14 +190,15 @@ def _status(found: Sequence["Exported"]) -> ExitStatus:
 
 def _record(each: "Exported") -> dict[str, Any]:
     """What came of one format among several, for machines."""
-    about = {"format": each.form, "folder": str(each.folder)}
     if each.refusal is not None:
         return {
-            **about,
+            "format": each.form,
+            "folder": None,
             "status": "refused",
             "exit": int(exit_status(each.refusal)),
             "errors": error_lines(each.refusal),
         }
+    about = {"format": each.form, "folder": str(each.folder)}
     return {**about, "status": "exported", "exit": 0, "files": list(each.files), "export": each.record}
 
 

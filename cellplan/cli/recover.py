@@ -55,6 +55,7 @@ def recover(  # noqa: PLR0913, PLR0917 - the options of the command
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.pipeline.gate.open_gate import open_gate
         from cellplan.pipeline.recover.recover import recover as recovered
+        from cellplan.pipeline.recover.state import refuse_state
         from cellplan.pipeline.recover.write import default_folder, refuse_unless_recoverable, write_recovery
         from cellplan.report.text.recovery import recovery_lines
 
@@ -63,7 +64,13 @@ def recover(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or default_folder(run)
         refuse_unless_recoverable(folder, run)
         with progress_listener(quiet=quiet) as progress:
-            verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), progress=progress)
+            verified = open_gate(
+                run,
+                cell=cell,
+                allow_dirs=allow_dir or (),
+                refuse=lambda read: refuse_state(read.cell, read.motion, at=at, frozen=times, keep=keep or ()),
+                progress=progress,
+            )
             found = recovered(verified, at=at, frozen=times, keep=keep or (), progress=progress)
             record = write_recovery(found, folder)
     status = ExitStatus.PASSED if found.found else ExitStatus.NO_SOLUTION

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -94,14 +95,17 @@ def _verify_export(
     folder: Path, run: Path | None, *, cell: Path | None, as_json: bool, quiet: bool, allow_dirs: Sequence[Path]
 ) -> None:
     """Verify a folder of exported programs against the run that they were made from."""
-    from cellplan.pipeline.export.stored import read_stored_export, run_of_export
+    from cellplan.pipeline.export.program import require_format
+    from cellplan.pipeline.export.stored import read_stored_export, refuse_other_run, run_of_export
     from cellplan.pipeline.export.verify_export import verify_export
     from cellplan.pipeline.gate.open_gate import open_gate
 
     stored = read_stored_export(folder)
     source = run or run_of_export(folder)
+    require_format(stored.form)
     with _failures(folder, as_json=as_json), progress_listener(quiet=quiet) as progress:
-        verified = open_gate(source, cell=cell, allow_dirs=allow_dirs, progress=progress)
+        other = partial(refuse_other_run, stored)
+        verified = open_gate(source, cell=cell, allow_dirs=allow_dirs, refuse=other, progress=progress)
         found = verify_export(stored, verified, progress=progress)
     remarks = [*verified.remarks, *found.remarks]
     if as_json:

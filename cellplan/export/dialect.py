@@ -1,6 +1,6 @@
 """Dialect: what a program format is, and the one signature that all formats share."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from cellplan.model.controllers import ControllerKind
@@ -8,6 +8,12 @@ from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, Progr
 
 Render = Callable[[ExportJob], dict[str, str]]
 Read = Callable[[ExportFrame, Mapping[str, str]], tuple[ProgramRows, ...]]
+Demands = Callable[[ExportFrame, int], Iterator[Callable[[], object]]]  # the rows of its longest program are counted
+
+
+def no_demands(_frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """Those of a format that needs nothing of the cell."""
+    return iter(())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,6 +25,8 @@ class Dialect:
             knows no row beforehand. Raises ``InputError`` with file and line where a text is not such a file.
         decimals: Of a degree, radian or millimetre in these files. Where ``kinds`` is not empty, so that the format is
             the language of a controller, a robot may state its own.
+        demands: What its programs need of the cell, as calls that raise ``InputError`` where it is not there; all of
+            them are made before anything is computed.
         is_thinned: Whether rows may be left out, as the target moves evenly between those that are written; not those
             that lie on the cycle of the controller.
         is_rounded: Whether its files round rows within a share of their segments; not those on the cycle either.
@@ -40,3 +48,4 @@ class Dialect:
     shortest_time: float = 0.0  # shortest time in [s] between two rows that targets are known to keep; 0 for no limit
     is_proved: bool = False  # whether that time is documented by the maker, not only known from practice
     targets: tuple[Targets, ...] = (Targets.JOINTS,)  # what rows can state
+    demands: Demands = no_demands

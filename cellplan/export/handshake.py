@@ -6,9 +6,10 @@ its own, waits until all are lowered, and lowers its own. Whatever the order in 
 inputs, none misses a state of another, and none leaves a mark before all have come to it.
 """
 
+from functools import partial
 from typing import NamedTuple
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.model.controllers import Handshake
 from cellplan.model.exported import ExportFrame
 
@@ -67,6 +68,19 @@ def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
     key = f"robots.{robot}.controller.handshake"
     inputs = {f"{key}.inputs.{other}": signal for other, signal in control.handshake.inputs.items()}
     return {f"{key}.output": control.handshake.output} | inputs
+
+
+def require_signals(frame: ExportFrame, robot: str) -> None:
+    """Require every signal of a robot.
+
+    Raises:
+        InputError: Signals are not stated in the cell: all of these.
+    """
+    names = [each.name for each in frame.cell.robots]
+    others = names[1:] if robot == names[0] else names[:1]
+    if others:
+        stated = _signals(frame, robot)
+        raise_findings(refusals(*(partial(_input, stated, robot, other) for other in others)))
 
 
 def _signals(frame: ExportFrame, robot: str) -> Handshake:

@@ -15,6 +15,25 @@ ACCESS_TOKEN: Final = object()  # known to ``open_gate`` only
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadMotion:
+    """One phase of a run that was read and not verified."""
+
+    name: str | None  # name of the phase among several; None for the only one of a program
+    schedule: Schedule  # desired tool poses
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReadRun:
+    """What the files of a run say before anything in them is verified: enough to refuse what cannot be done with it."""
+
+    folder: Path  # the run folder
+    digest: str  # SHA-256 of its manifest
+    cell: Cell  # the cell that was solved
+    motion: Motion  # all rows of the program
+    motions: tuple[ReadMotion, ...]  # one for each phase
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class VerifiedMotion:
     """One phase of a verified run, on its own time, which starts at 0.
 

@@ -1,12 +1,14 @@
 """KUKA KRL: a module of a .src and a .dat file for each robot, one PTP motion to each row, pages as subprograms."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import floor
 from typing import Final
 
 import numpy as np
 
+from cellplan.errors import raise_findings, refusals
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import Step, handshake_steps, lowering_step
@@ -14,11 +16,11 @@ from cellplan.export.head import head_notes
 from cellplan.export.joints import to_numbers
 from cellplan.export.krl.names import AXES, EXTERNAL, POINT, WHOLE, module_paths, require_numbers
 from cellplan.export.krl.reader import read_krl
-from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes
+from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.geometry.transforms import Array
 from cellplan.model.controllers import ControllerKind
-from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 
 DECIMALS: Final = 5
 PAGE: Final = 1000  # rows; public programs are split at 1400 to 2500 lines
@@ -54,14 +56,19 @@ def render_krl(job: ExportJob) -> dict[str, str]:
     """
     paths = module_paths(job.frame, KRL)
     robots = list(dict.fromkeys(robot for _, robot in paths))
-    for robot in robots:
-        require_numbers(job.frame, robot)
-        require_six_axes(job.frame.robot(robot), external=EXTERNAL, what="KRL")
+    raise_findings(refusals(*_demands(job.frame, 0)))
     files: dict[str, str] = {}
     for program in job.programs:
         for robot, rows in program_rows(job, robots, program).items():
             files |= _files(job, _program(job, program, rows, paths[program.name, robot]))
     return files
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    for robot in robots_of(frame, KRL):
+        yield partial(require_numbers, frame, robot)
+        yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
 
 
 def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Program:
@@ -175,4 +182,5 @@ KRL: Final[Dialect] = Dialect(
     is_thinned=True,
     is_rounded=True,
     split=PAGE,
+    demands=_demands,
 )

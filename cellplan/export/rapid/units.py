@@ -89,9 +89,9 @@ def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
     modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | OWN_NAMES)
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     if is_synchronised:
-        _require_one_controller(frame)
+        require_one_controller(frame)
     units = tuple(
-        _unit(frame, name, task=_task(frame, name) if is_synchronised else None, module=modules[name])
+        _unit(frame, name, task=rapid_task(frame, name) if is_synchronised else None, module=modules[name])
         for name in frame.robots
     )
     tasks = [(unit.task or "").lower() for unit in units]
@@ -142,7 +142,7 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     holder = frame.cell.part.held_by[0].robot
     if holder not in frame.robots:
         raise InputError(f"--targets part: expected '{holder}', which holds the part, among the exported robots")
-    task, placed = _task(frame, holder), frame.robot(holder)
+    task, placed = rapid_task(frame, holder), frame.robot(holder)
     unit = _controller(frame, holder).tasks[task]
     return PartFrame(unit=unit, X_FP=placed.tool.X_FT @ frame.cell.part.X_CP)
 
@@ -210,7 +210,7 @@ def _controller(frame: ExportFrame, name: str) -> Controller:
     return found
 
 
-def _task(frame: ExportFrame, name: str) -> str:
+def rapid_task(frame: ExportFrame, name: str) -> str:
     """Name of the task that moves a robot."""
     controller, control = _controller(frame, name), frame.robot(name).control
     task = None if control is None else control.task
@@ -232,7 +232,7 @@ def _key(controller: Controller, task: str) -> str:
     return f"controllers.{controller.name}.tasks.{task}"
 
 
-def _require_one_controller(frame: ExportFrame) -> None:
+def require_one_controller(frame: ExportFrame) -> None:
     """Refuse synchronised programs of robots that no single controller moves."""
     names = dict.fromkeys(_controller(frame, name).name for name in frame.robots)
     if len(names) > 1 or len(frame.robots) < 2:

@@ -6,19 +6,21 @@ Synchronised programs follow the rules of MultiMove (application manual 3HAC0212
 sets the time of all.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
 from itertools import chain
 from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import Step, handshake_steps, lowering_step, signals_by_key
 from cellplan.export.head import head_notes
 from cellplan.export.rapid.moves import LARGEST_ID
 from cellplan.export.rapid.reader import read_rapid
-from cellplan.export.rapid.targets import frame_text, joint_targets, part_targets
+from cellplan.export.rapid.targets import configuration, frame_text, joint_targets, part_targets
 from cellplan.export.rapid.units import (
     DECIMALS,
     FROM,
@@ -34,7 +36,9 @@ from cellplan.export.rapid.units import (
     PartFrame,
     RapidUnit,
     part_frame,
+    rapid_task,
     rapid_units,
+    require_one_controller,
     works_on_part,
     zone_name,
 )
@@ -58,6 +62,7 @@ def render_rapid(job: ExportJob) -> dict[str, str]:
     Raises:
         InputError: Something cannot be written or promised.
     """
+    raise_findings(refusals(*_demands(job.frame, 0)))
     units, part = rapid_units(job.frame), part_frame(job.frame)
     files: dict[str, str] = {}
     for program in job.programs:
@@ -71,6 +76,24 @@ def render_rapid(job: ExportJob) -> dict[str, str]:
             files |= {f"{folder}{module}.mod": text for module, text in modules.items()}
             files[f"{folder}{unit.module}.pgf"] = _program_file(modules)
     return files
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    if frame.promise is Promise.SYNCHRONISED and any(refusals(partial(require_one_controller, frame))):
+        yield partial(require_one_controller, frame)  # all else may be as it is
+        return
+    for name in frame.robots:
+        yield partial(rapid_units, replace(frame, robots=(name,), promise=Promise.SEQUENCE_ONLY))
+        if frame.promise is Promise.SYNCHRONISED:
+            yield partial(rapid_task, frame, name)
+        elif frame.promise is Promise.SEQUENCE_ONLY:
+            yield partial(_require_names, frame, name)
+        if works_on_part(frame, name):
+            robot = frame.robot(name)
+            yield partial(configuration, robot, np.zeros((1, len(robot.model.joints))))
+    yield partial(rapid_units, frame)
+    yield partial(part_frame, frame)
 
 
 def _program_file(modules: dict[str, str]) -> str:
@@ -226,5 +249,6 @@ RAPID: Final = Dialect(
     is_thinned=True,
     is_rounded=True,
     split=LINES,
+    demands=_demands,
     targets=(Targets.JOINTS, Targets.PART),
 )

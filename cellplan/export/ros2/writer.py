@@ -6,7 +6,8 @@ that the last one rests. A trajectory is split only where all robots rest: each 
 begins at the same point at its own time 0.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -23,7 +24,7 @@ from cellplan.export.text import comment, fixed, joined
 from cellplan.export.timed_rows import NANO, file_path, nanoseconds, shared_clock, times_of
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
-from cellplan.model.exported import ExportJob, Interpolation, ProgramRows, Promise, RobotRows
+from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, RobotRows
 
 MOST_POINTS: Final = 100_000  # of a message, which then has some ten megabytes
 REST: Final = 1e-6  # [rad/s] or [m/s] a slower joint rests
@@ -84,12 +85,9 @@ def _parts(job: ExportJob, clock: Array, speeds: Mapping[str, Array]) -> list[tu
         InputError: Robots do not rest together often enough.
     """
     count, most = len(clock), job.frame.split
-    if most is None and count > MOST_POINTS:
-        raise InputError(f"--split: expected the most points that the controller takes, as the program has {count}")
+    _require_split(job.frame, count)
     if most is None:
         return [(0, count - 1)]
-    if most < SHORTEST:
-        raise InputError(f"--split: expected {SHORTEST} points or more, got {most}")
     rests = np.flatnonzero(np.all([np.all(qd == 0.0, axis=1) for qd in speeds.values()], axis=0)).tolist()
     first, last = max(pairwise(rests), key=lambda stretch: stretch[1] - stretch[0])
     if last - first + 1 > most:
@@ -101,6 +99,19 @@ def _parts(job: ExportJob, clock: Array, speeds: Mapping[str, Array]) -> list[tu
     while ends[-1] < count - 1:
         ends.append(max(rest for rest in rests if rest <= ends[-1] + most - 1))
     return list(pairwise(ends))
+
+
+def _require_split(frame: ExportFrame, rows: int) -> None:
+    """Refuse more points than controllers are known to take in one trajectory, and parts that are no motion."""
+    if frame.split is None and rows > MOST_POINTS:
+        raise InputError(f"--split: expected the most points that the controller takes, as the program has {rows}")
+    if frame.split is not None and frame.split < SHORTEST:
+        raise InputError(f"--split: expected {SHORTEST} points or more, got {frame.split}")
+
+
+def _demands(frame: ExportFrame, rows: int) -> Iterator[Callable[[], object]]:
+    """What trajectories need."""
+    yield partial(_require_split, frame, rows)
 
 
 def _head(job: ExportJob, program: ProgramRows, name: str) -> list[str]:
@@ -160,4 +171,5 @@ ROS2: Final[Dialect] = Dialect(
     promises=(Promise.TIMED,),
     interpolation=Interpolation.CUBIC,
     split=MOST_POINTS,
+    demands=_demands,
 )

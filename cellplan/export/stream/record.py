@@ -85,7 +85,7 @@ def stream_record(
     """
     placed = frame.robot(robot)
     cycle, zero = whole_cycle(placed), placed.model.controller
-    controller = _controller(frame, placed)
+    controller = stated_controller(frame, placed)
     latency = None if controller is None else controller.latency
     return {
         "schema": SCHEMA,
@@ -112,7 +112,7 @@ def stream_record(
     }
 
 
-def _controller(frame: ExportFrame, robot: Robot) -> Controller | None:
+def stated_controller(frame: ExportFrame, robot: Robot) -> Controller | None:
     """The controller of a robot; None when none is stated.
 
     Raises:

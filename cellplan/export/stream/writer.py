@@ -7,17 +7,26 @@ the controller shows, in degrees and millimetres; the axes of the arm come first
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.export.dialect import Dialect
 from cellplan.export.joints import from_numbers, to_numbers
 from cellplan.export.json_tree import dumped, parsed
-from cellplan.export.stream.record import DECIMALS, FREE, MICRO, stream_axes, stream_record, whole_cycle
+from cellplan.export.stream.record import (
+    DECIMALS,
+    FREE,
+    MICRO,
+    stated_controller,
+    stream_axes,
+    stream_record,
+    whole_cycle,
+)
 from cellplan.export.timed_rows import file_path, found_error, line_error, lines_of, require_paths, times_of
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
@@ -37,12 +46,11 @@ def render_stream(job: ExportJob) -> dict[str, str]:
         InputError: Rows are not on the cycle, robots end at different times, or something that a controller needs is
             not stated.
     """
+    raise_findings(refusals(*_demands(job.frame, 0)))
     found = {}
     for program in job.programs:
         for name in job.frame.robots:
             robot = job.frame.robot(name)
-            if program.name is None and name.lower() == RESERVED:
-                raise InputError(f"robots.{name}: expected another name, as the record of an export is '{name}.json'")
             text, quanta = _table(robot, program.robots[name])
             record = stream_record(
                 job.frame, program.name, name, quanta=quanta, digest=_digest(text), notes=_notes(job, robot)
@@ -51,6 +59,20 @@ def render_stream(job: ExportJob) -> dict[str, str]:
             found[file_path(program.name, f"{name}.json")] = dumped(record) + "\n"
         _require_one_end({name: float(times_of(program.robots[name])[-1]) for name in job.frame.robots})
     return found
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What a stream needs of the cell."""
+    for name in frame.robots:
+        yield partial(_require_name, frame, name)
+        yield partial(whole_cycle, frame.robot(name))
+        yield partial(stated_controller, frame, frame.robot(name))
+
+
+def _require_name(frame: ExportFrame, name: str) -> None:
+    """Refuse a robot whose record would be that of the export."""
+    if frame.programs == (None,) and name.lower() == RESERVED:
+        raise InputError(f"robots.{name}: expected another name, as the record of an export is '{name}.json'")
 
 
 def read_stream(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
@@ -199,4 +221,5 @@ STREAM: Final[Dialect] = Dialect(
     decimals=DECIMALS,
     promises=(Promise.TIMED,),
     at_cycle=True,
+    demands=_demands,
 )

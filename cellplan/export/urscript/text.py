@@ -133,7 +133,7 @@ def handshake_lines(frame: ExportFrame, robot: str) -> list[str]:
     """
     lines = []
     for step in handshake_steps(frame, robot):
-        _require_signals(frame, robot)
+        require_standard_signals(frame, robot)
         if step.waits:
             state = "not " if step.is_on else ""
             lines += [f"while {state}get_standard_digital_in({step.signal}):", "  sync()", "end"]
@@ -147,7 +147,7 @@ def lowering(frame: ExportFrame, robot: str) -> str:
     return f"set_standard_digital_out({lowering_step(frame, robot).signal}, False)"
 
 
-def _require_signals(frame: ExportFrame, robot: str) -> None:
+def require_standard_signals(frame: ExportFrame, robot: str) -> None:
     """Make sure that the signals of a robot are standard digital ones."""
     for key, signal in signals_by_key(frame, robot).items():
         if signal not in SIGNALS:

@@ -5,12 +5,13 @@ end. ``servoj`` follows its rows with a lag, its lookahead time, which the cell 
 ``sequence only``: one ``movej`` per row, and at marks a handshake by standard digital signals.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.export.corners import chosen_shares
 from cellplan.export.dialect import Dialect
 from cellplan.export.head import head_notes
@@ -30,13 +31,14 @@ from cellplan.export.urscript.text import (
     handshake_lines,
     lowering,
     require_length,
+    require_standard_signals,
     require_turns,
     servo_call,
     stop_call,
 )
 from cellplan.model.cell import Robot
 from cellplan.model.controllers import ControllerKind
-from cellplan.model.exported import ExportJob, Promise, RobotRows
+from cellplan.model.exported import ExportFrame, ExportJob, Promise, RobotRows
 
 
 def render_urscript(job: ExportJob) -> dict[str, str]:
@@ -49,6 +51,7 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
         InputError: A robot has other joints than six, a position beyond two turns, too many rows, or lacks something
             that its program needs.
     """
+    raise_findings(refusals(*_demands(job.frame, 0)))
     names, found = function_names(job.frame), {}
     for program in job.programs:
         for name in job.frame.robots:
@@ -61,6 +64,16 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
             head = [line for note in head_notes(job, name) for line in comment(note, "#")]
             found[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
     return found
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    for name in frame.robots:
+        yield partial(decimals_of_urscript, frame, frame.robot(name))
+        if frame.promise is Promise.TIMED:
+            yield partial(servo_call, frame, frame.robot(name))
+        else:
+            yield partial(require_standard_signals, frame, name)
 
 
 def _points(robot: Robot, rows: RobotRows, decimals: int) -> list[str]:
@@ -107,4 +120,5 @@ URSCRIPT: Final[Dialect] = Dialect(
     is_rounded=True,
     lags=True,
     split=MOST_ROWS,
+    demands=_demands,
 )

@@ -1,18 +1,20 @@
 """VAL3 of Staubli: a project for each robot, whose data hold the rows and whose programs move from one to the next."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from cellplan.errors import raise_findings, refusals
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import Step, handshake_steps, lowering_step
 from cellplan.export.head import head_notes
 from cellplan.export.joints import from_numbers, to_numbers
-from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes
+from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.export.val3.names import (
     BASE,
@@ -35,7 +37,7 @@ from cellplan.export.zones import tool_zones
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.controllers import ControllerKind
-from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.units import DEG, MM
 
 DECIMALS: Final = 5
@@ -102,14 +104,19 @@ def render_val3(job: ExportJob) -> dict[str, str]:
     """
     paths = project_paths(job.frame, VAL3)
     robots = list(dict.fromkeys(robot for _, robot in paths))
-    for robot in robots:
-        require_links(job.frame, robot)
-        require_six_axes(job.frame.robot(robot), external=0, what="VAL3")
+    raise_findings(refusals(*_demands(job.frame, 0)))
     files: dict[str, str] = {}
     for program in job.programs:
         for robot, rows in program_rows(job, robots, program).items():
             files |= _files(_project(job, program, rows, paths[program.name, robot]))
     return files
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    for robot in robots_of(frame, VAL3):
+        yield partial(require_links, frame, robot)
+        yield partial(require_six_axes, frame.robot(robot), external=0, what="VAL3")
 
 
 def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Project:
@@ -294,4 +301,5 @@ VAL3: Final[Dialect] = Dialect(
     is_thinned=True,
     is_rounded=True,
     split=PAGE,
+    demands=_demands,
 )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, raise_findings
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.model.cell import Cell
@@ -95,7 +95,7 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
     found = tuple(name for name in asked if _plays(cell, dialect, name))
     missing = [name for name in asked if name not in found]
     if missing and (chosen or not found):
-        raise InputError(_not_played(cell, dialect, missing))
+        raise_findings([InputError(_not_played(cell, dialect, name)) for name in missing])
     return found
 
 
@@ -105,15 +105,13 @@ def _plays(cell: Cell, dialect: Dialect, robot: str) -> bool:
     return control is not None and cell.controllers[control.controller].kind in dialect.kinds
 
 
-def _not_played(cell: Cell, dialect: Dialect, missing: Sequence[str]) -> str:
-    """Why a format plays none of some robots: one without a controller first."""
-    bare = next((name for name in missing if cell.robot(name).control is None), None)
-    if bare is not None:
-        return f"robots.{bare}.controller: expected the controller that plays {dialect.name}, got none"
-    control = cell.robot(missing[0]).control
-    name = "" if control is None else control.controller
+def _not_played(cell: Cell, dialect: Dialect, robot: str) -> str:
+    """Why a format does not play a robot."""
+    control = cell.robot(robot).control
+    if control is None:
+        return f"robots.{robot}.controller: expected the controller that plays {dialect.name}, got none"
     kinds = " or ".join(sorted(dialect.kinds))
     return (
-        f"robots.{missing[0]}.controller: expected a controller of kind {kinds}, which plays {dialect.name}, got "
-        f"'{name}' of kind {cell.controllers[name].kind}"
+        f"robots.{robot}.controller: expected a controller of kind {kinds}, which plays {dialect.name}, got "
+        f"'{control.controller}' of kind {cell.controllers[control.controller].kind}"
     )

@@ -15,6 +15,7 @@ import numpy as np
 
 from cellplan.certify.free_clocks import ClockRegion, RegionBound, certify_regions
 from cellplan.certify.lever_arms import LeverArms
+from cellplan.collision.distance import APART_TOL
 from cellplan.errors import NotVerifiedError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
@@ -29,6 +30,10 @@ from cellplan.scene.scene import Scene
 
 STAGE: Final = "certifying every order between marks"
 MOST_MARKS: Final = 200  # of one program; a longer row of waits is no program that anybody would run
+CURE: Final = (
+    "let the one task follow the other (after), place bases, approaches or homes farther apart, or export rows that "
+    "keep the times of the plan (--format stream or csv)"
+)
 Pair = tuple[str, str]
 
 
@@ -263,11 +268,13 @@ def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int
 def _not_clear(phase: str, bound: RegionBound, times: Array) -> str:
     """What is not clear, as one line."""
     bodies = "" if bound.bodies is None else f" ({' and '.join(bound.bodies)})"
-    if np.isfinite(bound.distance):
-        what = f"come within {MM * bound.distance:.3g} mm{bodies}"
+    if not np.isfinite(bound.distance):
+        what = f"are proved to keep only {MM * min(bound.proved, bound.demand):.3g} mm"
     else:
-        what = "cannot be proved to keep their distance"
+        what = f"come within {MM * bound.distance:.3g} mm"
+    demanded = f"{MM * bound.demand:.3g} mm are demanded" if bound.demand > APART_TOL else "they must not touch"
     return (
-        f"sequence only: phase '{phase}', {times[0]:g} to {times[1]:g} s: '{bound.first}' and '{bound.second}' {what} "
-        f"in another order than that of the plan, and no robot can wait between"
+        f"sequence only: phase '{phase}', {times[0]:g} to {times[1]:g} s: '{bound.first}' and '{bound.second}' {what}"
+        f"{bodies} in another order than that of the plan, {demanded}, and no robot can "
+        f"wait between: {CURE}"
     )

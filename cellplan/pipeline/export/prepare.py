@@ -1,16 +1,18 @@
 """Prepared: all that a format is to write of a run, promised and shaped, before any text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, InvalidFileError, NotVerifiedError, raise_findings, refusals
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import handshake_steps
+from cellplan.export.handshake import require_signals
+from cellplan.export.timed_rows import cycle_of
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, Targets
 from cellplan.model.progress import Progress, silent
 from cellplan.model.units import DEG, MM
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
 from cellplan.pipeline.export.orders import Orders
 from cellplan.pipeline.export.part_targets import with_part_poses
@@ -18,6 +20,7 @@ from cellplan.pipeline.export.promises import Promised, choose_promise, controll
 from cellplan.pipeline.export.resample import lead_time, resampled
 from cellplan.pipeline.export.round_rows import stops_left, with_rounding
 from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.run_programs import run_programs
 from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.skew import RunSkew, run_skew
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
@@ -70,9 +73,7 @@ def prepare(
     skew = run_skew(run, progress=progress) if Promise.TIMED in dialect.promises else None
     promised = choose_promise(run, dialect, robots, skew=skew, asked=choice.promise)
     frame = frame_of(run, robots, promised.promise, choice)
-    if is_at_cycle(dialect, frame.promise) and choice.is_thinned:
-        raise InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
-    require_handshakes(frame)
+    raise_findings(unmet_demands(run, dialect, frame, choice))
     has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
     orders = shared.orders(progress) if has_waits else ()
     job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
@@ -109,27 +110,58 @@ def _job(
     return job, lead
 
 
-def frame_of(run: VerifiedRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
+def frame_of(run: VerifiedRun | ReadRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
     """What a reader may know of an export of a run."""
     return ExportFrame(
         cell=run.cell,
         robots=tuple(robots),
-        programs=tuple(run.programs),
+        programs=tuple(program.name for program in run_programs(run)),
         promise=promise,
         targets=choice.targets,
         split=choice.split,
     )
 
 
-def require_handshakes(frame: ExportFrame) -> None:
-    """Require the signals of all robots of the cell where robots wait for one another.
+def refuse_unfit(run: ReadRun, dialect: Dialect, choice: Choice) -> None:
+    """Refuse an export of which the files of a run say already that it cannot be, before anything is verified.
+
+    Args:
+        run: The run as it was read.
+        dialect: The format.
+        choice: What the caller chose.
 
     Raises:
-        InputError: A signal is not stated.
+        InputError: All that is not stated in the cell, or does not fit.
+        NotVerifiedError: No promise of the format can be kept with this motion.
     """
+    choice.refuse_for(dialect)
+    robots = exported_robots(run.cell, dialect, choice.robots)
+    try:
+        promise = choose_promise(run, dialect, robots, asked=choice.promise).promise
+    except InputError as error:
+        unstated = error.findings if isinstance(error, InvalidFileError) else [error]
+        promise = choice.promise or dialect.promises[0]
+    except NotVerifiedError as error:
+        frame = frame_of(run, robots, choice.promise or dialect.promises[-1], choice)
+        needed = {f"  needed too: {finding}": None for finding in unmet_demands(run, dialect, frame, choice)}
+        raise NotVerifiedError([*error.findings, *needed]) from None
+    else:
+        unstated = []
+    raise_findings([*unstated, *unmet_demands(run, dialect, frame_of(run, robots, promise, choice), choice)])
+
+
+def unmet_demands(
+    run: VerifiedRun | ReadRun, dialect: Dialect, frame: ExportFrame, choice: Choice
+) -> Iterator[InputError]:
+    """All that a format still needs of a cell, and choices that do not go with what is promised."""
+    if is_at_cycle(dialect, frame.promise):
+        if choice.is_thinned:
+            yield InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
+        yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
     if frame.promise is Promise.SEQUENCE_ONLY:
-        for robot in frame.cell.robots:
-            handshake_steps(frame, robot.name)
+        yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
+    rows = max(len(program.times) for program in run_programs(run))
+    yield from refusals(*dialect.demands(frame, rows))
 
 
 def _shaped(
@@ -141,7 +173,7 @@ def _shaped(
         programs = tuple(_with_marks(program, own) for program, own in zip(programs, orders, strict=True))
     thinning = thinning_of(dialect, frame.promise, choice)
     if is_at_cycle(dialect, frame.promise):
-        cycles = {robot.name: cycle_of(frame, robot.name) for robot in run.cell.robots}  # all start and end together
+        cycles = {robot.name: cycle_of(robot) for robot in run.cell.robots}  # all start and end together
         programs = tuple(_only(program, frame.robots) for program in programs)
         return tuple(resampled(run.cell, program, cycles) for program in programs), lead_time(cycles)
     if thinning is not None:
@@ -165,13 +197,6 @@ def is_at_cycle(dialect: Dialect, promise: Promise) -> bool:
 def thinning_of(dialect: Dialect, promise: Promise, choice: Choice) -> tuple[float, float] | None:
     """How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out."""
     return None if is_at_cycle(dialect, promise) else choice.thinning(dialect)
-
-
-def cycle_of(frame: ExportFrame, robot: str) -> float:
-    """Cycle in [s] at which the controller of a robot takes positions."""
-    placed = frame.robot(robot)
-    stated = None if placed.control is None else placed.control.cycle
-    return placed.controller_cycle if stated is None else stated
 
 
 def row_groups(frame: ExportFrame) -> list[list[str]]:

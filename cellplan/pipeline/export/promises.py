@@ -10,7 +10,7 @@ from cellplan.io.input.findings import listed
 from cellplan.model.cell import Cell
 from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import Promise
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.dialects import DIALECTS
 from cellplan.pipeline.export.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.pipeline.export.skew import PER_SECOND, ClockPair, RunSkew, skew_text
@@ -42,7 +42,7 @@ class _Against(NamedTuple):
 class _Export:
     """What is exported, and what is known of it."""
 
-    run: VerifiedRun
+    run: VerifiedRun | ReadRun
     dialect: Dialect
     robots: tuple[str, ...]
     skew: RunSkew | None
@@ -56,7 +56,7 @@ class _Export:
 
 
 def choose_promise(
-    run: VerifiedRun,
+    run: VerifiedRun | ReadRun,
     dialect: Dialect,
     robots: Sequence[str],
     *,
@@ -66,7 +66,7 @@ def choose_promise(
     """The best promise that a format can keep for some robots of a run, or the one that is asked for.
 
     Args:
-        run: The run.
+        run: The run, verified or only read.
         dialect: The format.
         robots: Names of the robots that are exported.
         skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
@@ -90,7 +90,27 @@ def choose_promise(
         raise InvalidFileError([InputError(text) for text in unstated])
     *better, last = [promise for promise in found if promise in dialect.promises]
     details = [f"  not {promise}: {found[promise].text}" for promise in better]
-    raise NotVerifiedError([f"{dialect.name}: not {last}: {found[last].text}", *details])
+    raise NotVerifiedError([f"{dialect.name}: not {last}: {found[last].text}", *details, f"  cure: {_cure(export)}"])
+
+
+def _cure(export: _Export) -> str:
+    """What helps where the motion of a cell keeps a format from promising anything."""
+    cell, form = export.run.cell, export.dialect.name
+    every = [robot.name for robot in cell.robots]
+    groups: dict[str, list[str]] = {}
+    for robot, controller in controllers_of(cell, every).items():
+        groups.setdefault(controller, []).append(robot)
+    rest = "or let the part rest while a tool is in process (motion.mode: semi_coordinated or part_at_rest)"
+    timed = "export joint tables that keep the plan's times (--format stream, csv, json, ros2 or wide)"
+    if Promise.SYNCHRONISED in export.dialect.promises:
+        if len(groups) > 1:
+            return f"state one controller for {listed(every)}, if it moves them all, {rest}; {timed}"
+        return f"export all robots of controller '{next(iter(groups))}' together, without --robot, {rest}; {timed}"
+    shared = next(
+        (f"{listed(names)} share controller '{name}'" for name, names in groups.items() if len(names) > 1), ""
+    )
+    why = f"{shared}, but {form} as cellplan writes it moves each robot by a program of its own: " if shared else ""
+    return f"{why}{timed}, {rest}"
 
 
 def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Programs of a run: each with its phases, where tools are in process, and where holders move."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.plan import rows_of
 from cellplan.model.task import TIME_TOLERANCE, Frame
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.plan.program import STILL_TOL
 from cellplan.scene.scene import Scene
@@ -55,9 +55,10 @@ class RunProgram:
         return found
 
 
-def run_programs(run: VerifiedRun) -> tuple[RunProgram, ...]:
+def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
     """The programs of a run: one from home to home, or one for each of its phases."""
     motion, plan = run.motion, run.motion.plan
+    motions: Sequence[ReadMotion | VerifiedMotion] = run.motions
     process = {task: _within(motion.sigma, stretches) for task, stretches in plan.process.items()}
     rows = [rows_of(phase, motion.sigma) for phase in plan.program]
     if run.cell.program is not None:
@@ -74,7 +75,7 @@ def run_programs(run: VerifiedRun) -> tuple[RunProgram, ...]:
             phases=(RunPhase(name=phase.name, place=place, first=0, last=own.stop - own.start - 1),),
             process={task: process[task][own] for task in phase.tasks},
         )
-        for place, (phase, own, verified) in enumerate(zip(plan.program, rows, run.motions, strict=True))
+        for place, (phase, own, verified) in enumerate(zip(plan.program, rows, motions, strict=True))
     )
 
 

@@ -6,14 +6,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from cellplan.cache import nothing_kept
-from cellplan.errors import InputError, NotVerifiedError
+from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
+from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.model.progress import Progress, silent
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.choice import Choice
+from cellplan.pipeline.export.prepare import refuse_unfit
 from cellplan.pipeline.export.program import (
     EXPORTERS,
     exported,
+    refuse_choice,
     refuse_unless_exportable,
     require_format,
     write_export,
@@ -97,6 +100,44 @@ def export_programs(
         return tuple(_each(Shared(run), folder, chosen, choice, progress))
 
 
+def refuse_unfit_run(run: ReadRun, formats: Iterable[str], choice: Choice) -> None:
+    """Refuse an export of which none of the formats can be, as the files of the run say already.
+
+    Args:
+        run: The run as it was read, before anything is verified.
+        formats: Names of formats.
+        choice: What of the run, and how.
+
+    Raises:
+        InputError: There is no such robot, or something is not stated in the cell, or does not fit.
+        NotVerifiedError: No promise of a format can be kept with this motion.
+    """
+    _refuse_unknown(run, choice.robots)
+    refused: dict[str, InputError | NotVerifiedError] = {}
+    for form in (names := tuple(formats)):
+        dialect = EXPORTERS[form]
+        try:
+            refuse_choice(form, choice)
+            if isinstance(dialect, Dialect):
+                refuse_unfit(run, dialect, choice)
+        except (InputError, NotVerifiedError) as error:
+            refused[form] = error
+    if len(refused) < len(names):
+        return
+    if len(refused) == 1:
+        raise refused[names[0]]
+    if all(isinstance(error, InputError) for error in refused.values()):
+        raise InvalidFileError([InputError(f"{form}: {line}") for form, line in _lines(refused)])
+    raise NotVerifiedError(
+        [line if line.startswith(("  ", f"{form}: ")) else f"{form}: {line}" for form, line in _lines(refused)]
+    )
+
+
+def _lines(refused: Mapping[str, Exception]) -> Iterator[tuple[str, str]]:
+    """Every line of what speaks against the formats."""
+    return ((form, line) for form, error in refused.items() for line in str(error).splitlines())
+
+
 def refuse_unless_writable(folders: Iterable[Path], run: Path) -> None:
     """Refuse places that programs must not be written to; call it early, before any long work.
 
@@ -127,7 +168,7 @@ def _of(form: str, progress: Progress) -> Progress:
     return lambda stage, share: progress(f"{form}: {stage}", share)
 
 
-def _refuse_unknown(run: VerifiedRun, robots: Sequence[str]) -> None:
+def _refuse_unknown(run: VerifiedRun | ReadRun, robots: Sequence[str]) -> None:
     """Refuse robots that the cell does not have, which no format could write."""
     names = [robot.name for robot in run.cell.robots]
     for name in robots:

@@ -11,7 +11,7 @@ from cellplan.io.input.findings import did_you_mean, shown
 from cellplan.io.input.json_reader import parse_json, required
 from cellplan.io.run.folder import EXPORT, MANIFEST
 from cellplan.model.exported import Promise, Targets
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.record import SCHEMA
 
@@ -139,7 +139,7 @@ def read_stored_export(folder: Path) -> StoredExport:
     return StoredExport(folder=folder, record=record, files={name: _text(folder, name) for name in names})
 
 
-def refuse_other_run(stored: StoredExport, run: VerifiedRun) -> None:
+def refuse_other_run(stored: StoredExport, run: VerifiedRun | ReadRun) -> None:
     """Refuse a run that the programs were not made from.
 
     Raises:

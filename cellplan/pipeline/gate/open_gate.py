@@ -1,7 +1,7 @@
 """Verification before export: a run on disk is opened only when all of its content is verified again."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -16,7 +16,7 @@ from cellplan.io.run.stored import CELL, SERIES, StoredRun, read_stored_run
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
-from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedMotion, VerifiedRun
+from cellplan.model.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.gate.compare_drawings import drawings_again, other_drawings
 from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
 from cellplan.pipeline.gate.compare_report import differences, misshapen_series
@@ -38,7 +38,12 @@ MAX_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
 
 
 def open_gate(
-    folder: Path | str, *, cell: Path | str | None = None, allow_dirs: Sequence[Path] = (), progress: Progress = silent
+    folder: Path | str,
+    *,
+    cell: Path | str | None = None,
+    allow_dirs: Sequence[Path] = (),
+    refuse: Callable[[ReadRun], object] | None = None,
+    progress: Progress = silent,
 ) -> VerifiedRun:
     """Verify a run on disk with this version of the program; the result can be exported.
 
@@ -49,6 +54,7 @@ def open_gate(
         folder: The run folder.
         cell: The cell file that was solved; None when it is not available.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+        refuse: Called when all is read and before anything is verified; raises what speaks against the use of the run.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -57,16 +63,25 @@ def open_gate(
     """
     with nothing_kept():  # a proof rests on the files themselves
         file = None if cell is None else Path(cell)
-        return _opened(Path(folder), cell=file, allow_dirs=allow_dirs, progress=progress)
+        return _opened(Path(folder), cell=file, allow_dirs=allow_dirs, refuse=refuse, progress=progress)
 
 
-def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], progress: Progress) -> VerifiedRun:
+def _opened(
+    folder: Path,
+    *,
+    cell: Path | None,
+    allow_dirs: Sequence[Path],
+    refuse: Callable[[ReadRun], object] | None,
+    progress: Progress,
+) -> VerifiedRun:
     """The run, once everything in it was found to be true."""
     stored = read_stored_run(folder)
     _refuse_failed(stored)
     source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
     demanded = _demanded(source.cell, stored)
     rows = read_rows(stored, source.cell, demanded)
+    if refuse is not None:
+        refuse(_read_run(stored, source.cell, demanded, rows))
     scenes = demanded.scenes(source.cell)
     motions = tuple(
         _verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes)
@@ -94,6 +109,13 @@ def _opened(folder: Path, *, cell: Path | None, allow_dirs: Sequence[Path], prog
         ),
         token=ACCESS_TOKEN,
     )
+
+
+def _read_run(stored: StoredRun, cell: Cell, demanded: DemandedProgram, rows: StoredRows) -> ReadRun:
+    """The run as it is before anything is verified."""
+    phases = zip(demanded.plan.program[: len(demanded.cells)], rows.clock.schedules, strict=False)
+    motions = tuple(ReadMotion(name=phase.label, schedule=schedule) for phase, schedule in phases)
+    return ReadRun(folder=stored.folder, digest=stored.digest, cell=cell, motion=rows.motion, motions=motions)
 
 
 def _refuse_failed(stored: StoredRun) -> None:

@@ -158,10 +158,30 @@ def stopped_state(
         keep: Names of the robots that are to stand still.
 
     Raises:
+        InputError: See ``refuse_state``.
+    """
+    cell, motion = places.cell, places.motion
+    refuse_state(cell, motion, at=at, frozen=frozen, keep=keep)
+    times = _standing_times(cell, at, frozen)
+    q = np.concatenate([_at(motion, times[robot.name])[cell.columns(robot.name)] for robot in cell.robots])
+    held_at = next((times[name] for name in cell.positioners), at)
+    return StoppedState(
+        at=float(at),
+        times=times,
+        kept=tuple(name for name in times if name in set(keep)),
+        q=q,
+        place=places.at(at),
+        lying=places.lying_at(places.at(held_at)),
+    )
+
+
+def refuse_state(cell: Cell, motion: Motion, *, at: float, frozen: Mapping[str, float], keep: Collection[str]) -> None:
+    """Refuse a state that is none of a run; call it early, before any long work. Arguments as of ``stopped_state``.
+
+    Raises:
         InputError: A time is outside of the program or where it has no rows, there is no such robot, a joint fails in
             the run, or robots that hold the part together stand at different times.
     """
-    cell, motion = places.cell, places.motion
     names = [robot.name for robot in cell.robots]
     _require_time(motion, at, "--at")
     for option, given in (("--frozen", frozen), ("--keep", keep)):
@@ -172,21 +192,16 @@ def stopped_state(
         _require_time(motion, time, f"--frozen {name}")
     if cell.motion.locked:
         raise InputError("--at: expected a run in which no joint fails, got one with motion.locked_joints")
-    times = {name: float(frozen.get(name, at)) for name in names}
+    times = _standing_times(cell, at, frozen)
     holders = {name: times[name] for name in cell.positioners}
     if len(set(holders.values())) > 1:
         stated = listed(f"{name}@{time:g}" for name, time in holders.items())
         raise InputError(f"--frozen: expected one time for all robots that hold the part together, got {stated}")
-    q = np.concatenate([_at(motion, times[name])[cell.columns(name)] for name in names])
-    held_at = next(iter(holders.values()), at)
-    return StoppedState(
-        at=float(at),
-        times=times,
-        kept=tuple(name for name in names if name in set(keep)),
-        q=q,
-        place=places.at(at),
-        lying=places.lying_at(places.at(held_at)),
-    )
+
+
+def _standing_times(cell: Cell, at: float, frozen: Mapping[str, float]) -> dict[str, float]:
+    """Time of the program in [s] at which each robot stands, by its name."""
+    return {robot.name: float(frozen.get(robot.name, at)) for robot in cell.robots}
 
 
 def _require_time(motion: Motion, time: float, option: str) -> None:

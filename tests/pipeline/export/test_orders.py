@@ -112,7 +112,8 @@ def test_what_marks_cannot_part_is_refused_with_robots_phase_and_distance() -> N
 
     said = str(refusal.value)
     assert said.startswith("sequence only: phase 'transfer-1', 0 to 6 s: 'a' and 'b' come within ")
-    assert "(a/ball and b/ball) in another order than that of the plan" in said
+    assert "(a/ball and b/ball) in another order than that of the plan, 5 mm are demanded" in said
+    assert "let the one task follow the other (after)" in said
 
 
 def test_holders_that_move_together_are_spoilt_by_any_other_order() -> None:

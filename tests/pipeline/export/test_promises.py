@@ -110,7 +110,8 @@ def test_what_is_not_synchronised_and_no_free_order_either_is_refused(
     with pytest.raises(NotVerifiedError, match=reason) as refusal:
         choose_promise(apart, IN_STEP, robots)
 
-    first, detail = refusal.value.findings
+    first, detail, cure = refusal.value.findings
+    assert cure.startswith("  cure: ")
     assert detail.startswith("  not synchronised: ")
     assert first.startswith("in-step: not sequence only: phase 'all tasks', ")
     assert first.endswith(

@@ -40,7 +40,10 @@ def test_all_formats_are_written_or_refused_with_the_reason(all_of: tuple[Export
     assert [each.form for each in all_of] == list(EXPORTERS)
     assert set(refused) == {"krl", "rapid", "urscript", "val3"}
     for form, reason in refused.items():
-        assert reason == f"robots.left.controller: expected the controller that plays {form}, got none"
+        assert reason.splitlines() == [
+            f"robots.{robot}.controller: expected the controller that plays {form}, got none"
+            for robot in ("left", "right", "idle")
+        ]
     for each in all_of:
         assert each.folder.exists() is (each.refusal is None)
         assert not each.is_named
