@@ -1,12 +1,13 @@
 # Every target works on a bare machine: Python 3.11 or newer with venv, make and a package index are all it takes.
 # PYTHON=/path/to/python picks the interpreter that `.venv` is made from; WORKERS=n picks the number of test processes.
+# KERNELS picks the kernels of `make test-kernels`, PYTHONS the interpreters of `make test-pythons`.
 # ROUNDS=n says how often a benchmark runs; each has a number of its own otherwise.
 # pip itself is brought up to date first where that is possible: the one that comes with Python takes longer to choose versions.
 # CONSTRAINTS=constraints.txt installs the very versions that the project was last tested with.
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help install constraints test test-all quick-tests lint style rules format demo docs bench bench-methods reproduce clean FORCE
+.PHONY: help install constraints test test-all test-kernels test-pythons quick-tests numerical-tests lint style rules format demo docs bench bench-methods reproduce clean FORCE
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,6 +15,8 @@ PROGRAM := $(VENV)/.program
 STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.docs-installed
 WORKERS ?= auto
+PYTHONS ?= python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
+NUMERICAL := $(addprefix tests/,certify checks geometry kinematics planning search)
 ROUND_OPTION := $(if $(ROUNDS),--rounds $(ROUNDS))
 USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 comma := ,
@@ -24,6 +27,8 @@ help:
 	@echo "make demo      install cellplan alone, solve the shipped four-robot cell, and say where its report and 3-D page are"
 	@echo "make test      formatter, linter, types, import rules, sizes and all quick tests"
 	@echo "make test-all  the same with the slow tests"
+	@echo "make test-kernels  the numerical tests under each kernel of OpenBLAS, two to ten minutes a kernel; KERNELS='Haswell baseline' picks"
+	@echo "make test-pythons  the numerical tests with each newer Python that is installed, each in an environment of its own"
 	@echo "make lint      everything but the tests"
 	@echo "make install   only make .venv; with CONSTRAINTS=constraints.txt in the versions of that file"
 	@echo "make constraints  write the installed versions to constraints.txt"
@@ -107,6 +112,25 @@ quick-tests: $(STAMP)
 
 test-all: lint $(DOCS_STAMP)
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope
+
+# Figures differ in their last digits from kernel to kernel; a test holds under each of them.
+test-kernels: $(STAMP)
+	$(BIN)/python tests/kernels.py $(KERNELS) -- -n $(WORKERS) --dist loadscope
+
+numerical-tests: $(STAMP)
+	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow" --assert=plain -p no:cacheprovider $(NUMERICAL)
+
+# Each version once, in an environment outside of the tree that goes again.
+test-pythons:
+	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; tested=""; failed=""; \
+	for python in $(PYTHONS); do \
+	    version=$$("$$python" -c '$(USABLE)' 2>/dev/null && "$$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])') \
+	        || { echo "not run: $$python is not installed"; continue; }; \
+	    case " $$tested " in *" $$version "*) continue;; esac; tested="$$tested $$version"; \
+	    echo "testing with Python $$version, $$python"; \
+	    $(MAKE) --no-print-directory numerical-tests VENV="$$folder/$$version" PYTHON="$$python" || failed="$$failed $$version"; \
+	done; \
+	echo "tested with Python:$${tested:- none}; failed:$${failed:- none}"; [ -n "$$tested" ] && [ -z "$$failed" ]
 
 format: $(STAMP)
 	$(BIN)/python -m ruff check --fix .

@@ -9,10 +9,12 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from builders import kernels
 from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
 SESSION = "CELLPLAN_TEST_SESSION"  # folder that all processes of a session share
+SLOW_S = 1800  # [s] after which a slow test hangs
 settings.register_profile("quick", max_examples=25, deadline=None, derandomize=True)
 settings.register_profile("full", max_examples=200, deadline=None, derandomize=True)
 
@@ -24,6 +26,15 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(SESSION), ignore_errors=True))
     os.environ["CELLPLAN_CACHE"] = str(Path(os.environ[SESSION]) / "cache")
     settings.load_profile("quick" if config.option.markexpr == "not slow" else "full")
+    if kernels.EXPECTED in os.environ:
+        kernels.require_expected()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give slow tests more time before they count as hanging."""
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(SLOW_S))
 
 
 @contextmanager

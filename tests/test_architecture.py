@@ -230,6 +230,27 @@ def asserting(calls: dict[str, set[str]]) -> set[str]:
     return found
 
 
+BLOCKING = {"wait", "join", "result", "exception", "acquire", "communicate"}  # without an argument they wait for ever
+
+
+def waits_without_limit(path: Path) -> list[str]:
+    """Calls of a file that wait for a process, a thread or an answer for as long as it takes."""
+    lines = []
+    for node in ast.walk(parsed(path)):
+        if not isinstance(node, ast.Call) or any(keyword.arg == "timeout" for keyword in node.keywords):
+            continue
+        is_method = isinstance(node.func, ast.Attribute) and node.func.attr in BLOCKING
+        is_subprocess = isinstance(node.func, ast.Attribute) and ast.unparse(node.func) == "subprocess.run"
+        is_function = isinstance(node.func, ast.Name) and node.func.id == "wait"
+        if is_subprocess or is_function or (is_method and not (node.args or node.keywords)):
+            lines.append(f"{place(path)}:{node.lineno}: {ast.unparse(node)}")
+    return lines
+
+
+def test_nothing_waits_without_a_limit() -> None:
+    assert [line for path in SOURCES for line in waits_without_limit(path)] == []
+
+
 def test_nothing_unfinished_is_shipped() -> None:
     marks = re.compile(r"\b(TODO|FIXME|XXX|NotImplementedError)\b")
 

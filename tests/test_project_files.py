@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from builders import kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -39,16 +40,17 @@ def test_the_workflow_runs_what_exists_and_needs_no_secret() -> None:
     text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
     jobs = yaml.safe_load(text)["jobs"]
     commands = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
-    targets = {match for command in commands for match in re.findall(r"\bmake (\w+)", command)}
+    targets = {match for command in commands for match in re.findall(r"\bmake ([\w-]+)", command)}
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
 
-    assert targets == {"test", "install", "docs"}
+    assert targets == {"test", "test-kernels", "install", "docs"}
     assert [target for target in targets if not re.search(rf"^{target}:", makefile, re.MULTILINE)] == []
     assert [
         path for command in commands for path in re.findall(r"tests/\S+", command) if not (ROOT / path).exists()
     ] == []
     assert "secrets" not in text
     assert jobs["linux"]["strategy"]["matrix"]["python"] == ["3.11", "3.12", "3.13", "3.14"]
+    assert jobs["kernels"]["strategy"]["matrix"]["kernel"] == [*kernels.KERNELS, kernels.BASELINE]
 
 
 def test_every_decision_is_listed_under_its_number() -> None:

@@ -48,7 +48,7 @@ def watch(
                 if not quiet:
                     count = "1 file" if files.count == 1 else f"{files.count} files"
                     tell(f"watching {count}: save one for another round, Ctrl-C ends")
-                saved = files.wait()
+                saved = files.next_saved()
                 if not quiet:
                     tell(f"round {number + 1}: {saved} was saved")
         except KeyboardInterrupt:
@@ -70,6 +70,9 @@ def _round(work: Work, files: WatchedFiles, page: WatchPage | None, *, schema: s
         except OutputError:
             raise
         except Exception as error:  # noqa: BLE001 - the next save may mend whatever it is
+            if files.rewritten() is not None:  # half a save was read
+                files.settle()
+                continue
             _refuse(error, files, page, schema=schema, as_json=as_json)
             return
         present(result, as_json=as_json, on_one_line=True)

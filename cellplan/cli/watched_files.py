@@ -14,12 +14,14 @@ from cellplan.io.input.files import digest
 from cellplan.model.cell import Cell
 
 POLL_EVERY_S: Final = 0.2  # [s] between two polls while waiting
-SETTLED_S: Final = 0.2  # [s] without a further change after which a save counts as complete
+SETTLED_S: Final = 0.3  # [s] without a further change after which a save counts as complete
+EMPTIED_S: Final = 3.0  # [s] for which an emptied file may lack its new content: editors empty before they write
 ASK_EVERY_S: Final = 0.3  # [s] between two polls during a computation
 INPUT_SUFFIXES: Final = frozenset(
     {".yaml", ".yml", ".csv", ".stl", ".obj", ".dae", ".ply", ".urdf", ".xacro", ".srdf", ".json"}
 )
 MOST_ENTRIES: Final = 2000  # [-] files below the folder of a cell that are polled
+NOTHING: Final = digest(b"")  # of an empty file
 
 Stamp = tuple[int, int, int] | None  # time in [ns], size and number of a file; None while there is none
 
@@ -50,7 +52,9 @@ class WatchedFiles:
         return len(self._stamps)
 
     def begin(self) -> None:
-        """Take the files as they are now, before they are read."""
+        """Take the files as they are now, before they are read; not in the middle of a save."""
+        if any(self._is_emptied(path, _stamp(path)) for path in self._stamps):
+            self.settle()
         for path in self._stamps:
             self._note(path)
 
@@ -70,16 +74,20 @@ class WatchedFiles:
                 self._note(path)
 
     def changed(self) -> Path | None:
-        """A file whose content is another one than before; None if all are the same."""
+        """A file whose content is another one than before, or that a broken cell may lack; None if there is none."""
+        if (path := self.rewritten()) is not None or not self._are_inputs_unknown:
+            return path
+        return next((path for path in _neighbours(self.cell.parent) if path not in self._stamps), None)
+
+    def rewritten(self) -> Path | None:
+        """A watched file whose content is another one than before; None if all are the same."""
         for path, stamp in self._stamps.items():
             now = _stamp(path)
             if now != stamp:
                 if _digest(path) != self._digests[path]:
                     return path
                 self._stamps[path] = now
-        if not self._are_inputs_unknown:
-            return None
-        return next((path for path in _neighbours(self.cell.parent) if path not in self._stamps), None)
+        return None
 
     def require_unchanged(self) -> None:
         """Poll the files now and then during a computation.
@@ -93,19 +101,31 @@ class WatchedFiles:
         if self.changed() is not None:
             raise InputsChangedError
 
-    def wait(self) -> Path:
-        """The file that was saved next, once it is complete."""
-        while (path := self.changed()) is None:
+    def next_saved(self) -> Path:
+        """The file that was saved next, once it is complete; waits until the user saves one."""
+        while True:
+            if self.changed() is not None:
+                self.settle()
+                if (path := self.changed()) is not None:
+                    return path
             time.sleep(POLL_EVERY_S)
-        self.settle()
-        return path
 
     def settle(self) -> None:
-        """Wait until no file has changed for a moment."""
+        """Wait until no file has changed for a moment, and for the content of those that a save has just emptied."""
         before: dict[Path, Stamp] = {}
-        while (now := {path: _stamp(path) for path in self._stamps}) != before:
-            before = now
+        quiet_since = time.monotonic()
+        while True:
+            now = {path: _stamp(path) for path in self._stamps}
+            if now != before:
+                before, quiet_since = now, time.monotonic()
+            is_emptied = any(self._is_emptied(path, stamp) for path, stamp in now.items())
+            if time.monotonic() - quiet_since >= (EMPTIED_S if is_emptied else SETTLED_S):
+                return
             time.sleep(SETTLED_S)
+
+    def _is_emptied(self, path: Path, stamp: Stamp) -> bool:
+        """Whether a file that had content is empty or away, as it is for a moment while it is saved."""
+        return (stamp is None or stamp[1] == 0) and self._digests[path] not in (None, NOTHING)
 
     def _note(self, path: Path) -> None:
         """Keep time and content of a file."""

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO, Final, NoReturn, Self, TypeVar
 
 HELD: Final = {signal.SIGINT, signal.SIGTERM}  # signals that must not reach a copy before it ignores or obeys them
 PROGRESS_EVERY_S: Final = 0.1  # [s] between two messages of a copy on its progress
+LONGEST_S: Final = 3600.0  # [s] that a copy is waited for, far above what any honest work takes
 
 Value = TypeVar("Value")
 Listener = Callable[[str, float], None]
@@ -120,7 +121,9 @@ class ForkedWork:
             os._exit(0)  # whatever has gone wrong is done again by the process that was copied, and goes wrong there
 
     def _read(self, process: int) -> Any:
-        """What a copy has found; EOFError when it ended without."""
+        """What a copy has found; EOFError when it ended without, or was ended because it took too long."""
+        clock = threading.Timer(LONGEST_S, os.kill, [process, signal.SIGKILL])
+        clock.start()
         try:
             while True:
                 message = pickle.load(self._running[process])  # noqa: S301 - written by our own copy
@@ -128,6 +131,8 @@ class ForkedWork:
                     return message[0]
                 self._progress(*message)
         finally:
+            clock.cancel()
+            clock.join(PROGRESS_EVERY_S)
             self._end(process)
 
     def _end(self, process: int) -> None:

@@ -19,6 +19,7 @@ WORKER_PROGRAM: Final = (
 )
 ONE_THREAD: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # each more takes address space
 EXIT_TIMEOUT_S: Final = 0.5  # [s] an idle process ends at once when its pipe is closed
+KILL_TIMEOUT_S: Final = 10.0  # [s] a killed process ends at once, unless the system holds it at a disk that is gone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +86,8 @@ class ChildProcess:
             self._process.wait(EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(KILL_TIMEOUT_S)
 
     def _exchange(self, job: Job) -> Answer:
         """Send a job and wait for its answer."""

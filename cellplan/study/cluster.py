@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future
 from contextlib import suppress
 from functools import partial
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
@@ -22,6 +22,14 @@ RECONNECT_S: Final = 30.0  # [s] within which it answers again after the connect
 NO_WORKERS_S: Final = 60.0  # [s] after which a cluster without a worker is given up
 CHECK_EVERY_S: Final = 0.2  # [s] between two checks of the connection
 PER_THREAD: Final = 2  # trials begun for each thread of the cluster, so that none waits for the next one
+
+
+class Sent(NamedTuple):
+    """A job under way."""
+
+    job: Future[Any]  # as Dask answers it
+    call: Callable[[], Any]  # what sends it
+    connection: object  # what it was sent through; an answer comes through no other one
 
 
 class Cluster(Executor):
@@ -49,9 +57,10 @@ class Cluster(Executor):
         self._address = address
         self._client = _connected(address)
         self._dask = self._client.get_executor(pure=False)
-        threads = sum(self._client.nthreads().values())
+        threads = sum(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S).values())
         self.count = max(2, PER_THREAD * threads)
-        self._under_way: dict[Future[Any], Future[Any]] = {}
+        self._under_way: dict[Future[Any], Sent] = {}
+        self._answering = threading.Lock()
         self._again: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
         self._is_over = threading.Event()
         self._watch = threading.Thread(target=self._watched, name="cellplan-cluster", daemon=True)
@@ -66,7 +75,7 @@ class Cluster(Executor):
     ) -> None:
         """Leave the cluster; what it has not begun is cancelled."""
         self._is_over.set()
-        self._watch.join()
+        self._watch.join(CONNECT_S)
         with suppress(Exception):
             self._dask.shutdown(wait=False)
             self._client.close(timeout=CONNECT_S)
@@ -80,37 +89,51 @@ class Cluster(Executor):
 
     def _send(self, outer: Future[Any], call: Callable[[], Any]) -> None:
         """Give a job to Dask."""
-        if outer.cancelled():
+        if outer.done():
+            self._under_way.pop(outer, None)
             return
+        connection = self._client.scheduler_comm
         try:
             inner: Future[Any] = call()
         except Exception as error:  # noqa: BLE001 - the client is closed, or the job is none that can be sent
             if self._is_connected():
-                self._stop(outer, f"cannot be sent a trial: {error}")
+                self._answer(outer, _stopped(self._address, f"cannot be sent a trial: {error}"))
             else:
                 self._again.put((outer, call))
             return
-        self._under_way[outer] = inner
+        self._under_way[outer] = Sent(inner, call, connection)
         inner.add_done_callback(partial(self._arrived, outer, call))
 
     def _arrived(self, outer: Future[Any], call: Callable[[], Any], inner: Future[Any]) -> None:
-        """Pass on an answer; a job whose connection was lost is begun again."""
-        self._under_way.pop(outer, None)
-        if outer.done():
-            return
+        """Pass on an answer; a job whose connection was lost is begun again, and its first answer counts."""
+        sent = self._under_way.get(outer)
         if inner.cancelled():
-            self._again.put((outer, call))
+            if sent is not None and sent.job is inner:
+                self._again.put((outer, call))
             return
-        error = inner.exception()
+        self._under_way.pop(outer, None)
+        error = inner.exception(timeout=0)
         if error is None:
-            outer.set_result(inner.result())
+            self._answer(outer, inner.result(timeout=0))
         elif type(error).__name__ == "KilledWorker":
-            outer.set_result(Lost("the workers of the cluster that worked it out ended"))
+            self._answer(outer, Lost("the workers of the cluster that worked it out ended"))
         elif isinstance(error, StudyStoppedError | NotFiniteError):
-            outer.set_exception(error)
+            self._answer(outer, error)
         else:
             said = (str(error).splitlines() or [""])[0]
-            self._stop(outer, f"a worker cannot work out trials: {type(error).__name__}: {said}")
+            self._answer(
+                outer, _stopped(self._address, f"a worker cannot work out trials: {type(error).__name__}: {said}")
+            )
+
+    def _answer(self, outer: Future[Any], answer: Any) -> None:
+        """Pass on a result or an error of our own, unless the caller has one already or wants none any more."""
+        with self._answering:
+            if outer.done():
+                return
+            if isinstance(answer, BaseException):
+                outer.set_exception(answer)
+            else:
+                outer.set_result(answer)
 
     def _watched(self) -> None:
         """Begin jobs again once there is a connection, and give up when there is none or no worker for too long."""
@@ -119,8 +142,7 @@ class Cluster(Executor):
             now = time.monotonic()
             if self._is_connected():
                 lost_since = None
-                while not self._again.empty():
-                    self._send(*self._again.get())
+                self._renew()
             else:
                 lost_since = lost_since or now
                 if now - lost_since > RECONNECT_S:
@@ -128,6 +150,14 @@ class Cluster(Executor):
             idle_since = None if self._workers() or lost_since else idle_since or now
             if idle_since and now - idle_since > NO_WORKERS_S:
                 self._give_up(f"has had no worker for {NO_WORKERS_S:g} s")
+
+    def _renew(self) -> None:
+        """Begin again what waits for a connection, and what was sent through one that is gone: nobody answers it."""
+        while not self._again.empty():
+            self._send(*self._again.get_nowait())
+        for outer, sent in list(self._under_way.items()):
+            if sent.connection is not self._client.scheduler_comm:
+                self._send(outer, sent.call)
 
     def _is_connected(self) -> bool:
         comm = self._client.scheduler_comm
@@ -141,16 +171,10 @@ class Cluster(Executor):
     def _give_up(self, reason: str) -> None:
         """Stop the study."""
         while not self._again.empty():
-            self._stop(self._again.get()[0], reason)
+            self._answer(self._again.get_nowait()[0], _stopped(self._address, reason))
         for outer in list(self._under_way):
             self._under_way.pop(outer, None)
-            self._stop(outer, reason)
-
-    def _stop(self, outer: Future[Any], reason: str) -> None:
-        if not outer.done():
-            outer.set_exception(
-                StudyStoppedError(f"--scheduler {self._address}: {reason}; --resume goes on from what is recorded")
-            )
+            self._answer(outer, _stopped(self._address, reason))
 
 
 def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: object) -> Any:
@@ -162,6 +186,10 @@ def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: 
     if versions != _versions():
         raise StudyStoppedError(f"--scheduler: expected workers with {versions}, got one with {_versions()}")
     return function(*arguments)
+
+
+def _stopped(address: str, reason: str) -> StudyStoppedError:
+    return StudyStoppedError(f"--scheduler {address}: {reason}; --resume goes on from what is recorded")
 
 
 def _versions() -> dict[str, str]:
@@ -178,9 +206,11 @@ def _connected(address: str) -> Any:
             '--scheduler: expected Dask, got no package distributed: pip install "cellplan[cluster]"'
         ) from None
     try:
-        return Client(address, timeout=CONNECT_S, set_as_default=False)
+        client = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, TypeError, ImportError) as error:
         said = (str(error).splitlines() or [""])[0]
         raise InputError(
             f"--scheduler {address}: expected the address of a Dask scheduler that answers, got: {said}"
         ) from None
+    client._timeout = RECONNECT_S  # after a loss it would give up earlier
+    return client

@@ -7,8 +7,19 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import contextmanager
 from typing import Final
 
+from cellplan.errors import StudyStoppedError
 from cellplan.study.trial import Outcome, Variant
-from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
+from cellplan.study.workers import (
+    PATIENCE,
+    START,
+    Evaluate,
+    Limits,
+    Lost,
+    Workers,
+    crashed,
+    outcome_in_child,
+    packed,
+)
 
 BEGUN: Final = 256  # trials that are begun at once on an executor of the caller
 SURE: Final = 2  # ends of its process, the last one alone, after which a trial is the culprit
@@ -38,18 +49,27 @@ class Flight:
         self._is_alone = False
 
     def outcomes(self, variants: Iterable[Variant]) -> Iterator[tuple[Variant, Outcome]]:
-        """Variants and their outcomes, in the order in which these come."""
+        """Variants and their outcomes, in the order in which these come.
+
+        Raises:
+            StudyStoppedError: The executor answers for none of them within the time after which each is ended.
+        """
         self._waiting.extend(variants)
+        longest = PATIENCE * (self._limits.seconds + START.seconds)
         while self._waiting or self._lost or self._flying:
             self._fill()
-            wait(self._flying, return_when=FIRST_COMPLETED)
+            if not wait(self._flying, timeout=longest, return_when=FIRST_COMPLETED).done:
+                raise StudyStoppedError(
+                    f"no trial has ended for {longest:g} s, longer than one may take: what works them out does not "
+                    "answer; --resume goes on from what is recorded"
+                )
             yield from self.ended()
 
     def ended(self) -> Iterator[tuple[Variant, Outcome]]:
         """Those whose outcomes have come, without waiting for others."""
         done = [future for future in self._flying if future.done()]
         for future in sorted(done, key=lambda each: self._flying[each].number):
-            outcome = self._outcome(self._flying[future], future.result())
+            outcome = self._outcome(self._flying[future], future.result(timeout=0))
             if outcome is not None:
                 yield self._flying[future], outcome
             del self._flying[future]
@@ -57,7 +77,7 @@ class Flight:
     def arrived(self) -> list[tuple[Variant, Outcome]]:
         """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
         done = [future for future in self._flying if future.done() and not future.cancelled()]
-        answers = [(self._flying[each], each.result()) for each in done if each.exception() is None]
+        answers = [(self._flying[each], each.result(timeout=0)) for each in done if each.exception(timeout=0) is None]
         return [(variant, self._read(answer)) for variant, answer in answers if isinstance(answer, str)]
 
     def cancel(self) -> None:

@@ -23,6 +23,7 @@ PATIENCE: Final = 4.0  # [-] clock over processor: trials may share a processor 
 START: Final = Guard(
     file="cellplan", worker="the start of a worker process", seconds=300.0, patience=PATIENCE, megabytes=16_000
 )
+LONGEST_S: Final = 2.0 * PATIENCE * START.seconds  # [s] of the clock for a piece of work, that before it included
 
 Evaluate = Callable[[Variant], Outcome]
 Value = TypeVar("Value")
@@ -84,8 +85,8 @@ class Workers(ThreadPoolExecutor):
         begun = self.submit(_called, function, arguments)
 
         def value() -> Value:
-            with suppress(CellplanError, TypeError, AttributeError, pickle.PicklingError):
-                found: Value = begun.result()
+            with suppress(CellplanError, TypeError, AttributeError, pickle.PicklingError, TimeoutError):
+                found: Value = begun.result(timeout=LONGEST_S)
                 return found
             return function(*arguments)
 
@@ -93,8 +94,8 @@ class Workers(ThreadPoolExecutor):
 
     def attempt(self, function: Callable[..., object], *arguments: object) -> None:
         """Do ``function(*arguments)`` in one of the processes, which it may end: what goes wrong is ignored."""
-        with suppress(CellplanError):
-            self.submit(_called, function, arguments).result()
+        with suppress(CellplanError, TimeoutError):
+            self.submit(_called, function, arguments).result(timeout=LONGEST_S)
 
     def stop(self) -> None:
         """End the processes of trials under way: nothing is asked of these any more."""

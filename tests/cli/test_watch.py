@@ -135,6 +135,73 @@ def test_a_save_without_a_change_is_none(pair: Path) -> None:
     assert files.changed() is None
 
 
+def saved_in_pieces(path: Path, *saves: list[str], pause_s: float) -> threading.Thread:
+    """An editor that saves a file so many times: each time it empties it first and then writes it piece by piece."""
+
+    def save() -> None:
+        for pieces in saves:
+            with path.open("w", encoding="utf-8") as file:
+                for piece in pieces:
+                    threading.Event().wait(pause_s)
+                    file.write(piece)
+                    file.flush()
+
+    editor = threading.Thread(target=save)
+    editor.start()
+    return editor
+
+
+@pytest.mark.parametrize(("count", "pause_s"), [(1, 1.0), (5, 0.15)])  # empty for long; half of it for a moment
+def test_half_a_save_is_none(pair: Path, count: int, pause_s: float) -> None:
+    files, text = WatchedFiles(pair), pair.read_text(encoding="utf-8") + "# saved\n"
+    size = -(-len(text) // count)
+
+    editor = saved_in_pieces(pair, [text[at : at + size] for at in range(0, len(text), size)], pause_s=pause_s)
+
+    assert files.next_saved() == pair
+    assert pair.read_text(encoding="utf-8") == text
+    editor.join(LIMIT_S)
+
+
+def test_a_file_that_was_emptied_and_got_its_old_content_was_not_saved(pair: Path) -> None:
+    files, text = WatchedFiles(pair), pair.read_text(encoding="utf-8")
+
+    editor = saved_in_pieces(pair, [text], ["", text + "#"], pause_s=0.7)
+
+    assert files.next_saved() == pair
+    assert pair.read_text(encoding="utf-8") == text + "#"
+    editor.join(LIMIT_S)
+
+
+def test_a_file_that_stays_empty_is_taken_as_it_is(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cellplan.cli.watched_files.EMPTIED_S", 0.4)
+    files = WatchedFiles(pair)
+
+    pair.write_bytes(b"")
+
+    assert files.next_saved() == pair
+    files.begin()
+    assert files.changed() is None
+
+
+def test_what_half_a_save_made_wrong_is_not_said(pair: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    texts: list[str] = []
+
+    def work(follow: Any, _: Any) -> Result:
+        texts.append(pair.read_text(encoding="utf-8")[-1:])
+        if len(texts) == 1:
+            pair.write_text("", encoding="utf-8")
+            saved_in_pieces(pair, ["name: whole"], pause_s=0.5)
+            load_cell(pair)
+        raise KeyboardInterrupt
+
+    with pytest.raises(Exception, match="watching ended in round 1"):
+        watch(work, pair, schema="x/1", as_json=False, quiet=True)
+
+    assert texts == ["\n", "e"]
+    assert capsys.readouterr().err == ""
+
+
 def test_a_file_that_was_saved_while_it_was_read_is_noticed(pair: Path) -> None:
     files, cell = WatchedFiles(pair), load_cell(pair)
     pair.write_bytes(pair.read_bytes() + b"\n")

@@ -173,3 +173,16 @@ def test_a_copy_ends_with_the_process_that_it_is_a_copy_of(end: signal.Signals) 
         time.sleep(0.01)
     parent.stdout.close()
     assert not lives(child)
+
+
+def test_a_copy_that_never_ends_is_not_waited_for_for_ever(work: ForkedWork, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cellplan.guard.forked.LONGEST_S", 0.3)
+    home = os.getpid()
+
+    def hang(progress: Progress) -> int:
+        while os.getpid() != home:
+            time.sleep(0.05)
+        return os.getpid()
+
+    assert work.begin(hang)() == home
+    assert work.is_possible  # no thread of the waiting is left behind

@@ -1,13 +1,12 @@
 """Resolving a run: the accurate mode against Euler's steps, and what happens where it finds no way on."""
 
-import time
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from builders.batch_cells import CELLS
-from builders.planar_arms import planar_cell
+from builders.planar_arms import planar_cell, tip_jacobians
 from builders.random_cells import make_task
 from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangles
 
@@ -16,8 +15,11 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SpacePolylinePath
+from cellplan.planning.methods.weighted_pseudo_inverse import SINGULAR_REGION
+from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING
 
 EULER = Integrator.EULER
+MOST_SOLVES = 20_000  # [-] systems of equations, four times what the hardest of these motions takes
 
 
 def arm(points: list[Any], start: list[float], *, step: float = 1e-3, damping: float | None = None) -> Case:
@@ -111,15 +113,13 @@ def test_near_a_singularity_there_are_more_panels() -> None:
 @pytest.mark.parametrize("step", [1e-3, 0.02])
 def test_through_a_singularity_steps_lead_on_to_the_end(points: Any, start: Any, step: float) -> None:
     case = arm(points, start, step=step)
-    begun = time.perf_counter()
     motion = case.resolved()
-    taken = time.perf_counter() - begun
 
     assert motion.resolution.euler_from is None or 0.0 <= motion.resolution.euler_from < 1.0
     assert len(motion.q) == len(case.schedule.times)
     assert np.all(np.isfinite(motion.q))
     assert np.linalg.norm(tips(case, motion.q)[-1] - points[-1]) < 0.05
-    assert taken < 10.0  # a second or so: nothing is halved without end
+    assert motion.resolution.solves < MOST_SOLVES  # nothing is halved without end
 
 
 def test_an_arm_that_cannot_leave_its_singularity_stays_as_with_steps() -> None:
@@ -145,13 +145,31 @@ def test_what_is_out_of_reach_is_lost_as_with_steps(point: tuple[float, float]) 
             case.resolved(integrator=integrator)
 
 
-def test_what_is_just_out_of_reach_is_followed_as_far_as_it_goes() -> None:
-    case = arm([(2.1, 0.0)], [0.5, 0.9])
-    motion = case.resolved()
-    assert 0.5 < motion.resolution.euler_from < 1.0
-    before = case.schedule.times <= motion.resolution.euler_from
-    assert np.linalg.norm(tips(case, motion.q)[before], axis=1).max() <= 2.0
-    assert 1.9 < np.linalg.norm(tips(case, motion.q)[-1]) <= 2.0  # Euler's steps swing where nothing can be reached
+@pytest.mark.parametrize("reach", [2.02, 2.1])
+def test_what_is_just_out_of_reach_is_followed_to_its_edge_and_then_by_damped_steps(reach: float) -> None:
+    """Where nothing can be reached Euler's steps swing, and no digit of their end is a property of the motion.
+
+    What is: up to where collocation ends the tool is on its path, which is not yet out of reach; and from there on each
+    row follows from the one before, by the equations of the method in closed form.
+    """
+    case = arm([(reach, 0.0)], [0.5, 0.9])
+    motion, (task,) = case.resolved(), case.schedule.tasks
+    desired, first = task.X_PT[:, :2, 3], round(motion.resolution.euler_from / case.schedule.step)
+
+    off_path = np.linalg.norm(tips(case, motion.q) - desired, axis=1)
+    assert off_path[: first + 1].max() <= 2.0 * case.cell.solver.accuracy
+    assert 1.8 < np.linalg.norm(desired[first]) <= 2.0
+
+    gain = case.cell.solver.gain
+    J = tip_jacobians([1.0, 1.0], motion.q)
+    s = np.linalg.svd(J, compute_uv=False)[:, -1]
+    damping = np.maximum(1.0 - (s / SINGULAR_REGION) ** 2, 0.0) * LARGEST_DAMPING**2
+    twist = task.V_PT_P[:, :2] + gain * (desired - tips(case, motion.q))
+    JJ = J @ np.swapaxes(J, 1, 2) + damping[:, None, None] * np.eye(2)
+    speeds = np.swapaxes(J, 1, 2) @ np.linalg.solve(JJ, twist[..., None])
+    followed = motion.q[:-1] + speeds[:-1, :, 0] * case.schedule.step
+    np.testing.assert_allclose(motion.q[first + 1 :], followed[first:], atol=1e-9)
+    assert damping[first:].max() > 0.0
 
 
 def test_without_damping_steps_are_refused_where_they_have_to_take_over() -> None:
@@ -159,14 +177,12 @@ def test_without_damping_steps_are_refused_where_they_have_to_take_over() -> Non
         arm([(1.5, 0.0)], [0.0, 0.0], damping=0.0).resolved()
 
 
-def test_a_failing_run_takes_little_longer_than_steps_alone() -> None:
-    case = arm([(2.1, 0.0)], [0.5, 0.9])
-    taken = {}
-    for integrator in Integrator:
-        begun = time.perf_counter()
-        case.resolved(integrator=integrator)
-        taken[integrator] = time.perf_counter() - begun
-    assert taken[Integrator.ACCURATE] < 3.0 * taken[EULER] + 0.5
+@pytest.mark.parametrize("reach", [2.02, 2.1])
+def test_a_failing_run_takes_little_more_work_than_steps_alone(reach: float) -> None:
+    case = arm([(reach, 0.0)], [0.5, 0.9])
+    stepped, resolution = case.resolved(integrator=EULER).resolution.solves, case.resolved().resolution
+    assert resolution.euler_from is not None
+    assert resolution.solves < 3.0 * stepped
 
 
 def test_settings_that_rule_the_accurate_mode_out_take_steps() -> None:

@@ -5,7 +5,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import Future, wait
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -139,6 +141,56 @@ def test_a_scheduler_that_stays_away_ends_the_study_and_loses_nothing(
     with Workers(1) as workers:
         rounds(tmp_path / "cluster").run(halved, workers=workers, stop=TRIALS, resume=True)
     assert (tmp_path / "cluster" / JOURNAL).read_bytes() == whole
+
+
+class Dask:
+    """A client and executor of Dask, as a cluster uses them, that answer jobs of the latest connection only."""
+
+    def __init__(self, *, is_silent: bool) -> None:
+        self.status, self.scheduler, self._is_silent = "running", SimpleNamespace(ncores=None), is_silent
+        self._scheduler_identity = {"n_workers": 1}
+        self.scheduler_comm = SimpleNamespace(closed=lambda: False)
+        self.sent: list[Future[Any]] = []
+
+    def get_executor(self, *, pure: bool) -> "Dask":
+        return self
+
+    def sync(self, function: Any, *, callback_timeout: float) -> dict[str, int]:
+        return {"worker": 1}
+
+    def submit(self, function: Any, *arguments: Any) -> Future[Any]:
+        self.sent.append(Future())
+        if len(self.sent) > 1:
+            self.sent[-1].set_result(function(*arguments))
+        return self.sent[-1]
+
+    def connect_again(self) -> None:
+        """A scheduler that has come back knows nothing of the jobs before, and may not say so."""
+        self.scheduler_comm = SimpleNamespace(closed=lambda: False)
+        if not self._is_silent:
+            self.sent[0].cancel()
+            self.sent[0].set_running_or_notify_cancel()
+
+    def shutdown(self, *, wait: bool) -> None:
+        """There is nothing to end."""
+
+    def close(self, *, timeout: float) -> None:
+        """There is nothing to end."""
+
+
+@pytest.mark.parametrize("is_silent", [True, False])
+def test_a_job_of_a_connection_that_is_gone_is_sent_again(is_silent: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    dask = Dask(is_silent=is_silent)
+    monkeypatch.setattr("cellplan.study.cluster._connected", lambda _address: dask)
+    with Cluster("tcp://127.0.0.1:1") as executor:
+        answer = executor.submit(sum, (1, 2))
+        assert wait([answer], timeout=0.5).not_done
+        dask.connect_again()
+        assert answer.result(timeout=30.0) == 3
+        if is_silent:
+            dask.sent[0].set_result(4)  # late: the first answer counts
+        assert answer.result(timeout=0) == 3
+    assert len(dask.sent) == 2
 
 
 def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
 import pytest
 from builders.study_trials import SIZE, InThisProcess, accident, from_the_best, halved, rounds
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, StudyStoppedError
 from cellplan.study.folder import AHEAD, JOURNAL
 from cellplan.study.running import STATE, RunningState, running
 from cellplan.study.status import Best, StudyStatus, read_status
@@ -38,6 +39,27 @@ def test_a_round_begins_with_the_best_of_the_rounds_before(tmp_path: Path) -> No
     assert [trial["values"]["place"] for trial in finished.trials[:2]] == [[0, 1], [1, 1]]  # as they are read back
     assert (finished.rounds, finished.stopped_by) == (1, StoppedBy.TRIALS)
     assert json.loads(journal(tmp_path / "study").splitlines()[0])["best"] == {"figure": "length", "of": "smallest"}
+
+
+class Deaf(InThisProcess):
+    """Answers for the first trials only, and for none of the others ever."""
+
+    def submit(self, function: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        return super().submit(function, *arguments, **named) if len(self.numbers) < 5 else Future()
+
+
+def test_an_executor_that_does_not_answer_ends_the_study_and_what_is_recorded_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cellplan.study.run.PATIENCE", 0.001)
+    with pytest.raises(
+        StudyStoppedError, match=r"^no trial has ended for 0\.3005 s, longer than one may take: .* --resume"
+    ):
+        rounds(tmp_path / "deaf").run(halved, workers=Deaf(), stop=Stop(trials=8), limits=SHORT)
+
+    run(tmp_path / "deaf", 8, resume=True)
+    run(tmp_path / "whole", 8)
+    assert journal(tmp_path / "deaf") == journal(tmp_path / "whole")
 
 
 def test_a_shorter_study_is_a_prefix_of_a_longer_one_and_can_be_continued_to_it(tmp_path: Path) -> None:

@@ -32,10 +32,14 @@ class BatchTasks:
     Attributes:
         chains: The chains of all robots.
         joint_count: Length of the stacked joint vector.
+        is_refined: Whether speeds are exact to rounding even where operators cannot do their tasks alone.
     """
 
-    def __init__(self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> None:
-        """Gather what stays the same from configuration to configuration."""
+    def __init__(
+        self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str], *, is_refined: bool = False
+    ) -> None:
+        """Gather what stays the same from configuration to configuration; refined speeds are exact to rounding."""
+        self.is_refined = is_refined
         self.chains, self.joint_count = BatchChains(cell), cell.joint_count
         constraints = TaskConstraints.of(cell, tasks, moving)
         self._robots, self._holder, self._X_CP = constraints.operators, constraints.carrier, cell.part.X_CP
@@ -205,6 +209,7 @@ class Linearisation:
     ) -> None:
         """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
         self._tasks, self._arrow, self._rows, self._desired, self._mobile = tasks, arrow, rows, desired, mobile
+        self._speeds = arrow.refined_speeds if tasks.is_refined else arrow.speeds
         self.errors = errors
 
     def speeds(self, drift: Array | None = None) -> Array:
@@ -214,19 +219,19 @@ class Linearisation:
         """
         b = self._turned(self._desired)
         if drift is None:
-            return self._tasks.stacked(*self._arrow.speeds(b))
+            return self._tasks.stacked(*self._speeds(b))
         u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
-        return u + self._tasks.stacked(*self._arrow.speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
+        return u + self._tasks.stacked(*self._speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
 
     def null_space_projection(self, u: Array) -> Array:
         """What of joint velocities moves no tool, ``(I - J^# J) u``, shape (nq, batch)."""
         twists = self._arrow.twists(*self._tasks.unstacked(u))
-        return u - self._tasks.stacked(*self._arrow.speeds(twists))
+        return u - self._tasks.stacked(*self._speeds(twists))
 
     def correction(self, moved: Array) -> Array:
         """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, batch)."""
         b = self._turned(self.errors) - self._arrow.twists(*self._tasks.unstacked(moved))
-        return self._tasks.stacked(*self._arrow.speeds(b))
+        return self._tasks.stacked(*self._speeds(b))
 
     def _turned(self, b: Array) -> Array:
         """Errors or twists in the frame of the columns."""

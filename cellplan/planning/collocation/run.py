@@ -66,7 +66,7 @@ class AccurateRun:
         if not schedule.is_continuous:
             raise TypeError("accurate run: expected a desired motion between samples, got none")
         accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
-        tasks = BatchTasks(cell, motion.relations, motion.moving)
+        tasks = BatchTasks(cell, motion.relations, motion.moving, is_refined=cell.motion.cyclic)
         placement, self.end = tasks.chains.placement(cell), float(schedule.times[-1])
         breaks, jumps = schedule.breaks, schedule.jumps
         until, first = _settled(cell, schedule, len(grasps)), breaks[:2]

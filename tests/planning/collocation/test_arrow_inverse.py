@@ -71,6 +71,21 @@ def test_speeds_are_those_of_the_weighted_pseudo_inverse(tasks: int, own: int) -
     assert_agrees(Drawn(tasks, own=own))
 
 
+@pytest.mark.parametrize("lost", [1, 2])
+@pytest.mark.parametrize("tasks", [2, 5])
+def test_refined_speeds_lose_no_digit_where_operators_cannot_do_their_tasks_alone(tasks: int, lost: int) -> None:
+    drawn = Drawn(tasks)
+    drawn.A[:lost, :, 0] = 0.0  # only the shared joints move the first tool there
+    for t in range(1, tasks):
+        drawn.A[-1, :, t] = drawn.A[0, :, t]  # no own joint turns it but with its shift
+
+    speeds = drawn.inverse().refined_speeds(drawn.b)
+
+    for lane in range(LANES):
+        expected = drawn.expected(lane)
+        np.testing.assert_allclose(stacked(speeds, lane), expected, atol=1e-10 * np.abs(expected).max())
+
+
 def test_far_from_a_singularity_one_step_is_enough() -> None:
     drawn = Drawn(3)
     for t in range(3):
