@@ -71,3 +71,9 @@ def test_what_shows_a_guarantee_exists() -> None:
 
     assert len(named) > 100
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
+def test_a_test_that_hangs_is_ended(request: pytest.FixtureRequest) -> None:
+    """`make install` brings the plug-in that does so."""
+    assert request.config.pluginmanager.hasplugin("timeout")
+    assert request.node.get_closest_marker("timeout").args[0] <= 300
