@@ -13,8 +13,10 @@ from cellplan.collision.bodies import BodyPoses, CollisionBody, fine_segments, p
 from cellplan.collision.engine import Engine, nearest_triangle
 from cellplan.collision.overlap.surface_tree import SurfaceTree
 from cellplan.geometry.arrays import Flags
+from cellplan.geometry.mesh.counts import ray_winding
 from cellplan.geometry.mesh.rays import ray_hits
 from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.mesh.touching import has_several_solids, outer_surface
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere
 from cellplan.geometry.transforms import Array
 
@@ -78,6 +80,8 @@ def _tree(body: CollisionBody) -> SurfaceTree:
 @lru_cache(maxsize=MOST_KEPT)
 def _probe(body: CollisionBody) -> Engine:
     """A solid and a point."""
+    if isinstance(body.shape, Mesh):
+        body = prepare(body.name, outer_surface(body.shape))  # points between solids that touch are not near a surface
     return Engine((body, prepare("point", Sphere(POINT_RADIUS))))
 
 
@@ -115,7 +119,8 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array, s
     depths = np.linalg.norm(ways, axis=1)
     is_relevant = depths > worth
     height = np.einsum("ij,ij->i", _normals(mesh.vertices[mesh.faces[faces]]), ways)
-    sides = np.where((sides == 0.0) & (np.abs(height) >= STRAIGHT * depths), np.sign(height), sides)
+    if not has_several_solids(mesh):  # the nearest face of one solid may be inside another
+        sides = np.where((sides == 0.0) & (np.abs(height) >= STRAIGHT * depths), np.sign(height), sides)
     asked = np.flatnonzero(is_relevant & (sides == 0.0))
     sides[asked] = np.where(_is_within(mesh, points[asked]), -1.0, 1.0)
     found: Array = np.where(is_relevant, -sides * depths, 0.0)
@@ -123,9 +128,12 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array, s
 
 
 def _is_within(mesh: Mesh, points: Array) -> Flags:
-    """Whether points are inside a closed mesh, shape (N,): two of three rays from each say so."""
+    """Whether points are inside a closed mesh, shape (N,): two of three rays say so, or how often solids wind round."""
     if not len(points):
         return np.zeros(0, dtype=bool)
+    if has_several_solids(mesh):
+        within: Flags = ray_winding(mesh.vertices[mesh.faces], points) > 0
+        return within
     normals = _normals(mesh.vertices[mesh.faces])
     rays = np.repeat(RAYS, len(points), axis=0)
     hits = ray_hits(mesh, np.tile(points, (len(RAYS), 1)), rays)

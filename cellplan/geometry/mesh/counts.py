@@ -40,6 +40,14 @@ def count_edges(faces: Indices) -> EdgeCount:
     )
 
 
+def open_edge_ends(faces: Indices) -> Indices:
+    """Both vertices of each edge that has a triangle on one side only, shape (K, 2)."""
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    _, first, triangles = np.unique(low * (high.max(initial=0) + 1) + high, return_index=True, return_counts=True)
+    return np.stack([low, high], axis=1)[first[triangles == 1]]
+
+
 def winding_numbers(triangles: Array, points: Array) -> Array:
     r"""How often a surface winds round each point: 1 inside a closed outward surface, 0 outside, shape (N,).
 

@@ -11,7 +11,8 @@ from cellplan.geometry.mesh.counts import components, count_edges, face_volumes,
 from cellplan.geometry.transforms import Array
 
 MAX_PIECES: Final = 5000  # [-] an assembly with its screws has some hundreds
-PROBE_COUNT: Final = 64  # [-] vertices of a shell that are tested for lying inside the others
+PROBE_COUNT: Final = 64  # [-] triangles of a shell that are tested for lying inside the others
+BEHIND: Final = 1e-6  # [-] of the extent: by so much the points lie behind their triangle, inside its shell
 
 
 def require_few_pieces(faces: Indices, *, source: str) -> None:
@@ -74,7 +75,7 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
     require_few_pieces(faces, source=source)
     if face_volumes(vertices, faces).sum() < 0.0:
         faces = faces[:, ::-1]
-    names, label = np.unique(shells(faces, len(vertices))[faces[:, 0]], return_inverse=True)
+    names, label = np.unique(_solids(faces, len(vertices)), return_inverse=True)
     inward = np.flatnonzero(np.bincount(label, weights=face_volumes(vertices, faces)) < 0.0)
     if not inward.size:
         return faces
@@ -85,9 +86,29 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
         holders = np.all(low <= low[shell], axis=1) & np.all(high >= high[shell], axis=1)
         holders[shell] = False
         around = vertices[faces[holders[label]]]
-        if not len(around) or not _all_within(around, vertices[np.unique(faces[is_own])]):
+        if not len(around) or not _all_within(around, _points_behind(vertices[faces[is_own][:, ::-1]])):
             turned[is_own] = faces[is_own][:, ::-1]
     return turned
+
+
+def _solids(faces: Indices, count: int) -> Indices:
+    """Label of the closed surface that each triangle is of: solids that touch at an edge or a corner are several.
+
+    Where triangles of several solids cannot be told apart at their common edges, these solids are one.
+    """
+    first, second, _ = _neighbours(faces)
+    label = components(len(faces), np.stack([first, second], axis=1))
+    edge = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    keys = np.column_stack([np.sort(edge, axis=1), np.repeat(label, 3)])
+    _, uses = np.unique(keys, axis=0, return_counts=True)
+    return label if np.all(uses == 2) else shells(faces, count)[faces[:, 0]]
+
+
+def _points_behind(corner: Array) -> Array:
+    """Points a little behind triangles of shape (M, 3, 3), shape (M, 3)."""
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    size = np.ptp(corner.reshape(-1, 3), axis=0).max()
+    return corner.mean(axis=1) - BEHIND * size * normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _all_within(around: Array, points: Array) -> bool:

@@ -17,7 +17,15 @@ from cellplan.geometry.mesh.polygons import Triangles
 from cellplan.geometry.mesh.rays import RayHits, ray_hits
 from cellplan.geometry.mesh.stl_obj import parse_mesh, require_likely_count, unknown_format
 from cellplan.geometry.mesh.tessellation import tessellate
-from cellplan.geometry.mesh.topology import components, count_edges, make_mesh, mesh_volume, winding_numbers
+from cellplan.geometry.mesh.topology import (
+    components,
+    count_edges,
+    make_mesh,
+    mesh_volume,
+    open_edge_ends,
+    winding_numbers,
+)
+from cellplan.geometry.mesh.touching import outer_surface
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
@@ -46,6 +54,7 @@ MAX_BYTES: Final = 100_000_000
 MIN_EXTENT: Final = 1e-3  # [m] smaller things in a robot cell are errors of the unit
 MAX_EXTENT: Final = 20.0  # [m] larger ones as well
 FLAT_FRACTION: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
+CORNER_LAGS: Final = (1, 2, 3)  # places between two of the four triangles at an edge that two solids share
 CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
 
 
@@ -128,12 +137,12 @@ def _is_collada(name: str) -> bool:
 
 
 def require_solid(mesh: Mesh) -> None:
-    """Refuse a mesh that does not enclose a volume.
+    """Refuse a mesh that does not enclose a volume; several closed bodies that touch do.
 
     Raises:
         InputError: The surface is open or encloses nothing.
     """
-    if not mesh.is_closed or count_edges(mesh.faces).crowded:
+    if not mesh.is_closed:
         raise InputError(f"{_not_closed(mesh)}: repair the mesh")
     if is_flat(mesh) or mesh_volume(mesh) <= 0.0:
         raise InputError(f"{mesh.source}: expected a solid, got a surface that encloses no volume")
@@ -191,16 +200,22 @@ def contains(mesh: Mesh, points: Array) -> np.ndarray[tuple[int], np.dtype[np.bo
 
     A few open edges do no harm. Points on the surface itself may count either way.
     """
-    inside = winding_numbers(mesh.vertices[mesh.faces], points) > 0.5
+    surface = outer_surface(mesh)
+    inside = winding_numbers(surface.vertices[surface.faces], points) > 0.5
     return np.asarray(inside, dtype=np.bool_)
 
 
 def _not_closed(mesh: Mesh) -> str:
     """What is wrong with a surface that is not that of one solid."""
-    edges = count_edges(mesh.faces)
+    edges, ends = count_edges(mesh.faces), open_edge_ends(mesh.faces)
+    place = ""
+    if len(ends):
+        longest = int(np.argmax(np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)))
+        a, b = (", ".join(f"{1e3 * x + 0.0:.6g}" for x in mesh.vertices[end]) for end in ends[longest])
+        place = f", the longest open one from ({a}) to ({b}) mm"
     return (
         f"{mesh.source}: expected a closed surface, got {edges.open} open edges, {edges.crowded} edges of more "
-        f"than two triangles and {edges.turned} edges whose triangles face opposite directions"
+        f"than two triangles and {edges.turned} edges whose triangles face opposite directions{place}"
     )
 
 
@@ -240,7 +255,8 @@ def _smooth_corners(faces: np.ndarray, normals: Array, *, crease: float) -> np.n
     after = 3 * (corner // 3) + (corner + 1) % 3
     low_corner, high_corner = np.where(a < b, corner, after), np.where(a < b, after, corner)
     order = np.lexsort((high, low))
-    first, second = order[:-1], order[1:]
+    first = np.concatenate([order[:-lag] for lag in CORNER_LAGS])
+    second = np.concatenate([order[lag:] for lag in CORNER_LAGS])
     joined = (low[first] == low[second]) & (high[first] == high[second])
     cosine = np.sum(normals[first // 3] * normals[second // 3], axis=1)
     smooth = joined & (cosine > np.cos(crease))

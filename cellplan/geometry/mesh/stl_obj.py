@@ -22,6 +22,9 @@ from cellplan.geometry.mesh.ply import parse_ply
 from cellplan.geometry.mesh.polygons import Polygons, Triangles, cut_polygons, polygons_as_triangles
 from cellplan.geometry.transforms import Array
 
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8: editors put it before text
+WIDE_MARKS: Final = (b"\xff\xfe", b"\xfe\xff")  # of text in UTF-16
+PADDING: Final = b"\0\x1a \t\r\n"  # what programs put after the end of a file without meaning anything by it
 STL_HEADER: Final = 84  # [bytes] 80 of comment and 4 of count
 STL_TRIANGLE: Final = 50  # [bytes]
 STL_LETTERS: Final = {
@@ -57,9 +60,9 @@ def parse_mesh(data: bytes, name: str) -> Triangles:
             case "stl":
                 return _parse_stl(data, name)
             case "obj":
-                return _parse_obj(data, name)
+                return _parse_obj(data.removeprefix(BYTE_ORDER_MARK), name)
             case "ply":
-                return parse_ply(data, name)
+                return parse_ply(data.removeprefix(BYTE_ORDER_MARK), name)
             case _:
                 raise unknown_format(name)
 
@@ -91,19 +94,35 @@ def require_no_more(count: int, most: int, what: str, *, place: str) -> None:
 
 def _parse_stl(data: bytes, name: str) -> Triangles:
     """Tell binary from text by the length: many binary files also start with the word ``solid``."""
-    count = int.from_bytes(data[80:STL_HEADER], "little")
-    expected = STL_HEADER + STL_TRIANGLE * count
-    if len(data) >= STL_HEADER and len(data) == expected:
-        return _read_stl(data, name, triangles=count)
-    if re.match(rb"\s*solid\b", data, re.IGNORECASE) and b"\0" not in data:
-        text, facets = _checked_text_stl(data, name)
+    plain = data.removeprefix(BYTE_ORDER_MARK)
+    for binary in (data, plain):
+        end = _binary_end(binary)
+        if end and not binary[end:].strip(PADDING):
+            return _read_stl(binary[:end], name, triangles=(end - STL_HEADER) // STL_TRIANGLE)
+    text = plain.rstrip(PADDING)
+    if re.match(rb"\s*solid\b", text, re.IGNORECASE) and b"\0" not in text:
+        text, facets = _checked_text_stl(text, name)
         return _read_stl(text, name, triangles=facets)
+    if data.startswith(WIDE_MARKS):
+        raise InputError(f"{name}: expected a binary or plain text STL file, got text in UTF-16: save it as UTF-8")
     if len(data) < STL_HEADER:
         raise InputError(f"{name}: expected an STL file, got {len(data)} bytes that are neither binary nor text STL")
+    count = int.from_bytes(data[80:STL_HEADER], "little")
+    if end := _binary_end(data):
+        raise InputError(
+            f"{name}: expected the file to end after the {count} triangles that its header declares, got "
+            f"{len(data) - end} bytes more: the header is wrong, or something was appended; export it again"
+        )
     raise InputError(
-        f"{name}: expected {expected} bytes for the {count} triangles that its header declares, "
-        f"got {len(data)}: the file is damaged or not STL"
+        f"{name}: expected {STL_HEADER + STL_TRIANGLE * count} bytes for the {count} triangles that its header "
+        f"declares, got {len(data)}: the file is damaged or not STL"
     )
+
+
+def _binary_end(data: bytes) -> int:
+    """Where the triangles end that the header of a binary STL declares; 0 where the file is too short for them."""
+    end = STL_HEADER + STL_TRIANGLE * int.from_bytes(data[80:STL_HEADER], "little")
+    return end if len(data) >= max(end, STL_HEADER) else 0
 
 
 def _read_stl(data: bytes, name: str, *, triangles: int) -> Triangles:

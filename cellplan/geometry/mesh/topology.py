@@ -1,5 +1,6 @@
 """Triangle meshes as surfaces: made of loose triangles by welding, with lost area accounted for and outside outside."""
 
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -12,18 +13,27 @@ from cellplan.geometry.mesh.counts import (
     components,
     count_edges,
     face_volumes,
+    open_edge_ends,
     winding_numbers,
 )
 from cellplan.geometry.mesh.healing import encloses, oriented_alike, turn_outward, without_repeats
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
-__all__ = ["EdgeCount", "components", "count_edges", "make_mesh", "mesh_volume", "winding_numbers"]
+__all__ = [
+    "EdgeCount",
+    "components",
+    "count_edges",
+    "make_mesh",
+    "mesh_volume",
+    "open_edge_ends",
+    "weld_tolerance",
+    "winding_numbers",
+]
 
 FaceArray = np.ndarray[tuple[int, int], np.dtype[np.int64]]
 
-WELD_FRACTION: Final = 1e-7  # [-] of the extent: vertices written in single precision differ by no more than this
-GRID_SHIFTS: Final = (0.0, 0.5, 0.25)  # [-] of a cell of the grid that vertices are rounded to
+WELD_FRACTION: Final = 1e-6  # [-] of the largest coordinate: the last of the seven digits that single precision has
 AREA_FRACTION: Final = 1e-12  # [-] of the longest side squared: thinner triangles have no usable normal
 LOST_FRACTION: Final = 0.5  # [-] of the triangles that may be without area before the mesh counts as damaged
 
@@ -31,8 +41,9 @@ LOST_FRACTION: Final = 0.5  # [-] of the triangles that may be without area befo
 def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     """Mesh from loose triangles: equal vertices welded, triangles without area dropped, outside made outside.
 
-    Triangles that are there twice are taken once, and those that face the other way than their neighbours turned over;
-    nothing is moved or filled in.
+    Triangles that are there twice are taken once, and those that face the other way than their neighbours turned over.
+    A crack no wider than a millionth of the largest coordinate is closed if that closes the surface; nothing else is
+    moved or filled in. Closed bodies that touch stay several solids.
 
     Args:
         vertices: Corner points in [m], finite, shape (V, 3).
@@ -67,7 +78,7 @@ def mesh_volume(mesh: Mesh) -> float:
 
 
 def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices, EdgeCount]:
-    """Merge equal vertices; where that leaves open edges, those that differ by rounding to single precision.
+    """Merge equal vertices; where that leaves open edges, those of their ends that differ by rounding only.
 
     Returns:
         The vertices, the corners of all triangles, and the edges of those that still have three.
@@ -76,15 +87,33 @@ def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices, EdgeCount]:
     edges = count_edges(corners[_has_three_corners(corners)])
     if not edges.open:
         return points, corners, edges
-    grid = WELD_FRACTION * float(np.ptp(points, axis=0).max())
-    for shift in GRID_SHIFTS:  # two vertices that one grid separates lie in one cell of another
-        near, joined = _merge(points, corners, key=np.round(points / grid + shift))
-        if len(near) == len(points):
-            break  # no two vertices are that near: the file is not one that rounds
-        closed = count_edges(joined[_has_three_corners(joined)])
-        if not closed.open:
-            return near, joined, closed
-    return points, corners, edges
+    border = np.unique(open_edge_ends(corners[_has_three_corners(corners)]))
+    place = np.arange(len(points))
+    place[border] = border[_groups(points[border], weld_tolerance(points))]
+    joined = place[corners]
+    closed = count_edges(joined[_has_three_corners(joined)])
+    return (points, joined, closed) if not closed.open else (points, corners, edges)
+
+
+def weld_tolerance(points: Array) -> float:
+    """Distance in [m] within which two points count as one, from points of shape (V, 3)."""
+    return WELD_FRACTION * float(np.abs(points).max())
+
+
+def _groups(points: Array, tolerance: float) -> Indices:
+    """First member of the group of each point, shape (N,): neighbours are no farther apart than the tolerance.
+
+    Two such points lie in one cell of a grid of twice the tolerance, or of one of those shifted by half a cell.
+    """
+    pairs = []
+    for shift in product((0.0, 0.5), repeat=3):
+        cells = np.floor(points / (2.0 * tolerance) + shift)
+        order = np.lexsort(cells.T)
+        is_shared = np.all(cells[order[1:]] == cells[order[:-1]], axis=1)
+        pairs.append(np.stack([order[:-1][is_shared], order[1:][is_shared]], axis=1))
+    near = np.concatenate(pairs)
+    apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
+    return components(len(points), near[apart <= tolerance])
 
 
 def _merge(vertices: Array, faces: Indices, *, key: Array) -> tuple[Array, Indices]:

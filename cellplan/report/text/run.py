@@ -107,7 +107,11 @@ def _task_rows(tasks: Record) -> Iterator[Row]:
         yield "largest tool error", _error_text(task), f"task {name} ({task['robot']})"
     for name, task in tasks.items():
         if task.get("path_bulge_mm"):
-            yield "largest bulge of a path", f"{task['path_bulge_mm']:.3g} mm", f"from the sides between its points, task {name}"
+            yield (
+                "largest bulge of a path",
+                f"{task['path_bulge_mm']:.3g} mm",
+                f"from the sides between its points, task {name}",
+            )
 
 
 def _closure_rows(closures: Record) -> Iterator[Row]:

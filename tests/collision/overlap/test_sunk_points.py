@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from builders.touching_boxes import as_one, assembly
 
 from cellplan.collision.bodies import prepare
 from cellplan.collision.overlap.sunk_points import SUNK_TOL, deepest_point
@@ -76,3 +77,20 @@ def test_the_patches_of_a_surface_hold_what_their_halves_hold() -> None:
 
     assert len(patches) == len(triangles)  # repeated triangles are left out
     np.testing.assert_array_equal(covered, np.sort(triangles.mean(axis=1), axis=0))
+
+
+def test_a_tool_is_as_deep_in_bodies_that_touch_as_in_the_one_solid_they_make() -> None:
+    rng, tool = np.random.default_rng(8), prepare("tool", Box((0.004, 0.004, 0.2)))
+    hosts = [prepare("part", mesh) for mesh in (assembly(), as_one())]
+    places = [
+        np.array([0.07, 0.0, 0.16]),
+        np.array([0.0, 0.0, 0.11]),
+        *rng.uniform([-0.1, -0.1, 0], [0.1, 0.1, 0.2], (12, 3)),
+    ]
+
+    deep = 0
+    for p in places:
+        ours, truth = (deepest_point(tool, host, np.eye(3), p, tolerance=3e-4) for host in hosts)
+        assert ours == pytest.approx(truth, abs=6e-4)
+        deep += truth > 0.005
+    assert deep > 2

@@ -40,6 +40,27 @@ def test_vertices_that_differ_by_single_precision_are_welded() -> None:
     assert make_mesh(shaken, np.arange(36).reshape(-1, 3), source="part.stl").is_closed
 
 
+@pytest.mark.parametrize("away", [0.0, 3.0])
+def test_a_crack_of_one_float_step_is_closed_and_a_wider_one_is_named(away: float) -> None:
+    corners = (BOX.vertices[BOX.faces].reshape(-1, 3) + away).astype(np.float32)
+    faces = np.arange(36).reshape(-1, 3)
+    for steps in (1, 2):
+        cracked = corners.copy()
+        for _ in range(steps):
+            cracked[4] = np.nextafter(cracked[4], np.float32(10.0))
+        require_solid(make_mesh(cracked.astype(float), faces, source="part.stl"))
+
+    torn = corners.astype(float)
+    torn[4] += 1e-4
+    with pytest.raises(InputError, match=r"got 4 open edges, .* the longest open one from \(.*\) to \(.*\) mm: repair"):
+        require_solid(make_mesh(torn, faces, source="part.stl"))
+
+
+def test_points_of_a_closed_surface_stay_where_they_are_however_near() -> None:
+    thin = BOX.vertices * [1e-6, 1.0, 1.0]
+    assert len(make_mesh(thin, BOX.faces, source="foil.stl").vertices) == 8
+
+
 def test_a_surface_turned_inside_out_is_turned_back_and_a_cavity_stays_one() -> None:
     inner = 0.5 * BOX.vertices
     assert mesh_volume(make_mesh(BOX.vertices, BOX.faces[:, ::-1], source="x")) == pytest.approx(0.048, rel=1e-12)
@@ -63,7 +84,8 @@ def test_an_open_crowded_or_flat_surface_is_no_solid() -> None:
         require_solid(open_box)
     assert str(caught.value) == (
         "part.stl: expected a closed surface, got 3 open edges, 0 edges of more than two triangles and 0 edges whose "
-        "triangles face opposite directions: repair the mesh"
+        "triangles face opposite directions, the longest open one from (-100, -200, -300) to (-100, 200, 300) mm: "
+        "repair the mesh"
     )
     crowded = make_mesh(BOX.vertices, np.concatenate([BOX.faces, BOX.faces[:1, ::-1]]), source="part.stl")
     with pytest.raises(InputError, match="3 edges of more than two triangles"):

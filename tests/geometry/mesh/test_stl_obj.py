@@ -147,6 +147,49 @@ def test_binary_ply_may_have_more_columns_and_mixed_faces_in_either_byte_order(t
     assert "expected the numbers that the PLY header declares, got a damaged file" in refusal(path)
 
 
+MARK = b"\xef\xbb\xbf"
+
+
+@pytest.mark.parametrize(
+    ("kind", "before", "after"),
+    [
+        ("stl", b"", b"\n"),
+        ("stl", b"", b"\0" * 50),
+        ("stl", MARK, b""),
+        ("ascii.stl", MARK, b""),
+        ("ascii.stl", b"", b"\x1a"),
+        ("ascii.stl", MARK, b"\n\0\0"),
+        ("obj", MARK, b""),
+        ("ascii.ply", MARK, b""),
+    ],
+)
+def test_marks_before_a_file_and_padding_after_it_change_nothing(
+    tmp_path: Path, kind: str, before: bytes, after: bytes
+) -> None:
+    path = write(tmp_path, kind)
+    path.write_bytes(before + path.read_bytes() + after)
+
+    mesh = read_mesh(path)
+
+    require_solid(mesh)
+    assert mesh_volume(mesh) == pytest.approx(0.048, rel=1e-6)
+
+
+def test_what_is_appended_to_an_stl_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, "stl")
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"COLOR=abc")
+    assert refusal(path) == (
+        "part.stl: expected the file to end after the 12 triangles that its header declares, got 9 bytes more: the "
+        "header is wrong, or something was appended; export it again"
+    )
+    text = write(tmp_path, "ascii.stl").read_text()
+    path.write_bytes(text.encode() + b"made by hand\n")
+    assert re.fullmatch(r"part\.stl:\d+: expected a line of a text STL, got 'made'", refusal(path))
+    path.write_bytes(text.encode("utf-16"))
+    assert refusal(path) == ("part.stl: expected a binary or plain text STL file, got text in UTF-16: save it as UTF-8")
+
+
 def test_damaged_binary_stl_names_the_bytes(tmp_path: Path) -> None:
     path = write(tmp_path, "stl")
     path.write_bytes(path.read_bytes()[:-1])

@@ -15,7 +15,8 @@ Refuse = Callable[..., list[str]]
 FLOOR = "  floor: {plane: {z_mm: 0}}"
 OPEN = (
     "a.stl: expected a closed surface, got 3 open edges, 0 edges of more than two triangles and 0 edges whose "
-    "triangles face opposite directions: repair the mesh, or set open: true, with which no point counts as inside it"
+    "triangles face opposite directions, the longest open one from (-250, -200, -150) to (-250, 200, 150) mm: repair "
+    "the mesh, or set open: true, with which no point counts as inside it"
 )
 
 
