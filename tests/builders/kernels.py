@@ -28,8 +28,10 @@ print(json.dumps([kernels(), features()]))
 
 def kernels() -> list[str]:
     """The kernels that the copies of OpenBLAS in this process run; none where NumPy has another library."""
+    import numpy as np  # loads its OpenBLAS
     import threadpoolctl
 
+    assert np.__version__
     copies: list[dict[str, Any]] = threadpoolctl.threadpool_info()
     reported = {copy["architecture"] for copy in copies if copy["internal_api"] == "openblas"}
     return sorted(NAMES.get(name, name) for name in reported)
