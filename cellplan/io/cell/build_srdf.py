@@ -41,7 +41,7 @@ def apply_srdfs(
     found, robots = dict(models), dict(valid.robots)
     for name, model in models.items():
         entry = valid.robots[name]
-        srdf = None if entry.srdf is None else sources.srdf(name, entry.srdf)
+        srdf = None if entry.srdf is None else sources.srdf(name, entry.srdf, entry)
         try:
             if srdf is not None:
                 from cellplan.io.robots.urdf.srdf import disabled_bodies, unknown_links

@@ -2,7 +2,8 @@
 
 import os
 import posixpath
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -32,6 +33,7 @@ from cellplan.model.task import SampledPath, TimedPath
 if TYPE_CHECKING:  # read only for a cell that names such a file
     from cellplan.io.robots.urdf.gripper import GripperState
     from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot
+    from cellplan.io.robots.urdf.moveit_limits import MoveitLimits
     from cellplan.io.robots.urdf.srdf import Srdf
 
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
@@ -119,16 +121,27 @@ class Sources:
         except InputError as error:
             self.findings.append(self._document.finding(path, str(error)))
 
-    def srdf(self, name: str, written: str) -> "Srdf | None":
-        """SRDF of a robot; None after a finding."""
+    def srdf(self, name: str, written: str, entry: RobotEntry) -> "Srdf | None":
+        """SRDF of a robot, expanded with its packages and arguments; None after a finding."""
         from cellplan.io.robots.urdf.srdf import read_srdf
+        from cellplan.io.robots.urdf.xacro import XacroSettings
 
-        place = self._file(written, ("robots", name, "srdf"))
-        if place is None:
+        path: KeyPath = ("robots", name, "srdf")
+        place, folders = self._file(written, path), self._package_dirs(name, entry)
+        if place is None or folders is None:
             return None
+        arguments = _arguments(entry)
+        settings = XacroSettings(
+            arguments=arguments,
+            package_dirs=folders,
+            within=self._folders,
+            elsewhere=frozenset(arguments) if _is_xacro(entry.model) else frozenset(),
+        )
         try:
-            srdf = in_child(read_srdf, place, guard=Guard(file=written, worker="the SRDF reader"))
+            srdf = in_child(read_srdf, place, settings, guard=Guard(file=written, worker="the SRDF reader"))
             self.inputs[written] = digest_of_file(place, file=written)
+            self.remarks += [(key_text(path), remark) for remark in srdf.remarks]
+            self._note_files(written, place, srdf.included)
         except InputError as error:
             self.errors.append(error)
             return None
@@ -205,29 +218,19 @@ class Sources:
 
     def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
         """Model from a URDF and its meshes."""
-        from cellplan.io.robots.urdf.load import UrdfOptions
-
         path = ("robots", name, "model")
         place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
         if place is None or folders is None:
             return None
-        rail = entry.mount.rail.name if entry.mount is not None and entry.mount.rail is not None else None
-        options = UrdfOptions(
-            flange=entry.flange,
-            package_dirs=folders,
-            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items() if joint != rail},
-            locked={joint: at.si for joint, at in entry.locked_joints.items()},
-            lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
-            locks_others=entry.locks_others,
-            within=self._folders,
-            xacro_args={key: argument_text(value) for key, value in entry.xacro_args.items()},
-            gripper=_gripper_state(entry.gripper),
-        )
-        if entry.xacro_args and place.suffix.lower() != XACRO_SUFFIX:
+        moveit = self._moveit_limits(name, entry)
+        options = replace(self._urdf_options(entry, folders), moveit=moveit) if moveit is not None else None
+        if options is None:
+            return None
+        if entry.xacro_args and not (_is_xacro(entry.model) or _is_xacro(entry.srdf)):
             text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
             self.findings.append(self._document.key_finding(("robots", name, "xacro_args"), text))
         try:
-            robot = _read_urdf(self._urdfs, entry.model, place, options=options)
+            robot = _read_urdf(self._urdfs, entry, place, options=options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             self.remarks += [(key_text(path), remark) for remark in robot.remarks]
             for file in (*robot.included, *robot.mesh_files):
@@ -235,13 +238,57 @@ class Sources:
                     text = f"expected files below the folder of the cell file, got {shown(file.name)} from elsewhere"
                     self.findings.append(self._document.finding(path, f"{text}; allow it with --allow-dir"))
                     return None
-                way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
-                key = posixpath.normpath(posixpath.join(posixpath.dirname(entry.model), way))
-                self.inputs[key] = digest_of_file(file, file=file.name)
+            self._note_files(entry.model, place, (*robot.included, *robot.mesh_files))
         except InputError as error:
             self.errors.append(error)
             return None
         return robot.model
+
+    def _urdf_options(self, entry: RobotEntry, folders: tuple[Path, ...]) -> "UrdfOptions":
+        """What the cell adds to a URDF."""
+        from cellplan.io.robots.urdf.load import UrdfOptions
+        from cellplan.io.robots.urdf.xacro import argument_names
+
+        rail = entry.mount.rail.name if entry.mount is not None and entry.mount.rail is not None else None
+        srdf = self._folders.folder / (entry.srdf or "")
+        return UrdfOptions(
+            flange=entry.flange,
+            package_dirs=folders,
+            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items() if joint != rail},
+            locked={joint: at.si for joint, at in entry.locked_joints.items()},
+            lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
+            locks_others=entry.locks_others,
+            within=self._folders,
+            xacro_args=_arguments(entry),
+            xacro_elsewhere=argument_names(srdf)
+            if _is_xacro(entry.srdf) and self._folders.holds(srdf)
+            else frozenset(),
+            gripper=_gripper_state(entry.gripper),
+        )
+
+    def _moveit_limits(self, name: str, entry: RobotEntry) -> "MoveitLimits | None":
+        """Limits that MoveIt states for a robot; None after a finding."""
+        from cellplan.io.robots.urdf.moveit_limits import MoveitLimits, read_moveit_limits
+
+        if entry.moveit_limits is None:
+            return MoveitLimits(file="")
+        place = self._file(entry.moveit_limits, ("robots", name, "moveit_limits"))
+        if place is None:
+            return None
+        try:
+            limits = read_moveit_limits(place, str(place))
+            self.inputs[entry.moveit_limits] = digest_of_file(place, file=entry.moveit_limits)
+        except InputError as error:
+            self.errors.append(error)
+            return None
+        return limits
+
+    def _note_files(self, written: str, place: Path, files: Iterable[Path]) -> None:
+        """Keep the digests of what a file reads in turn, by the paths from the cell."""
+        for file in files:
+            way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
+            key = posixpath.normpath(posixpath.join(posixpath.dirname(written), way))
+            self.inputs[key] = digest_of_file(file, file=file.name)
 
     def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
         """Folders for ``package://``; None after a finding."""
@@ -257,22 +304,34 @@ class Sources:
 
 def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
     """Keys that say something about a URDF."""
-    for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "gripper"):
+    for key in ("package_dirs", "xacro_args", "flange", "locked", "srdf", "moveit_limits", "gripper"):
         if getattr(entry, key):
             yield document.key_finding(("robots", name, key), "unexpected key, it applies to a URDF only")
 
 
-def _read_urdf(known: "dict[Hashable, UrdfRobot]", written: str, place: Path, *, options: "UrdfOptions") -> "UrdfRobot":
+def _read_urdf(
+    known: "dict[Hashable, UrdfRobot]", entry: RobotEntry, place: Path, *, options: "UrdfOptions"
+) -> "UrdfRobot":
     """Robot of a URDF; robots that say the same of the same file share one."""
     from cellplan.io.robots.urdf.load import load_urdf
 
     locked = _items(options.locked), _items(options.lock_units), options.locks_others, options.gripper
-    limits, arguments = _items(options.limits), _items(options.xacro_args)
-    key = (written, place, options.flange, options.package_dirs, limits, locked, arguments)
+    limits, arguments = (_items(options.limits), entry.moveit_limits), (_items(options.xacro_args), entry.srdf)
+    key = (entry.model, place, options.flange, options.package_dirs, limits, locked, arguments)
     if key not in known:
-        guard = Guard(file=written, worker="the URDF reader")
+        guard = Guard(file=entry.model, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
+
+
+def _is_xacro(written: str | None) -> bool:
+    """Whether the name of a file is one of xacro."""
+    return written is not None and PurePosixPath(written).suffix.lower() == XACRO_SUFFIX
+
+
+def _arguments(entry: RobotEntry) -> dict[str, str]:
+    """Values of the arguments of xacro files as their texts say them."""
+    return {key: argument_text(value) for key, value in entry.xacro_args.items()}
 
 
 def argument_text(value: str | float) -> str:

@@ -26,7 +26,7 @@ from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalE
 from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
 from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
 
-LARGEST_JOINT_DEG: Final = 720.0  # 4 pi rad: a wider range is a wrong unit
+LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
 FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
@@ -229,8 +229,13 @@ class RobotEntry(Entry):
     )
     srdf: Text | None = Field(
         default=None,
-        description="Path of an SRDF for a URDF: pairs of its links that are not checked against each other, and named "
-        "configurations for start and home.",
+        description="Path of an SRDF (.srdf, .xacro) for a URDF: pairs of its links that are not checked against each "
+        "other, and named configurations for start and home.",
+    )
+    moveit_limits: Text | None = Field(
+        default=None,
+        description="Path of a joint_limits.yaml of MoveIt for a URDF: limits by joint name, of which the tighter one "
+        "counts beside those of the URDF.",
     )
     gripper: GripperEntry | None = Field(
         default=None, description="The gripper that a URDF brings along: how far it is open, and what may work."

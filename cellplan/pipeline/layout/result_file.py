@@ -10,7 +10,7 @@ from cellplan.io.input.files import digest, read_regular_file
 from cellplan.model.cell import Cell
 
 BEST: Final = "best.yaml"
-NAMING: Final = frozenset({"model", "mesh", "csv", "file", "srdf"})  # keys whose values may name files
+NAMING: Final = frozenset({"model", "mesh", "csv", "file", "srdf", "moveit_limits"})  # keys whose values may name files
 FOLDERS: Final = frozenset({"package_dirs"})
 MAX_BYTES: Final = 2_000_000_000
 

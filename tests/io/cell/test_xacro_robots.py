@@ -31,6 +31,7 @@ def test_arguments_reach_the_file_and_all_that_was_read_has_a_digest(load: Load)
             "segment.xacro:6: joint 'upper_joint': attribute 'damping' of <limit> is not known and was not read "
             "(and 1 more)",
         ),
+        ("robots.worker.model", "arm.urdf.xacro: known, but not used: effort of <limit>"),
     )
     sizes = Path("sizes.yaml")
     sizes.write_text(sizes.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
@@ -67,8 +68,8 @@ def test_the_written_cell_reads_back_with_its_arguments(load: Load) -> None:
         ),
         (
             "model: arm.urdf.xacro",
-            "arm.urdf.xacro:4: no package 'arm_support' in package_dirs (none) or above the file: name the folder "
-            "that holds it in `package_dirs`",
+            "arm.urdf.xacro:4: no package 'arm_support', looked through {folder}: name the folder that holds it in "
+            "`package_dirs`",
         ),
         (
             f"{MODEL}\n    xacro_args: {{length: ../../x}}",
@@ -80,6 +81,7 @@ def test_findings_about_xacro_robots(load: Load, refuse: Refuse, model: str, mes
     path = write_arm(Path.cwd())
     path.with_name("arm.urdf").write_text('<robot name="r"><link name="b"/></robot>', encoding="utf-8")
 
+    message = message.replace("{folder}", str(Path.cwd()))
     assert message in refuse(("model: abb_irb1600", model), PLAIN)
 
 

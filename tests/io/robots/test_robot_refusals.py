@@ -112,8 +112,8 @@ Refuse = Callable[..., list[str]]
         ),
         (
             "weights: [1, 1, 1, 1, 1, 1]",
-            "limits: {A3: {upper_deg: 1000}}",
-            "c:11: robots.worker.limits.A3.upper_deg: expected a number of degrees of at most 720, got 1000",
+            "limits: {A3: {upper_deg: 10000}}",
+            "c:11: robots.worker.limits.A3.upper_deg: expected a number of degrees of at most 3600, got 10000",
         ),
         (
             "weights: [1, 1, 1, 1, 1, 1]",

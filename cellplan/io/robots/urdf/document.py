@@ -11,20 +11,16 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.io.input.findings import did_you_mean, shown
+from cellplan.io.input.findings import did_you_mean, listed, shown
 from cellplan.io.robots.urdf import XACRO_SUFFIX
 from cellplan.io.robots.urdf.remarks import Remarks
-from cellplan.io.robots.urdf.spelling import check_spelling
-from cellplan.io.robots.urdf.xacro import XacroSettings, expand_xacro
-from cellplan.io.robots.urdf.xml import Element, origin_of, read_xml
+from cellplan.io.robots.urdf.spelling import check_spelling, unused_names
+from cellplan.io.robots.urdf.stated_limits import UrdfLimit, read_limit, without_slips_of_unit
+from cellplan.io.robots.urdf.xacro import XacroSettings, read_elements
+from cellplan.io.robots.urdf.xml import Element, origin_of
 
 MAX_LINKS: Final = 1000  # a humanoid with two hands has 130
 MAX_SIZE: Final = 20.0  # [m] larger bodies are a wrong unit
-MAX_RANGE: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are mistakes of the unit
-MAX_TRAVEL: Final = 20.0  # [m]
-MAX_TURN_SPEED: Final = 100.0  # [rad/s] the fastest wrists reach 20
-MAX_TRAVEL_SPEED: Final = 10.0  # [m/s]
-INFINITE: Final = frozenset(sign + word for sign in ("", "+", "-") for word in ("inf", "infinity"))
 NAME: Final = re.compile(r"[A-Za-z0-9_/][A-Za-z0-9_./-]{0,119}")  # joints that are driven have stricter ones
 MOVABLE: Final = ("revolute", "continuous", "prismatic")
 REFUSED: Final = ("floating", "planar")
@@ -65,22 +61,6 @@ class UrdfMimic:
     leader: str
     multiplier: float
     offset: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UrdfLimit:
-    """Limits as far as the file gives usable ones, in [rad] or [m]."""
-
-    lower: float | None = None  # lowest position
-    upper: float | None = None  # highest position
-    velocity: float | None = None  # largest velocity
-    position_fault: str = ""  # what is wrong with the positions of the file, if they were not taken for that
-    velocity_fault: str = ""  # what is wrong with its velocity, if it was not taken for that
-
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Lowest and highest position; infinite where the file gives none."""
-        return -np.inf if self.lower is None else self.lower, np.inf if self.upper is None else self.upper
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,10 +113,7 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
         InputError: With file and line, for anything that is missing, double, misspelt, out of range or not supported.
     """
     remarks = Remarks()
-    if path.suffix.lower() == XACRO_SUFFIX:
-        root, included = expand_xacro(path, settings or XacroSettings(), remarks)
-    else:
-        root, included = read_xml(path), None
+    root, included = read_elements(path, settings, remarks)
     if root.tag != "robot":
         raise root.error(f"expected a URDF with the root element <robot>, got <{shown(root.tag)[1:-1]}>")
     for element in root.walk(frozenset()):
@@ -147,11 +124,16 @@ def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocu
     check_spelling(root.all("link"), root.all("joint"), remarks)
     _leave_out_nameless_meshes(root.all("link"), remarks)
     links = _by_name(_link(element) for element in root.all("link"))
-    joints = _by_name(_joint(element) for element in root.all("joint"))
+    joints = _by_name(_joint(element, remarks) for element in root.all("joint"))
+    turning = [(it.name, it.element, it.limit) for it in joints.values() if it.kind == "revolute"]
+    for (name, *_), limit in zip(turning, without_slips_of_unit(turning, remarks), strict=True):
+        joints[name] = replace(joints[name], limit=limit)
     if not 1 <= len(links) <= MAX_LINKS:
         hint = ": is it a file of macros that others include?" if included is not None and not links else ""
         raise InputError(f"{path.name}: expected 1 to {MAX_LINKS} links, got {len(links)}{hint}")
     _require_nothing_hidden(root, links, joints)
+    if unused := list(dict.fromkeys(unused_names(root))):
+        remarks.add("unused", f"{path.name}: known, but not used: {listed(unused)}")
     return UrdfDocument(
         file=path.name, name=_name(root), links=links, joints=joints, remarks=remarks.lines, included=included or ()
     )
@@ -259,7 +241,7 @@ def _scale(element: Element, owner: str) -> tuple[float, float, float]:
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
-def _joint(element: Element) -> UrdfJoint:
+def _joint(element: Element, remarks: Remarks) -> UrdfJoint:
     """One joint."""
     name = _name(element)
     owner = f"joint '{name}'"
@@ -284,7 +266,7 @@ def _joint(element: Element) -> UrdfJoint:
         child=child,
         X_PJ=origin_of(element, owner),
         axis_J=np.array([1.0, 0.0, 0.0]) if kind == "fixed" else _axis(element, owner),
-        limit=_limit(element, owner, kind=kind),
+        limit=read_limit(element, owner, kind=kind, remarks=remarks),
         mimic=None if kind == "fixed" else _mimic(element, owner),
     )
 
@@ -299,43 +281,6 @@ def _axis(element: Element, owner: str) -> Array:
     if not 1e-6 < length < 1e6:
         raise axis.error(f"{owner}: expected an axis that is not zero, got {shown(axis.attributes['xyz'])}")
     return vector / length
-
-
-def _limit(element: Element, owner: str, *, kind: str) -> UrdfLimit:
-    """Limits; what leaves no room, is not positive or is beyond all machines counts as not given."""
-    limit = element.one("limit", owner)
-    if limit is None or kind == "fixed":
-        return UrdfLimit()
-    velocity = _bound(limit, "velocity", owner)
-    fastest, unit = (MAX_TRAVEL_SPEED, "m/s") if kind == "prismatic" else (MAX_TURN_SPEED, "rad/s")
-    if velocity > fastest:
-        hint = "mm/s" if kind == "prismatic" else "deg/s"
-        fault = f"expected a velocity limit of at most {fastest:g} {unit}, got {velocity:g} {unit} (is it in {hint}?)"
-        speed = UrdfLimit(velocity_fault=fault)
-    else:
-        speed = UrdfLimit(velocity=velocity if velocity > 0.0 else None)
-    if kind == "continuous":
-        return speed
-    lower, upper = (_bound(limit, name, owner) for name in ("lower", "upper"))
-    fault = _position_fault(lower, upper, slides=kind == "prismatic")
-    if fault or lower == upper:
-        return replace(speed, position_fault=fault)
-    return replace(speed, lower=lower, upper=upper)
-
-
-def _bound(limit: Element, name: str, owner: str) -> float:
-    """One limit, which may be infinite; zero when it is absent."""
-    written = limit.attributes.get(name, "").strip().lower()
-    return float(written) if written in INFINITE else limit.number(name, owner, default=0.0)
-
-
-def _position_fault(lower: float, upper: float, *, slides: bool) -> str:
-    """What is wrong with a pair of position limits: their order, or their unit; empty for nothing."""
-    largest = max(abs(lower), abs(upper))
-    if largest > (MAX_TRAVEL if slides else MAX_RANGE):
-        hint = "20 m, got {:g} m (is the unit mm?)" if slides else "two turns, got {:g} rad (is the unit degrees?)"
-        return f"expected position limits within {hint.format(largest)}"
-    return f"expected 'lower' below 'upper', got {lower:g} and {upper:g}" if lower > upper else ""
 
 
 def _mimic(element: Element, owner: str) -> UrdfMimic | None:

@@ -1,7 +1,7 @@
 """Joint limits: those of the URDF, tightened or supplied by the cell."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -26,6 +26,8 @@ class Range:
     lower: float
     upper: float
     velocity: float
+    acceleration: float | None = None
+    jerk: float | None = None
     rated_velocity: float | None = None
 
 
@@ -75,34 +77,36 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     Raises:
         InputError: A limit is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
-    own = _own(joint)
+    own = joint.limit.stated
     for key, text in limit_findings(own, cell, is_revolute=joint.kind != "prismatic"):
         raise joint.error(f"{key}: {text}")
     limits = tightest(own, cell)
-    lower, upper = _endless(joint, cell) if cell.wraps else (limits.lower, limits.upper)
-    if lower is None or upper is None or limits.velocity is None:
+    if cell.wraps:
+        lowest, highest = _endless(joint, cell)
+        limits = replace(limits, lower=lowest, upper=highest)
+    for follower in followers:
+        limits = tightest(limits, _through(follower))
+    lower, upper, velocity = limits.lower, limits.upper, limits.velocity
+    if lower is None or upper is None or velocity is None:
         raise lacking_error([_lacking(joint, cell)])
-    velocity = limits.velocity
     if not velocity > 0.0:
         raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, velocity, '/s')}")
-    for follower in followers:
-        lower, upper, velocity = _within_follower(follower, lower, upper, velocity=velocity)
     if not lower < upper:
         ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected a lower limit below the upper one, got {ends}")
     return Range(
-        lower=lower, upper=upper, velocity=velocity, rated_velocity=None if cell.velocity is None else own.velocity
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
+        acceleration=limits.acceleration,
+        jerk=limits.jerk,
+        rated_velocity=None if cell.velocity is None else own.velocity,
     )
-
-
-def _own(joint: UrdfJoint) -> StatedLimits:
-    """Limits of the URDF."""
-    return StatedLimits(lower=joint.limit.lower, upper=joint.limit.upper, velocity=joint.limit.velocity)
 
 
 def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
     """What one joint lacks; no keys where it is complete."""
-    limits, unit = tightest(_own(joint), cell), unit_of(joint).name
+    limits, unit = tightest(joint.limit.stated, cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
     reasons = [joint.limit.position_fault or _range_reason(joint)] if ends else []
@@ -134,14 +138,13 @@ def _endless(joint: UrdfJoint, cell: StatedLimits) -> tuple[float, float]:
     return -np.inf, np.inf
 
 
-def _within_follower(follower: UrdfJoint, lower: float, upper: float, *, velocity: float) -> tuple[float, float, float]:
-    """Limits of a leader that keep its follower within its own."""
-    mimic, limit = follower.mimic, follower.limit
+def _through(follower: UrdfJoint) -> StatedLimits:
+    """Limits of a leader that keep its follower within the follower's own."""
+    mimic, limit = follower.mimic, follower.limit.stated
     if mimic is None or mimic.multiplier == 0.0:
-        return lower, upper, velocity
-    if limit.lower is not None and limit.upper is not None:
-        ends = sorted(((end - mimic.offset) / mimic.multiplier) for end in (limit.lower, limit.upper))
-        lower, upper = max(lower, ends[0]), min(upper, ends[1])
-    if limit.velocity is not None:
-        velocity = min(velocity, limit.velocity / abs(mimic.multiplier))
-    return lower, upper, velocity
+        return StatedLimits()
+    ratio = mimic.multiplier
+    ends = [None if end is None else (end - mimic.offset) / ratio for end in (limit.lower, limit.upper)]
+    lower, upper = ends if ratio > 0.0 else reversed(ends)
+    rates = [None if rate is None else rate / abs(ratio) for rate in (limit.velocity, limit.acceleration, limit.jerk)]
+    return StatedLimits(lower=lower, upper=upper, velocity=rates[0], acceleration=rates[1], jerk=rates[2])

@@ -15,6 +15,7 @@ from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_docum
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
 from cellplan.io.robots.urdf.locks import require_sound_locks, rest_position, unlocked_error, unlocked_joints
+from cellplan.io.robots.urdf.moveit_limits import MoveitLimits, with_moveit_limits
 from cellplan.io.robots.urdf.tree import (
     Roles,
     UrdfTree,
@@ -53,13 +54,20 @@ class UrdfOptions:
     locks_others: bool = False
     lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
+    moveit: MoveitLimits = field(default_factory=lambda: MoveitLimits(file=""))  # limits that MoveIt states
     xacro_args: Mapping[str, str] = field(default_factory=dict)  # values of the arguments of a xacro file, by name
+    xacro_elsewhere: frozenset[str] = frozenset()  # names of those that another file of the robot takes
     gripper: GripperState | None = None  # how far its gripper is open; None to leave its joints to ``locked``
 
     @property
     def xacro(self) -> XacroSettings:
         """What a xacro file needs to be expanded."""
-        return XacroSettings(arguments=self.xacro_args, package_dirs=self.package_dirs, within=self.within)
+        return XacroSettings(
+            arguments=self.xacro_args,
+            package_dirs=self.package_dirs,
+            within=self.within,
+            elsewhere=self.xacro_elsewhere,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +110,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
-    tree = build_tree(read_document(path, options.xacro))
+    tree = build_tree(with_moveit_limits(read_document(path, options.xacro), options.moveit))
     flange = choose_flange(tree, options.flange)
     held = gripper_locks(tree, flange, options.gripper, options.locked)
     structure = urdf_structure(tree, flange, replace(options, locked={**options.locked, **held}))
@@ -208,8 +216,8 @@ def _driven(
         lower=allowed.lower,
         upper=allowed.upper,
         velocity=allowed.velocity,
-        acceleration=stated.acceleration,
-        jerk=stated.jerk,
+        acceleration=allowed.acceleration,
+        jerk=allowed.jerk,
         rated_velocity=allowed.rated_velocity,
     )
 

@@ -4,7 +4,7 @@ Files of other programs are full of extensions: these are remarks. A name is ref
 that is missing and that the robot needs, as its default would then stand in for what was written.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from cellplan.io.input.findings import did_you_mean
@@ -41,6 +41,13 @@ ATTRIBUTES: Final = {
     "mimic": ("joint", "multiplier", "offset"),
     "mesh": ("filename", "scale"),
 }  # of the elements in which a missing attribute has a default
+UNUSED: Final = {
+    "link": ("inertial",),
+    "visual": ("material",),
+    "collision": ("material",),
+    "joint": ("dynamics", "calibration"),
+}  # elements that are known and say nothing about what is planned or judged here
+UNUSED_ATTRIBUTES: Final = {"limit": ("effort",), "safety_controller": ("k_position", "k_velocity")}
 NEEDED_LIMITS: Final = {"continuous": ("velocity",)}  # of other moving joints the first three
 
 
@@ -71,6 +78,19 @@ def check_spelling(links: Iterable[Element], joints: Iterable[Element], remarks:
         _check_children(joint, NEEDED_CHILDREN["fixed" if kind == "fixed" else "moving"], owner, remarks=remarks)
         for child in joint.children:
             _check_attributes(child, owner, kind=kind, remarks=remarks)
+
+
+def unused_names(root: Element) -> Iterator[str]:
+    """Elements and attributes that are known by name and not used, in the order of the file."""
+    for element in root.children:
+        if element.tag not in ("link", "joint"):
+            yield f"<{element.tag}>"
+            continue
+        for parent in (element, *element.all("visual", "collision")):
+            yield from (f"<{child.tag}>" for child in parent.all(*UNUSED[parent.tag]))
+        for child in element.children if element.tag == "joint" else ():
+            names = UNUSED_ATTRIBUTES.get(child.tag, ())
+            yield from (f"{name} of <{child.tag}>" for name in names if name in child.attributes)
 
 
 def _check_children(element: Element, needed: Iterable[str], owner: str, *, remarks: Remarks) -> None:

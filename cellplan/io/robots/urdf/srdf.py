@@ -9,7 +9,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import listed, shown
-from cellplan.io.robots.urdf.xml import Element, read_xml
+from cellplan.io.robots.urdf import XACRO_SUFFIX
+from cellplan.io.robots.urdf.remarks import Remarks
+from cellplan.io.robots.urdf.xacro import XacroSettings, read_elements
+from cellplan.io.robots.urdf.xml import Element
 from cellplan.model.robot import RobotModel
 
 
@@ -38,6 +41,8 @@ class Srdf:
     file: str  # name in messages
     pairs: tuple[DisabledPair, ...]  # pairs of links that are disabled
     configurations: tuple[NamedConfiguration, ...]
+    included: tuple[Path, ...] = ()  # files that a xacro file includes, each once
+    remarks: tuple[str, ...] = ()  # what was not read, one line for each kind
 
     @property
     def configuration_names(self) -> tuple[str, ...]:
@@ -51,13 +56,18 @@ class Srdf:
         )
 
 
-def read_srdf(path: Path) -> Srdf:
+def read_srdf(path: Path, settings: XacroSettings | None = None) -> Srdf:
     """Read the disabled pairs and the named configurations of an SRDF; groups, end effectors and the like are not used.
+
+    Args:
+        path: The file; one whose name ends in ``.xacro`` is expanded.
+        settings: What a xacro file needs to be expanded.
 
     Raises:
         InputError: With file and line: it is no plain SRDF, or an entry that is used is incomplete.
     """
-    root = read_xml(path)
+    remarks = Remarks()
+    root, included = read_elements(path, settings, remarks)
     if root.tag != "robot":
         raise root.error(f"expected an SRDF, whose root element is <robot>, got <{root.tag}>")
     link = next((child for child in root.children if child.tag == "link"), None)
@@ -65,7 +75,7 @@ def read_srdf(path: Path) -> Srdf:
         raise link.error("expected an SRDF, got a URDF, with <link>")
     macro = next((child for child in root.children if child.tag.startswith("xacro:")), None)
     if macro is not None:
-        raise macro.error(f"expected a plain SRDF, got <{macro.tag}>: expand it first")
+        raise macro.error(f"expected a plain SRDF, got <{macro.tag}>: let its name end in {XACRO_SUFFIX}")
     pairs = tuple(
         DisabledPair(
             links=(pair.text("link1", pair.tag), pair.text("link2", pair.tag)),
@@ -73,7 +83,16 @@ def read_srdf(path: Path) -> Srdf:
         )
         for pair in root.all("disable_collisions")
     )
-    return Srdf(file=path.name, pairs=pairs, configurations=tuple(map(_configuration, root.all("group_state"))))
+    configurations = tuple(map(_configuration, root.all("group_state")))
+    if included is not None and not pairs and not configurations:
+        remarks.add("empty", f"{path.name}: has no pairs and no configurations: is it a file of macros for others?")
+    return Srdf(
+        file=path.name,
+        pairs=pairs,
+        configurations=configurations,
+        included=included or (),
+        remarks=remarks.lines,
+    )
 
 
 def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str], ...]:

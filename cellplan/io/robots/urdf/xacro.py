@@ -22,16 +22,18 @@ from cellplan.errors import InputError
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.files import read_regular_file
 from cellplan.io.input.findings import did_you_mean, listed, shown
+from cellplan.io.robots.urdf import XACRO_SUFFIX
 from cellplan.io.robots.urdf.expressions import REFUSED_SYMBOLS, evaluated
 from cellplan.io.robots.urdf.packages import Packages
 from cellplan.io.robots.urdf.remarks import Remarks
-from cellplan.io.robots.urdf.xml import MAX_BYTES, MAX_DEPTH, Element, parse_xml
+from cellplan.io.robots.urdf.xml import MAX_BYTES, MAX_DEPTH, Element, parse_xml, read_xml
 
 INSTALL: Final = 'pip install "cellplan[xacro]"'
 PACKAGE: Final = "/:package:/"  # begins the path of a file in a package, until the file is read
 PACKAGE_PATH: Final = re.compile(f"(?:file:/*?)?{PACKAGE}")  # ``file://$(find NAME)/`` and ``file:///$(find NAME)/``
 PLACE: Final = "place"  # of a node in its file, kept by copies of the node
 LONGEST_REASON: Final = 200  # characters of what xacro says
+DECLARED: Final = re.compile(rb"<xacro:arg\s[^>]*?name=[\"']([^\"']+)")
 ARGUMENT: Final = re.compile(rb"\$\(arg\s+([^\s)]+)\s*\)")
 NAMESPACE: Final = 'xacro needs xmlns:xacro="http://www.ros.org/wiki/xacro" in the root element'
 BUILT_IN: Final = frozenset({"open", "eval"})  # of Python, which xacro calls
@@ -45,6 +47,30 @@ class XacroSettings:
     arguments: Mapping[str, str] = field(default_factory=dict)  # values of its arguments by name
     package_dirs: tuple[Path, ...] = ()  # folders in which ``$(find NAME)`` looks for packages
     within: AllowedFolders | None = None  # folders that all files it reads must lie in; None for all
+    elsewhere: frozenset[str] = frozenset()  # names of arguments that another file of the robot takes
+
+
+def read_elements(
+    path: Path, settings: XacroSettings | None, remarks: Remarks
+) -> tuple[Element, tuple[Path, ...] | None]:
+    """The root element of an XML file, and what a xacro file includes; None for a file that is none.
+
+    Args:
+        path: The file; one whose name ends in ``.xacro`` is expanded.
+        settings: What a xacro file needs to be expanded.
+        remarks: Takes the warnings of xacro.
+    """
+    if path.suffix.lower() == XACRO_SUFFIX:
+        return expand_xacro(path, settings or XacroSettings(), remarks)
+    return read_xml(path), None
+
+
+def argument_names(path: Path) -> frozenset[str]:
+    """Names of the arguments that a xacro file takes, as far as they stand in the file itself."""
+    text = read_regular_file(path, file=path.name, limit=MAX_BYTES)
+    return frozenset(
+        name.decode(errors="replace") for pattern in (DECLARED, ARGUMENT) for name in pattern.findall(text)
+    )
 
 
 def expand_xacro(path: Path, settings: XacroSettings, remarks: Remarks) -> tuple[Element, tuple[Path, ...]]:
@@ -224,9 +250,8 @@ class _Expansion:
             cure = f"state it as `xacro_args: {{{empty[0] if len(empty) == 1 else 'NAME'}: …}}`"
             raise InputError(f"expected the path of a file, got an empty one: {cure}, counted from the cell file")
         beside = Path(self._xacro.filestack[-1] or ".").parent / filename
-        if not any(
-            filename == value or filename.startswith(f"{value}/") for value in self._settings.arguments.values()
-        ):
+        values = [value for value in self._settings.arguments.values() if value]
+        if not any(f"{filename}/".startswith(f"{value}/") for value in values) or Path(filename).is_absolute():
             return str(beside)
         within = self._settings.within
         place = (Path() if within is None else within.folder).absolute() / filename
@@ -250,7 +275,7 @@ class _Expansion:
     def _require_known_arguments(self) -> None:
         """The cell gives no argument that none of the files declares."""
         for name in self._settings.arguments:
-            if name not in self._declared:
+            if name not in self._declared | self._settings.elsewhere:
                 known = sorted(self._declared)
                 hint = did_you_mean(name, known) or f", expected one of: {listed(known)}"
                 raise InputError(f"{self._path.name}: xacro_args: unknown argument {shown(name)}{hint}")

@@ -109,6 +109,17 @@ def test_a_path_that_only_lies_beside_the_macros_is_read_with_a_remark(tmp_path:
     )
 
 
+def test_values_that_are_no_paths_lead_nowhere(tmp_path: Path) -> None:
+    """Neither an empty prefix nor a text that some file happens to begin with; absolute paths stay as they are."""
+    path = write_arm(tmp_path)
+    settings = XacroSettings(
+        arguments={"prefix": "", "length": "0.5"},
+        package_dirs=(tmp_path / "packages",),
+        within=AllowedFolders(folder=tmp_path),
+    )
+    assert not any("xacro_args" in remark for remark in read_document(path, settings).remarks)
+
+
 def test_an_empty_path_is_named_with_its_argument(tmp_path: Path) -> None:
     message = refused(tmp_path, *LONG_ARM, args={"lengths": ""})
     assert message == (

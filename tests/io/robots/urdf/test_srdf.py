@@ -1,16 +1,19 @@
 """SRDFs: disabled pairs become pairs of link bodies, named configurations joint positions, the rest is refused."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.urdf_texts import FINGERS, HAND_ARM, LIMIT, boxed, joint, write_urdf
+from builders.urdf_texts import ARM, FINGERS, HAND_ARM, LIMIT, boxed, joint, write_urdf
+from builders.xacro_texts import HEAD
 
 from cellplan.errors import InputError
 from cellplan.io.robots.urdf.gripper import GripperState
 from cellplan.io.robots.urdf.load import UrdfOptions, read_urdf
 from cellplan.io.robots.urdf.srdf import Srdf, configuration_of, disabled_bodies, read_srdf
+from cellplan.model.cell import Cell
 from cellplan.model.robot import RobotModel
 
 READY = (
@@ -132,7 +135,10 @@ def test_limits_of_the_cell_count(tmp_path: Path, model: RobotModel) -> None:
     ("text", "said"),
     [
         ("<srdf/>", "arm.srdf:1: expected an SRDF, whose root element is <robot>, got <srdf>"),
-        ("<robot>\n<xacro:macro/></robot>", "arm.srdf:2: expected a plain SRDF, got <xacro:macro>: expand it first"),
+        (
+            "<robot>\n<xacro:macro/></robot>",
+            "arm.srdf:2: expected a plain SRDF, got <xacro:macro>: let its name end in .xacro",
+        ),
         (
             '<robot>\n<disable_collisions link1="a"/></robot>',
             "arm.srdf:2: disable_collisions: expected <disable_collisions> with the attribute 'link2'",
@@ -153,3 +159,71 @@ def test_what_is_no_srdf_is_refused(tmp_path: Path, text: str, said: str) -> Non
         read_srdf(path)
 
     assert str(caught.value) == said
+
+
+SRDF_MACRO = f"""\
+{HEAD}
+<xacro:arg name="prefix" default=""/>
+<xacro:include filename="$(find arm_moveit)/srdf/macro.xacro"/>
+<xacro:arm_srdf prefix="$(arg prefix)"/>
+</robot>
+"""
+MACRO = f"""\
+{HEAD}
+<xacro:macro name="arm_srdf" params="prefix">
+  <group_state name="ready" group="arm"><joint name="${{prefix}}a1" value="${{pi / 6}}"/></group_state>
+  <disable_collisions link1="${{prefix}}base" link2="${{prefix}}tip" reason="Adjacent"/>
+</xacro:macro>
+</robot>
+"""
+
+
+def write_macros(folder: Path) -> None:
+    """``arm.srdf.xacro`` and the package that it takes its macro from, as makers ship them."""
+    package = folder / "arm_moveit" / "srdf"
+    package.mkdir(parents=True)
+    (package / "macro.xacro").write_text(MACRO, encoding="utf-8")
+    (folder / "arm.srdf.xacro").write_text(SRDF_MACRO, encoding="utf-8")
+
+
+def test_an_srdf_of_macros_says_what_its_text_says(load: Callable[..., Cell], tmp_path: Path) -> None:
+    write_macros(tmp_path)
+    write_urdf(tmp_path, *ARM)
+    keys = "    srdf: arm.srdf.xacro\n    start: ready"
+
+    cell = load(("model: abb_irb1600", "model: arm.urdf"), ("    weights: [1, 1, 1, 1, 1, 1]", keys))
+
+    worker = cell.robot("worker")
+    assert np.degrees(worker.start) == pytest.approx([30.0], abs=1e-9)
+    assert {"arm.srdf.xacro", "arm_moveit/srdf/macro.xacro"} <= set(cell.inputs)
+
+
+@pytest.mark.parametrize("model", ["arm.urdf", "arm.urdf.xacro"])
+def test_arguments_are_those_of_the_robot_and_of_its_srdf(
+    load: Callable[..., Cell], tmp_path: Path, model: str
+) -> None:
+    """The URDF of macros takes ``length``, its SRDF ``prefix``: both are stated in one place, and no other one."""
+    write_macros(tmp_path)
+    lines = (ARM[0].replace("base", "l_base"), ARM[1].replace("tip", "l_tip"), joint("l_a1", "l_base", "l_tip"))
+    text = "\n".join([HEAD, '<xacro:arg name="length" default="1"/>', *lines, "</robot>"])
+    (tmp_path / model).write_text(
+        text if model.endswith("xacro") else text.replace('<xacro:arg name="length" default="1"/>', ""),
+        encoding="utf-8",
+    )
+    both = "{prefix: l_, length: 2}" if model.endswith("xacro") else "{prefix: l_}"
+    keys = "    srdf: arm.srdf.xacro\n    start: ready\n    xacro_args: "
+    new = ("model: abb_irb1600", f"model: {model}")
+
+    cell = load(new, ("    weights: [1, 1, 1, 1, 1, 1]", keys + both))
+
+    assert cell.robot("worker").model.joint_names == ("l_a1",)
+    with pytest.raises(InputError, match="xacro_args: unknown argument 'prefx'"):
+        load(new, ("    weights: [1, 1, 1, 1, 1, 1]", keys + both.replace("prefix", "prefx")))
+
+
+def test_an_srdf_of_macros_that_says_nothing_is_a_remark(tmp_path: Path) -> None:
+    path = tmp_path / "macro.srdf.xacro"
+    path.write_text(MACRO, encoding="utf-8")
+    assert read_srdf(path).remarks == (
+        "macro.srdf.xacro: has no pairs and no configurations: is it a file of macros for others?",
+    )

@@ -31,6 +31,7 @@ def arm(inside: str, kind: str = "revolute") -> tuple[str, ...]:
             (
                 "r.urdf:4: joint 'a1': attribute 'command_effort' of <limit> is not known and was not read",
                 "r.urdf:4: joint 'a1': attribute 'powr' of <limit> is not known and was not read",
+                "r.urdf: known, but not used: effort of <limit>",
             ),
         ),
         (
@@ -54,7 +55,18 @@ def arm(inside: str, kind: str = "revolute") -> tuple[str, ...]:
                 "r.urdf:6: joint 'to': element <limt> is not known and was not read",
             ),
         ),
-        ((*ARM, '<gazebo><link name="x"/></gazebo>', '<transmission name="t"/>'), ()),
+        (
+            (*ARM, '<gazebo><link name="x"/></gazebo>', '<transmission name="t"/>', "<gazebo/>"),
+            ("r.urdf: known, but not used: <gazebo>, <transmission>",),
+        ),
+        (
+            (
+                f'<link name="base"><inertial/><visual>{BOX}<material/></visual></link>',
+                ARM[1],
+                joint("a1", "base", "tip", f'{LIMIT}<dynamics damping="1"/><safety_controller k_velocity="3"/>'),
+            ),
+            ("r.urdf: known, but not used: <inertial>, <material>, <dynamics>, k_velocity of <safety_controller>",),
+        ),
     ],
 )
 def test_unknown_names_are_remarks_one_line_for_each_kind(

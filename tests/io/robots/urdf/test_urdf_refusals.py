@@ -166,7 +166,7 @@ MIMIC = '<mimic joint="{}"/>'
         ),
         (
             [*ARM[:2], joint("a1", "base", "tip", '<limit lower="-170" upper="170" velocity="3"/>')],
-            "r.urdf:4: joint 'a1': expected position limits within two turns, got 170 rad (is the unit degrees?): "
+            "r.urdf:4: joint 'a1': expected position limits within ten turns, got 170 rad (is the unit degrees?): "
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (

@@ -59,6 +59,7 @@ def test_every_file_that_was_read_is_known_and_findings_name_the_line_of_the_mac
     assert robot.remarks == (
         "segment.xacro:6: joint 'left_upper_joint': attribute 'damping' of <limit> is not known and was not read "
         "(and 1 more)",
+        "arm.urdf.xacro: known, but not used: effort of <limit>",
     )
     segment = tmp_path / "packages" / "arm_support" / "urdf" / "segment.xacro"
     segment.write_text(segment.read_text().replace('type="revolute"', 'type="revolut"'), encoding="utf-8")
