@@ -3,7 +3,6 @@
 import os
 import posixpath
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -33,7 +32,6 @@ from cellplan.model.task import SampledPath, TimedPath
 if TYPE_CHECKING:  # read only for a cell that names such a file
     from cellplan.io.robots.urdf.gripper import GripperState
     from cellplan.io.robots.urdf.load import UrdfOptions, UrdfRobot
-    from cellplan.io.robots.urdf.moveit_limits import MoveitLimits
     from cellplan.io.robots.urdf.srdf import Srdf
 
 URDF_SUFFIXES = frozenset({".urdf", XACRO_SUFFIX})
@@ -141,7 +139,7 @@ class Sources:
             srdf = in_child(read_srdf, place, settings, guard=Guard(file=written, worker="the SRDF reader"))
             self.inputs[written] = digest_of_file(place, file=written)
             self.remarks += [(key_text(path), remark) for remark in srdf.remarks]
-            self._note_files(written, place, srdf.included)
+            self.inputs |= _digests(written, place, srdf.included)
         except InputError as error:
             self.errors.append(error)
             return None
@@ -218,18 +216,17 @@ class Sources:
 
     def _urdf(self, name: str, entry: RobotEntry) -> RobotModel | None:
         """Model from a URDF and its meshes."""
-        path = ("robots", name, "model")
+        path, limits = ("robots", name, "model"), entry.moveit_limits
         place, folders = self._file(entry.model, path), self._package_dirs(name, entry)
-        if place is None or folders is None:
-            return None
-        moveit = self._moveit_limits(name, entry)
-        options = replace(self._urdf_options(entry, folders), moveit=moveit) if moveit is not None else None
-        if options is None:
+        moveit = None if limits is None else self._file(limits, ("robots", name, "moveit_limits"))
+        if place is None or folders is None or (moveit is None and limits is not None):
             return None
         if entry.xacro_args and not (_is_xacro(entry.model) or _is_xacro(entry.srdf)):
             text = f"unexpected key, it applies to a file whose name ends in {XACRO_SUFFIX} only"
             self.findings.append(self._document.key_finding(("robots", name, "xacro_args"), text))
         try:
+            options = _urdf_options(entry, folders, moveit, within=self._folders)
+            self.inputs |= {} if moveit is None else {limits or "": digest_of_file(moveit, file=str(moveit))}
             robot = _read_urdf(self._urdfs, entry, place, options=options)
             self.inputs[entry.model] = digest_of_file(place, file=entry.model)
             self.remarks += [(key_text(path), remark) for remark in robot.remarks]
@@ -238,57 +235,11 @@ class Sources:
                     text = f"expected files below the folder of the cell file, got {shown(file.name)} from elsewhere"
                     self.findings.append(self._document.finding(path, f"{text}; allow it with --allow-dir"))
                     return None
-            self._note_files(entry.model, place, (*robot.included, *robot.mesh_files))
+            self.inputs |= _digests(entry.model, place, (*robot.included, *robot.mesh_files))
         except InputError as error:
             self.errors.append(error)
             return None
         return robot.model
-
-    def _urdf_options(self, entry: RobotEntry, folders: tuple[Path, ...]) -> "UrdfOptions":
-        """What the cell adds to a URDF."""
-        from cellplan.io.robots.urdf.load import UrdfOptions
-        from cellplan.io.robots.urdf.xacro import argument_names
-
-        rail = entry.mount.rail.name if entry.mount is not None and entry.mount.rail is not None else None
-        srdf = self._folders.folder / (entry.srdf or "")
-        return UrdfOptions(
-            flange=entry.flange,
-            package_dirs=folders,
-            limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items() if joint != rail},
-            locked={joint: at.si for joint, at in entry.locked_joints.items()},
-            lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
-            locks_others=entry.locks_others,
-            within=self._folders,
-            xacro_args=_arguments(entry),
-            xacro_elsewhere=argument_names(srdf)
-            if _is_xacro(entry.srdf) and self._folders.holds(srdf)
-            else frozenset(),
-            gripper=_gripper_state(entry.gripper),
-        )
-
-    def _moveit_limits(self, name: str, entry: RobotEntry) -> "MoveitLimits | None":
-        """Limits that MoveIt states for a robot; None after a finding."""
-        from cellplan.io.robots.urdf.moveit_limits import MoveitLimits, read_moveit_limits
-
-        if entry.moveit_limits is None:
-            return MoveitLimits(file="")
-        place = self._file(entry.moveit_limits, ("robots", name, "moveit_limits"))
-        if place is None:
-            return None
-        try:
-            limits = read_moveit_limits(place, str(place))
-            self.inputs[entry.moveit_limits] = digest_of_file(place, file=entry.moveit_limits)
-        except InputError as error:
-            self.errors.append(error)
-            return None
-        return limits
-
-    def _note_files(self, written: str, place: Path, files: Iterable[Path]) -> None:
-        """Keep the digests of what a file reads in turn, by the paths from the cell."""
-        for file in files:
-            way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
-            key = posixpath.normpath(posixpath.join(posixpath.dirname(written), way))
-            self.inputs[key] = digest_of_file(file, file=file.name)
 
     def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
         """Folders for ``package://``; None after a finding."""
@@ -322,6 +273,41 @@ def _read_urdf(
         guard = Guard(file=entry.model, worker="the URDF reader")
         known[key] = in_child(as_here(load_urdf), place, options, guard=guard)
     return known[key]
+
+
+def _urdf_options(
+    entry: RobotEntry, package_dirs: tuple[Path, ...], moveit: Path | None, *, within: AllowedFolders
+) -> "UrdfOptions":
+    """What a cell adds to a URDF."""
+    from cellplan.io.robots.urdf.load import UrdfOptions
+    from cellplan.io.robots.urdf.moveit_limits import read_moveit_limits
+    from cellplan.io.robots.urdf.xacro import argument_names
+
+    rail = entry.mount.rail.name if entry.mount is not None and entry.mount.rail is not None else None
+    srdf = within.folder / (entry.srdf or "")
+    return UrdfOptions(
+        flange=entry.flange,
+        package_dirs=package_dirs,
+        limits={joint: limits_in_si(limits) for joint, limits in entry.limits.items() if joint != rail},
+        locked={joint: at.si for joint, at in entry.locked_joints.items()},
+        lock_units={joint: "deg" if isinstance(at, Deg) else "mm" for joint, at in entry.locked_joints.items()},
+        locks_others=entry.locks_others,
+        within=within,
+        moveit=None if moveit is None else read_moveit_limits(moveit, str(moveit)),
+        xacro_args=_arguments(entry),
+        xacro_elsewhere=argument_names(srdf) if _is_xacro(entry.srdf) and within.holds(srdf) else frozenset(),
+        gripper=_gripper_state(entry.gripper),
+    )
+
+
+def _digests(written: str, place: Path, files: Iterable[Path]) -> dict[str, str]:
+    """Digests of what a file reads in turn, by the paths from the cell."""
+    digests = {}
+    for file in files:
+        way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
+        key = posixpath.normpath(posixpath.join(posixpath.dirname(written), way))
+        digests[key] = digest_of_file(file, file=file.name)
+    return digests
 
 
 def _is_xacro(written: str | None) -> bool:

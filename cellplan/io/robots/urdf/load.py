@@ -54,7 +54,7 @@ class UrdfOptions:
     locks_others: bool = False
     lock_units: Mapping[str, str] = field(default_factory=dict)
     within: AllowedFolders | None = None
-    moveit: MoveitLimits = field(default_factory=lambda: MoveitLimits(file=""))  # limits that MoveIt states
+    moveit: MoveitLimits | None = None  # limits that MoveIt states
     xacro_args: Mapping[str, str] = field(default_factory=dict)  # values of the arguments of a xacro file, by name
     xacro_elsewhere: frozenset[str] = frozenset()  # names of those that another file of the robot takes
     gripper: GripperState | None = None  # how far its gripper is open; None to leave its joints to ``locked``

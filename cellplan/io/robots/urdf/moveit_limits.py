@@ -55,12 +55,14 @@ def read_moveit_limits(path: Path, file: str) -> MoveitLimits:
     return MoveitLimits(file=file, joints=joints, unused=tuple(sorted(unused)))
 
 
-def with_moveit_limits(document: UrdfDocument, moveit: MoveitLimits) -> UrdfDocument:
+def with_moveit_limits(document: UrdfDocument, moveit: MoveitLimits | None) -> UrdfDocument:
     """The document whose joints keep the limits of MoveIt too, with remarks on what was not used.
 
     Raises:
         InputError: The robot has none of the joints: the file is another robot's.
     """
+    if moveit is None:
+        return document
     known = {name: limits for name, limits in moveit.joints.items() if name in document.joints}
     if moveit.joints and not known:
         text = f"expected the limits of '{document.name}', got some of none of its joints"
