@@ -14,7 +14,7 @@ from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
-from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.tools.between_checks import (
@@ -224,7 +224,7 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
     for robot in cell.robots:
         own = joint_uses(robot, times, q[robot.name])
         uses += own
-        checks += check_joints(own, times, q[robot.name])
+        checks += [*check_joints(own, times, q[robot.name]), *check_shown(robot, times, q[robot.name])]
     return uses, checks
 
 

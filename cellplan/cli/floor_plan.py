@@ -46,14 +46,17 @@ def floor_plan(  # noqa: PLR0913, PLR0917 - the options of the command
             FloorPlanRequest,
             PlanFormat,
             requested_floor_plan,
+            target_of,
             write_floor_plan,
         )
 
         kind = PlanFormat(_format(form, output))
-        request = FloorPlanRequest(path=path, cell=cell, settings=settings or (), allow_dirs=allow_dir or ())
+        request = FloorPlanRequest(
+            path=path, output=output, form=kind, cell=cell, settings=settings or (), allow_dirs=allow_dir or ()
+        )
         with progress_listener(quiet=quiet) as progress:
             plan = requested_floor_plan(request, progress=progress)
-        target = output or Path("outputs") / f"{plan.cell}-floor-plan.{kind}"
+        target = target_of(request, plan.cell)
         size = write_floor_plan(plan, target, kind)
     if as_json:
         about = {"cell": plan.cell, "drawing": str(target), "format": str(kind), "bytes": size}

@@ -95,12 +95,13 @@ def search_and_say(
         InterruptedWorkError: The search was interrupted.
         Exit: Always, at the end.
     """
-    with ExitStack() as opened:
-        pool = opened.enter_context(_pool(work.workers, request))  # begins while this process imports what follows
-        from cellplan.pipeline.layout.search import search_layout
-        from cellplan.report.text.layout import layout_lines
+    from cellplan.pipeline.layout.search import refuse_search, search_layout
+    from cellplan.report.text.layout import layout_lines
 
-        folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
+    folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
+    refuse_search(request, folder, resume=work.resume)
+    with ExitStack() as opened:
+        pool = opened.enter_context(_pool(work.workers, request))
         progress = opened.enter_context(progress_listener(quiet=quiet))
         try:
             record = search_layout(

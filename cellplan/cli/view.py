@@ -49,10 +49,9 @@ def view(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.pipeline.view.write import ViewRequest, write_view
         from cellplan.pipeline.view.write import view as view_record
 
-        request = ViewRequest(path=path, cell=cell, settings=settings or (), allow_dirs=allow_dir or ())
+        request = ViewRequest(path=path, output=output, cell=cell, settings=settings or (), allow_dirs=allow_dir or ())
         with progress_listener(quiet=quiet) as progress:
-            record, usual = view_record(request, progress=progress)
-        target = output or usual
+            record, target = view_record(request, progress=progress)
         size = write_view(record, target)
     failures = [failure["text"] for scene in record["scenes"][:1] for failure in scene["failures"]]
     if as_json:

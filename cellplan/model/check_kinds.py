@@ -78,6 +78,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("tool_depth", "tool depth in the part within its limit", "Tool too deep in the part", concern=NEAR),
     CheckKind("stop_depth", "tool depth in the part within its limit where a robot stops", "Tool too deep in the part where a robot stops"),
     CheckKind("joint_position", "joint positions within their limits", "Joint beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
+    CheckKind("controller_position", "positions that controllers show within their limits", "Shown position beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("joint_margin", "joints keep the demanded margin", "Joint too near its limit", excess=DISTANCE, concern=LIMIT),
     CheckKind("locked_joint", "failed joints at rest", "Failed joint moves"),
     CheckKind("home", "idle robots at their homes", "Idle robot leaves its home"),

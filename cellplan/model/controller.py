@@ -20,12 +20,15 @@ class ControllerZero:
         sign: Sense s, 1 or -1, shape (n,).
         coupling: Factors k of controller positions of earlier joints, shape (n, n), zero on and above the diagonal.
         source: Where this is known from.
+        limits: Smallest and largest position that the controller allows of what it shows, in [rad] or [m], shape
+            (n, 2), infinite where none is stated; None where none is at all.
     """
 
     zero: Array
     sign: Array
     coupling: Array
     source: str
+    limits: Array | None = None
 
     def __post_init__(self) -> None:
         """Make sure that both conversions exist."""

@@ -33,4 +33,5 @@ def _after_rail(arm: ControllerZero) -> ControllerZero:
         zero=np.concatenate([[0.0], arm.zero]),
         sign=np.concatenate([[1.0], arm.sign]),
         coupling=np.pad(arm.coupling, ((1, 0), (1, 0))),
+        limits=None if arm.limits is None else np.concatenate([[[-np.inf, np.inf]], arm.limits]),
     )

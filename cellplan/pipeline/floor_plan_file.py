@@ -12,7 +12,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.stored import read_stored_run
-from cellplan.io.run.whole_file import replace_own
+from cellplan.io.run.whole_file import refuse_unless_own, replace_own
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.check import check
@@ -22,10 +22,11 @@ from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.view.cell_scene import standing
 from cellplan.pipeline.view.describe import path_points
 from cellplan.pipeline.view.run_scene import stored_series
-from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf
+from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf, require_dxf
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
 
+DRAWING: Final = "floor plan"  # in messages
 OWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
 
 
@@ -42,12 +43,16 @@ class FloorPlanRequest:
 
     Attributes:
         path: A run folder or a cell file.
+        output: The drawing; None for the usual place.
+        form: Its format.
         cell: The cell file of a run that depends on further files; None where the folder is enough.
         settings: Values of a cell file, as ``KEY=VALUE``.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
     """
 
     path: Path
+    output: Path | None = None
+    form: PlanFormat = PlanFormat.SVG
     cell: Path | None = None
     settings: Sequence[str] = field(default=())
     allow_dirs: Sequence[Path] = field(default=())
@@ -56,6 +61,8 @@ class FloorPlanRequest:
 def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = silent) -> FloorPlan:
     """The floor plan of a run with what its motion sweeps, or of a cell file at its start.
 
+    A place that the drawing may not take is refused first, and a format whose package is missing.
+
     Args:
         request: Which run or cell.
         progress: Called with the stage and the fraction done.
@@ -63,6 +70,8 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
     Raises:
         InputError: The path is neither a run nor a cell, or does not fit the options.
     """
+    if request.form is PlanFormat.DXF:
+        require_dxf()
     if request.path.is_dir():
         if request.settings:
             raise InputError(f"--set: expected a cell file with it, got the folder '{request.path}'")
@@ -70,7 +79,18 @@ def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = sile
     if request.cell is not None:
         raise InputError(f"--cell: expected a run with it, got '{request.path}'")
     cell = with_overrides(load_cell(request.path, allow_dirs=request.allow_dirs), request.settings)
+    _refuse_place(request, cell.name)
     return _of_cell(cell, progress)
+
+
+def target_of(request: FloorPlanRequest, cell: str) -> Path:
+    """Where the drawing of a cell of some name is written."""
+    return request.output or Path("outputs") / f"{cell}-floor-plan.{request.form}"
+
+
+def _refuse_place(request: FloorPlanRequest, cell: str) -> None:
+    """Refuse a place that the drawing may not take."""
+    refuse_unless_own(target_of(request, cell), is_own=_is_floor_plan, kind=DRAWING)
 
 
 def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = PlanFormat.SVG) -> int:
@@ -87,7 +107,7 @@ def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = Pla
     """
     kind = PlanFormat(form)
     content = (floor_plan_svg(plan) if kind is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
-    replace_own(target, content, is_own=_is_floor_plan, kind="floor plan")
+    replace_own(target, content, is_own=_is_floor_plan, kind=DRAWING)
     return len(content)
 
 
@@ -103,6 +123,7 @@ def _is_floor_plan(path: Path) -> bool:
 def _of_run(request: FloorPlanRequest) -> FloorPlan:
     """The floor plan of a run on disk."""
     stored = read_stored_run(request.path)
+    _refuse_place(request, stored.manifest.cell)
     cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs).cell
     read = [stored_series(stored, place, cell) for place in stored.records]
     motions = [_by_robot(cell, q) for _, q in read]

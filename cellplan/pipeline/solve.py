@@ -68,10 +68,10 @@ def solve_motion(
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
+    plan = plan_phases(cell, only=task)
     examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)
     started = with_start(cell, choice.start)
-    plan = plan_phases(cell, only=task)
     planned = [plan_run(started, paths, phase, progress=progress) for phase in plan.program]
     solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
     if depends_on_homes(started, planned):

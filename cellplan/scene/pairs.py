@@ -155,8 +155,8 @@ def _index_pairs(bodies: Sequence[SceneBody]) -> Iterator[tuple[int, int]]:
 
 def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int, int], str]:
     """Reasons of the pairs that the cell leaves out, by their indices in order."""
-    index = {body.name: i for i, body in enumerate(bodies)}
-    reasons = {}
+    index = _named_bodies(cell, bodies)
+    reasons: dict[tuple[int, int], str] = {}
     for number, exclusion in enumerate(cell.checks.exclusions):
         where = cell.origin.at(f"checks.exclude[{number}].bodies")
         for name in exclusion.bodies:
@@ -164,11 +164,23 @@ def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int,
                 near = get_close_matches(name, index, n=1)
                 hint = f"; did you mean '{near[0]}'?" if near else f"; the bodies are {', '.join(index)}"
                 raise InputError(f"{where}: expected names of two bodies, got '{name}'{hint}")
-        i, j = sorted(index[name] for name in exclusion.bodies)
-        if i == j:
+        first, second = (index[name] for name in exclusion.bodies)
+        if first == second:
             raise InputError(f"{where}: expected two different bodies, got '{exclusion.bodies[0]}' twice")
-        reasons[i, j] = exclusion.reason
+        reasons |= {(min(i, j), max(i, j)): exclusion.reason for i in first for j in second if i != j}
     return reasons
+
+
+def _named_bodies(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str, tuple[int, ...]]:
+    """Indices by name: of one body, of all bodies of a link by the name of the link, of all of a robot by its own."""
+    index: dict[str, tuple[int, ...]] = {robot.name: () for robot in cell.robots}
+    for robot in cell.robots:
+        own = [(i, body) for i, body in enumerate(bodies) if body.robot == robot.name]
+        index[robot.name] = tuple(i for i, _ in own)
+        for link in robot.model.links:
+            pieces = tuple(i for i, body in own if body.kind is Kind.LINK and body.link == link.index)
+            index |= {f"{robot.name}/{link.name}": pieces} if pieces else {}
+    return {body.name: (i,) for i, body in enumerate(bodies)} | index
 
 
 def _disabled(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int, int], str]:

@@ -10,7 +10,7 @@ from typing import Final
 from cellplan.errors import InputError
 from cellplan.io.input.files import digest
 from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
-from cellplan.io.run.whole_file import write_whole
+from cellplan.io.run.whole_file import refuse_unless_writable, write_whole
 from cellplan.study.running import STATE, require_idle
 
 SCHEMA: Final = "cellplan.study/1"
@@ -29,8 +29,8 @@ def run_folder(folder: Path, number: int) -> Path:
     return folder / RUNS / f"{number:04d}"
 
 
-def prepare_folder(folder: Path, *, resume: bool) -> None:
-    """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs.
+def refuse_unless_study(folder: Path) -> None:
+    """Refuse a folder that a study must not be written to; call it early, before any long work.
 
     Raises:
         InputError: The folder holds something that no study wrote, cannot be written, or is being written by a study.
@@ -38,13 +38,28 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
     try:
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
             raise InputError(f"{folder}: expected a folder for the study, got something else")
-        folder.mkdir(parents=True, exist_ok=True)
+        if not folder.exists():
+            refuse_unless_writable(folder)
+            return
         foreign = _foreign(folder)
         if foreign:
             raise InputError(
                 f"{folder}: holds '{foreign}', which no study wrote; choose another folder with -o or empty this one"
             )
         require_idle(folder)
+    except OSError as error:
+        raise _cannot_write(folder, error) from error
+
+
+def prepare_folder(folder: Path, *, resume: bool) -> None:
+    """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs.
+
+    Raises:
+        InputError: The folder holds something that no study wrote, cannot be written, or is being written by a study.
+    """
+    refuse_unless_study(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
         kept = {STATE, JOURNAL, AHEAD, RUNS} if resume else {STATE}
         for entry in folder.iterdir():
             if entry.name not in kept:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from cellplan.model.progress import Progress, silent
-from cellplan.study.folder import prepare_folder
+from cellplan.study.folder import prepare_folder, refuse_unless_study
 from cellplan.study.journal import Journal
 from cellplan.study.record import Recorder
 from cellplan.study.running import RunningState, running
@@ -116,6 +116,18 @@ class Study:
                 ) from None
         trials = [trial.record for trial in journal.trials[: stop.trials]]
         return Finished(trials=trials, rounds=len(trials) // self.size, stopped_by=stopped_by)
+
+    def refuse(self, *, resume: bool) -> None:
+        """Refuse a folder that the study cannot be written to; call it early, before any long work.
+
+        Args:
+            resume: Whether the study in the folder is to be continued.
+
+        Raises:
+            InputError: The folder cannot be used, or holds another study that is to be continued.
+        """
+        refuse_unless_study(self.folder)
+        Journal(self.folder, self._whole_header, resume=resume)
 
     @property
     def _whole_header(self) -> dict[str, Any]:

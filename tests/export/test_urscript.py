@@ -107,16 +107,53 @@ def test_other_cycles_are_refused() -> None:
         render_urscript(timed(cycle=0.004))
 
 
-def test_long_programs_are_streamed_instead() -> None:
+def test_long_programs_have_several_routines_and_say_that_nobody_has_tried_one() -> None:
     cell = ur_cell(cycle=0.002)
     long = job_of(cell, smooth_program(cell, cycle=0.002, end=60.0), promise=Promise.TIMED)
 
-    with pytest.raises(
-        InputError, match="robot 'alpha': expected 25000 rows at most for urscript, got 30001; use --format"
-    ):
-        render_urscript(long)
-    with pytest.raises(InputError, match="expected 50 rows at most for urscript, got 101"):
-        render_urscript(timed(split=50))
+    files = render_urscript(long)
+
+    text = files["alpha.script"]
+    assert "# 30001 rows: no program of more than 25000 has been tried on a controller" in text
+    assert re.findall(r"^  (?:def )?(page_[0-9]{3})\(\):?$", text, re.MULTILINE) == ["page_001", "page_002"] * 2
+    (read,) = read_urscript(long.frame, files)
+    assert np.allclose(read.robots["alpha"].q, long.programs[0].robots["alpha"].q, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["timed", "sequence"])
+def test_routines_hold_the_rows_of_the_whole_program(kind: str) -> None:
+    whole, split = (timed(), timed(split=40)) if kind == "timed" else (sequence(), sequence(split=3))
+
+    files = render_urscript(split)
+
+    (read,), (expected,) = read_urscript(split.frame, files), read_urscript(whole.frame, render_urscript(whole))
+    assert "def page_002():" in files["alpha.script"]
+    assert "tried on a controller" not in files["alpha.script"]
+    assert np.array_equal(read.robots["alpha"].q, expected.robots["alpha"].q)
+    assert read.robots["alpha"].marks == expected.robots["alpha"].marks
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("  page_002()\n", "", r"alpha\.script:[0-9]+: expected page_002\(\)"),
+        ("  page_001()\n  page_002()\n", "  page_002()\n  page_001()\n", r"expected page_001\(\)|expected page_002"),
+        ("def page_002", "def page_003", r"alpha\.script:[0-9]+: expected def page_002\(\):"),
+    ],
+)
+def test_routines_that_are_not_called_in_their_order_are_refused(old: str, new: str, reason: str) -> None:
+    job = timed(split=40)
+    text = render_urscript(job)["alpha.script"]
+
+    with pytest.raises(InputError, match=reason):
+        read_urscript(job.frame, {"alpha.script": text.replace(old, new)})
+
+
+def test_a_routine_with_more_rows_than_it_may_hold_is_refused() -> None:
+    text = render_urscript(timed(split=40))["alpha.script"]
+
+    with pytest.raises(InputError, match=r"alpha\.script:[0-9]+: expected 39 rows at most in a routine, got 40"):
+        read_urscript(timed(split=39).frame, {"alpha.script": text})
 
 
 def test_few_decimals_are_refused_in_a_timed_program_only() -> None:
@@ -130,6 +167,22 @@ def test_few_decimals_are_refused_in_a_timed_program_only() -> None:
     assert re.search(r"movej\(\[-?[0-9]\.[0-9]{4},", text)
 
 
+def test_positions_within_two_turns_are_written() -> None:
+    """A last joint that may turn on: one turn and a half either way."""
+    job = timed(cell=ur_cell())
+    rows = job.programs[0].robots["alpha"]
+    robot = job.frame.cell.robots[0]
+    joints = (*robot.model.joints[:5], replace(robot.model.joints[5], lower=-10.0, upper=10.0))
+    cell = replace(job.frame.cell, robots=(replace(robot, model=replace(robot.model, joints=joints)),))
+    q = rows.q.copy()
+    q[:, 5] = np.linspace(-9.4, 9.4, len(q))
+    turning = job_of(cell, ProgramRows(name=None, robots={"alpha": replace(rows, q=q)}), promise=Promise.TIMED)
+
+    (read,) = read_urscript(turning.frame, render_urscript(turning))
+
+    assert np.allclose(read.robots["alpha"].q, q, rtol=0.0, atol=1e-9)
+
+
 def test_positions_beyond_two_turns_are_refused() -> None:
     cell = ur_cell()
     model = cell.robots[0].model
@@ -137,11 +190,12 @@ def test_positions_beyond_two_turns_are_refused() -> None:
     turning = replace(cell, robots=(replace(cell.robots[0], model=replace(model, joints=joints)),))
     rows = timed(cell=cell).programs[0].robots["alpha"]
     q = rows.q.copy()
-    q[40, 5] = 2.0 * np.pi + 1e-8
+    q[40, 5] = 4.0 * np.pi + 1e-8
     program = ProgramRows(name=None, robots={"alpha": replace(rows, q=q)})
     beyond = job_of(turning, program, promise=Promise.TIMED)
 
-    with pytest.raises(InputError, match=r"^robot 'alpha', row 40: expected joint a6 within 2 pi, got 6\.283185 rad"):
+    reason = r"^robot 'alpha', row 40: expected joint a6 within two turns, got 12\.566371 rad"
+    with pytest.raises(InputError, match=reason):
         render_urscript(beyond)
 
 

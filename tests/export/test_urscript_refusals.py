@@ -59,7 +59,7 @@ def changed(kind: str, line: int, old: str, new: str) -> str:
 NUMBERS = [
     ("[", "[0.000000000, "),
     ("[", "[nan, "),
-    ("[", "[1"),
+    ("[", "[2"),
     ("[", "[+"),
     ("[", "[["),
     ("[", "("),
@@ -228,10 +228,10 @@ def test_positions_beyond_two_turns_are_refused_with_their_line() -> None:
     lines = TEXTS["timed"].splitlines()
     number = lines[line - 1].partition("[")[2].partition(",")[0]
 
-    found, message = refused_at("timed", changed("timed", line, number, "6.283185308"))
+    found, message = refused_at("timed", changed("timed", line, number, "12.566370615"))
 
     assert found == line
-    assert message == " expected joint a1 within 2 pi, got 6.283185 rad"
+    assert message == " expected joint a1 within two turns, got 12.566371 rad"
 
 
 def test_files_are_those_of_the_robots() -> None:

@@ -26,7 +26,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell, Grasp, Part
 from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import FollowerJoint, JointKind, RobotModel
+from cellplan.model.robot import FollowerJoint, JointKind, Link, RobotModel
 from cellplan.model.task import Frame
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
@@ -189,6 +189,52 @@ def test_pairs_the_user_leaves_out_carry_the_users_reason() -> None:
     scene = Scene.from_cell(two_arms(checks=settings))
 
     assert reasons(scene)[frozenset(("a/tool", "b/tool"))] == "they meet"
+
+
+def in_pieces() -> Cell:
+    """Two arms, whose forearms are of two pieces each."""
+    arms = []
+    for name, x in (("a", 0.0), ("b", 3.0)):
+        model = arm_model()
+        (forearm,) = (body for body in model.bodies if body.name == "forearm")
+        links = (Link(name="forearm", index=forearm.link, X_BL=np.eye(4)),)
+        second = replace(forearm, name="forearm_2")
+        arms.append(
+            placed(
+                name,
+                replace(model, bodies=(*model.bodies, second), links=links),
+                base=pose((x, 0.0, 0.0)),
+                tool=stick(),
+            )
+        )
+    return make_cell(*arms, things=(thing("post", Box((0.1, 0.1, 1.0)), pose((1.5, 1.5, 0.5))),))
+
+
+def left_out(cell: Cell, *bodies: str) -> set[frozenset[str]]:
+    """The pairs that an exclusion leaves out of a cell."""
+    exclusion = Exclusion(bodies=(bodies[0], bodies[1]), reason="as it is")
+    settings = CheckSettings(clearance=0.005, contact_zone=0.02, exclusions=(exclusion,))
+    return {pair for pair, why in reasons(Scene.from_cell(replace(cell, checks=settings))).items() if why == "as it is"}
+
+
+def test_all_pieces_of_a_link_are_left_out_by_its_name() -> None:
+    cell = in_pieces()
+
+    assert left_out(cell, "a/forearm", "post") == {
+        frozenset((f"a/{name}", "post")) for name in ("forearm", "forearm_2")
+    }
+    assert left_out(cell, "a/forearm_2", "post") == {frozenset(("a/forearm_2", "post"))}
+    assert len(left_out(cell, "a/forearm", "b/forearm")) == 4
+
+
+def test_a_whole_robot_is_left_out_by_its_own_name() -> None:
+    cell = in_pieces()
+    scene = Scene.from_cell(cell)
+    own = {body.name for body in scene.bodies if body.robot == "a"}
+
+    assert left_out(cell, "a", "post") == {frozenset((name, "post")) for name in own}
+    assert len(left_out(cell, "a", "b")) == len(own) ** 2
+    assert "a/tool" in own
 
 
 @pytest.mark.parametrize(

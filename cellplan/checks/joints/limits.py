@@ -1,10 +1,14 @@
 """Joint positions and speeds that were read back, against their limits."""
 
+from typing import Final
+
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.report import Check, JointUse
+
+SHOWN_TOL: Final = 1e-9  # [rad] sums of rounded positions
 
 
 def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
@@ -26,6 +30,46 @@ def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Che
     checks = []
     for index, use in enumerate(uses):
         checks += [_check_position(use, times, q[:, index]), _check_velocity(use)]
+    return checks
+
+
+def check_shown(robot: Robot, times: Array, q: Array) -> list[Check]:
+    """Positions that a controller shows, against the limits that are stated of these: of coupled axes too.
+
+    Args:
+        robot: The robot.
+        times: Times in [s], shape (N,).
+        q: Positions of the model, shape (N, n); every shown one is linear between two rows as these are.
+    """
+    counting = robot.model.controller
+    if counting is None or counting.limits is None:
+        return []
+    positions, checks = counting.from_model(q), list[Check]()
+    for index, (joint, (lower, upper)) in enumerate(zip(robot.model.joints, counting.limits.tolist(), strict=True)):
+        if np.isinf(lower) and np.isinf(upper):
+            continue
+        unit, scale = joint.display_unit
+        shown = positions[:, index]
+        margins = np.minimum(shown - lower, upper - shown)
+        worst = int(np.argmin(margins))
+        value, at_s = float(shown[worst]), float(times[worst])
+        limit = lower if value - lower < upper - value else upper
+        passed = bool(margins[worst] >= -SHOWN_TOL)
+        verdict = f"{'stays' if passed else 'is'} {scale * abs(float(margins[worst])):.4g} {unit} "
+        verdict += "inside its limits" if passed else f"beyond its limit {scale * limit:.6g} {unit}"
+        checks.append(
+            Check(
+                name="controller_position",
+                subject=f"{robot.name}/{joint.name}",
+                passed=passed,
+                value=scale * value,
+                limit=scale * limit,
+                unit=unit,
+                at_s=at_s,
+                message=f"joint {robot.name}/{joint.name} as the controller shows it {verdict}, {scale * value:.4f} "
+                f"{unit}, worst at {at_s:.3f} s",
+            )
+        )
     return checks
 
 

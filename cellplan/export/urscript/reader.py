@@ -1,12 +1,13 @@
 """Reader of URScript programs: statements of our own subset, one on each line, and the handshakes among them."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from cellplan.errors import InputError
 from cellplan.export.joints import ARM, Angle, from_numbers
 from cellplan.export.timed_rows import (
     cycle_of,
@@ -25,7 +26,8 @@ from cellplan.export.urscript.text import (
     function_names,
     handshake_lines,
     lowering,
-    require_length,
+    most_rows,
+    page_name,
     require_turns,
     servo_call,
     stop_call,
@@ -34,6 +36,7 @@ from cellplan.export.zones import tool_shares
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ProgramRows, Promise, RobotRows
 
+MOVES: Final = ("movej", "servoj")  # instructions of rows
 _GAP: Final = re.compile(r"\s*([()\[\],=:])\s*")
 _SPEED: Final = r"(?!0\.0+(?![0-9]))(?:0|[1-9][0-9]{0,3})\.[0-9]{3}"
 _RADIUS: Final = r"(?!0\.0+(?![0-9]))[0-9]\.[0-9]{4}"
@@ -60,6 +63,50 @@ class _Statements:
             if (content := line.partition("#")[0].strip()) and (plain := compact(content))
         ]
         self.last = len(lines)
+
+    def call_routines(self, most: int) -> None:
+        """Put the instructions of all routines where the program calls these, in their order.
+
+        Args:
+            most: Most rows of a routine, or of a program without any.
+
+        Raises:
+            InputError: A routine has more rows, another name, or is not called next.
+        """
+        inside, called = list[Statement](), list[str]()
+        while self.peek().text.startswith("def "):
+            called.append(page_name(len(called) + 1))
+            self.take(f"def {called[-1]}():")
+            inside += self._routine(most)
+        if not called:
+            self._require_length([each for each in self.all if each.text.startswith(MOVES)], most)
+            return
+        start = self.place
+        while self.peek().text != f"{called[0]}()":
+            self.place += 1
+        begin = self.all[start : self.place]
+        for name in called:
+            self.take(f"{name}()")
+        if moves := [each for each in begin if each.text.startswith(MOVES)]:
+            raise line_error(self.file, moves[0].line, f"{called[0]}()", moves[0].shown)
+        self.all, self.place = [*begin, *inside, *self.all[self.place :]], 0
+
+    def _routine(self, most: int) -> list[Statement]:
+        """The instructions of a routine up to its end."""
+        found, depth = list[Statement](), 1
+        while depth:
+            at = self.peek()
+            depth += at.text.startswith("while ") - (at.text == "end")
+            found.append(at)
+            self.place += 1
+        self._require_length([each for each in found if each.text.startswith(MOVES)], most)
+        return found[:-1]
+
+    def _require_length(self, moves: Sequence[Statement], most: int) -> None:
+        """Refuse more rows than a routine holds."""
+        if len(moves) > most:
+            line = moves[most].line
+            raise InputError(f"{self.file}:{line}: expected {most} rows at most in a routine, got {len(moves)}")
 
     def peek(self) -> Statement:
         """The next instruction.
@@ -113,6 +160,7 @@ def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[Program
             path = paths[program, robot]
             statements = _Statements(files[path], path)
             statements.take(f"def {names[program, robot]}():")
+            statements.call_routines(most_rows(frame))
             read = _timed if frame.promise is Promise.TIMED else _sequence
             robots[robot] = read(frame, frame.robot(robot), statements)
             statements.take("end")
@@ -136,7 +184,7 @@ class _Points:
 
     def __init__(self, frame: ExportFrame, robot: Robot, file: str) -> None:
         """Begin with no row."""
-        self.frame, self.robot, self.file = frame, robot, file
+        self.robot, self.file = robot, file
         self.lines: list[int] = []
         self.numbers: list[list[float]] = []
         decimals = decimals_of_urscript(frame, robot)
@@ -161,10 +209,9 @@ class _Points:
         """All rows.
 
         Raises:
-            InputError: A position is beyond two turns, or there are too many rows.
+            InputError: A position is beyond two turns.
         """
         where = [f"{self.file}:{line}" for line in self.lines]
-        require_length(self.frame, len(self.lines), where=where[-1])
         numbers = np.array(self.numbers)
         require_turns(self.robot.model.joint_names, numbers, row_of=where)
         cycle_ms = round(1000.0 * cycle_of(self.robot))

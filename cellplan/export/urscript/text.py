@@ -8,6 +8,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.export.handshake import handshake_steps, lowering_step, signals_by_key
 from cellplan.export.joints import ARM
+from cellplan.export.pages import MOST_PAGES
 from cellplan.export.text import safe_names
 from cellplan.export.timed_rows import cycle_of, decimals_of
 from cellplan.export.urscript.rows import APPROACH_ACCELERATION, APPROACH_SPEED, move_acceleration
@@ -17,8 +18,8 @@ from cellplan.model.exported import ExportFrame, Promise
 
 DECIMALS: Final = 9  # of a radian
 FEWEST_TIMED: Final = 8  # decimals of a radian: as fine as the six of a degree that a stream has
-MOST_ROWS: Final = 25_000  # of a program; longer ones are streamed row by row
-TURN: Final = 2.0 * np.pi  # [rad] the largest position either way
+MOST_ROWS: Final = 25_000  # of a routine, and of a program that anybody has tried; longer ones have several routines
+TURNS: Final = 4.0 * np.pi  # [rad] the largest position either way: two turns
 CYCLES: Final = (2, 8)  # [ms] of e-Series and of CB3 controllers
 LOOKAHEAD: Final = (0.03, 0.2)  # [s] that servoj takes
 GAIN: Final = 300  # 100 to 2000: that of the maker
@@ -31,7 +32,7 @@ _WORDS: Final = (
     "True False PI movej movel movep movec servoj servoc speedj speedl stopj stopl sync sleep join kill run "
     "set_standard_digital_out get_standard_digital_in"
 )
-RESERVED: Final = tuple(_WORDS.split())
+RESERVED: Final = (*_WORDS.split(), *(f"page_{number:03d}" for number in range(1, MOST_PAGES + 1)))
 
 
 def function_names(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
@@ -61,15 +62,14 @@ def decimals_of_urscript(frame: ExportFrame, robot: Robot) -> int:
     return decimals
 
 
-def require_length(frame: ExportFrame, count: int, *, where: str) -> None:
-    """Make sure that a program has no more rows than one routine holds.
+def most_rows(frame: ExportFrame) -> int:
+    """Most rows of a routine."""
+    return MOST_ROWS if frame.split is None else min(frame.split, MOST_ROWS)
 
-    Raises:
-        InputError: It has more.
-    """
-    most = MOST_ROWS if frame.split is None else min(frame.split, MOST_ROWS)
-    if count > most:
-        raise InputError(f"{where}: expected {most} rows at most for urscript, got {count}; use --format stream")
+
+def page_name(number: int) -> str:
+    """Name of a routine of a program that has several, from 1."""
+    return f"page_{number:03d}"
 
 
 def require_turns(joints: Sequence[str], numbers: Array, *, row_of: Sequence[str]) -> None:
@@ -83,11 +83,11 @@ def require_turns(joints: Sequence[str], numbers: Array, *, row_of: Sequence[str
     Raises:
         InputError: One is.
     """
-    beyond = np.argwhere(np.abs(numbers) > TURN)
+    beyond = np.argwhere(np.abs(numbers) > TURNS)
     if len(beyond):
         row, place = (int(index) for index in beyond[0])
         raise InputError(
-            f"{row_of[row]}: expected joint {joints[place]} within 2 pi, got {numbers[row, place]:.6f} rad"
+            f"{row_of[row]}: expected joint {joints[place]} within two turns, got {numbers[row, place]:.6f} rad"
         )
 
 

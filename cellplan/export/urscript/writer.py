@@ -16,6 +16,7 @@ from cellplan.export.corners import chosen_shares
 from cellplan.export.dialect import Dialect
 from cellplan.export.head import head_notes
 from cellplan.export.joints import Angle, to_numbers
+from cellplan.export.pages import pages_of
 from cellplan.export.text import comment, joined
 from cellplan.export.timed_rows import cycle_of, file_path, times_of
 from cellplan.export.urscript.reader import read_urscript
@@ -30,7 +31,7 @@ from cellplan.export.urscript.text import (
     function_names,
     handshake_lines,
     lowering,
-    require_length,
+    page_name,
     require_standard_signals,
     require_turns,
     servo_call,
@@ -48,7 +49,7 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
         job: What is written.
 
     Raises:
-        InputError: A robot has other joints than six, a position beyond two turns, too many rows, or lacks something
+        InputError: A robot has other joints than six, a position beyond two turns, or lacks something
             that its program needs.
     """
     raise_findings(refusals(*_demands(job.frame, 0)))
@@ -57,11 +58,11 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
         for name in job.frame.robots:
             robot, rows = job.frame.robot(name), program.robots[name]
             path = file_path(program.name, f"{name}{ENDING}")
-            require_length(job.frame, len(rows), where=f"robot '{name}'")
             points = _points(robot, rows, decimals_of_urscript(job.frame, robot))
             is_timed = job.frame.promise is Promise.TIMED
-            body = _timed(job, robot, rows, points) if is_timed else _sequence(job, robot, rows, points)
-            head = [line for note in head_notes(job, name) for line in comment(note, "#")]
+            at_rows = (_timed if is_timed else _sequence)(job, robot, rows, points)
+            body = [*_routines(job, rows, at_rows), *([stop_call(robot)] if is_timed else [])]
+            head = [line for note in _notes(job, rows) for line in comment(note, "#")]
             found[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
     return found
 
@@ -76,6 +77,25 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
             yield partial(require_standard_signals, frame, name)
 
 
+def _notes(job: ExportJob, rows: RobotRows) -> Iterator[str]:
+    """Notes at the head of a program."""
+    yield from head_notes(job, rows.robot)
+    if len(rows) > MOST_ROWS:
+        yield f"{len(rows)} rows: no program of more than {MOST_ROWS} has been tried on a controller"
+
+
+def _routines(job: ExportJob, rows: RobotRows, at_rows: Sequence[Sequence[str]]) -> list[str]:
+    """The instructions at all rows, in routines of the program and calls of these where one does not hold them."""
+    pages, waits = pages_of(len(at_rows), job.frame, URSCRIPT), rows.marks and handshake_lines(job.frame, rows.robot)
+    begin = [lowering(job.frame, rows.robot)] if waits else []
+    if len(pages) == 1:
+        return [*begin, *(line for lines in at_rows for line in lines)]
+    found, names = list[str](), [page_name(number) for number in range(1, len(pages) + 1)]
+    for name, page in zip(names, pages, strict=True):
+        found += [f"def {name}():", *(f"  {line}" for row in page for line in at_rows[row]), "end"]
+    return [*found, *begin, *(f"{name}()" for name in names)]
+
+
 def _points(robot: Robot, rows: RobotRows, decimals: int) -> list[str]:
     """Positions of all rows as they are written: ``[0.1, …]``."""
     numbers = to_numbers(robot, rows.q, decimals=decimals, angle=Angle.RADIANS)
@@ -85,25 +105,26 @@ def _points(robot: Robot, rows: RobotRows, decimals: int) -> list[str]:
     return [point % tuple(row) for row in numbers.tolist()]
 
 
-def _timed(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[str]:
-    """Instructions that follow the rows at the cycle of the controller."""
+def _timed(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[list[str]]:
+    """Instructions at each row that follow the rows at the cycle of the controller."""
     cycle, times, servo = cycle_of(robot), times_of(rows), servo_call(job.frame, robot)
     if np.any(np.abs(times - np.arange(len(times)) * cycle) > OFF_CYCLE + np.spacing(times)):
         raise InputError(f"robot '{robot.name}': expected rows every {1000.0 * cycle:g} ms, got others")
     first, *others = points
-    return [f"movej({first}, {approach_call()})", *(f"servoj({point}, {servo})" for point in others), stop_call(robot)]
+    return [[f"movej({first}, {approach_call()})"], *([f"servoj({point}, {servo})"] for point in others)]
 
 
-def _sequence(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[str]:
-    """Instructions that move from row to row, and wait at marks."""
+def _sequence(job: ExportJob, robot: Robot, rows: RobotRows, points: Sequence[str]) -> list[list[str]]:
+    """Instructions at each row that move there, and wait at marks; the last row of a routine is a stop."""
     meeting = handshake_lines(job.frame, robot.name) if rows.marks else []
-    lines = [lowering(job.frame, robot.name)] if meeting else []
+    lines = []
     speeds, radii = move_speeds(robot, rows), blend_radii(robot, rows, chosen_shares(job, rows))
+    radii[[page[-1] for page in pages_of(len(rows), job.frame, URSCRIPT)]] = 0.0
     acceleration = f"a={move_acceleration(robot):.3f}"
     for row, point in enumerate(points):
         call = approach_call() if row == 0 else f"{acceleration}, v={speeds[row]:.3f}"
         call += f", r={radii[row]:.4f}" if radii[row] > 0.0 else ""
-        lines += [f"movej({point}, {call})", *(meeting * rows.marks.count(row))]
+        lines.append([f"movej({point}, {call})", *(meeting * rows.marks.count(row))])
     return lines
 
 

@@ -185,7 +185,9 @@ def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], docum
         return
     known = {"part", *valid.names["environment"]}
     for name, model in models.items():
-        known |= {f"{name}/{body.name}" for body in model.bodies}
+        with_bodies = {body.link for body in model.bodies}
+        known |= {name, *(f"{name}/{body.name}" for body in model.bodies)}
+        known |= {f"{name}/{link.name}" for link in model.links if link.index in with_bodies}
         known |= {f"{name}/{body}" for body in (*mounted_names(valid.robots[name]), *tool_names(valid.robots[name]))}
     for index, pair in enumerate(valid.checks.exclude):
         for side, body in enumerate(pair.bodies):

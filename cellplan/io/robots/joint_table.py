@@ -16,7 +16,7 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
-from cellplan.io.robots.build_controller import build_controller, controller_findings
+from cellplan.io.robots.build_controller import build_controller, controller_findings, sense_findings
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
@@ -87,6 +87,8 @@ def _rules(table: RobotTableDocument, document: YamlDocument) -> Iterator[Findin
     yield from payload_findings(("payload",), table.payload, turning, document)
     turns = {name: joint.type == "revolute" for name, joint in table.joints.items()}
     yield from controller_findings(("controller",), table.controller, turns, document)
+    axes = {name: np.array(joint.axis, dtype=float) for name, joint in table.joints.items()}
+    yield from sense_findings(("controller",), table.controller, axes, document)
     if table.reach is not None and table.reach.to not in (None, "flange", *table.joints):
         text = unknown_name("flange or a joint", str(table.reach.to), ("flange", *table.joints))
         yield document.finding(("reach", "to"), text)

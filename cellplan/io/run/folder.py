@@ -26,6 +26,7 @@ from cellplan.io.run.content import (
 )
 from cellplan.io.run.drafts import hidden_folders, put_right
 from cellplan.io.run.exchange import exchange
+from cellplan.io.run.whole_file import refuse_unless_writable
 
 __all__ = [
     "EXPORT",
@@ -171,29 +172,18 @@ def refuse_unless_replaceable(path: Path) -> None:
                 raise InputError(f"{path}: output is never written through a symbolic link, and '{link}' is one")
         put_right(path.parent)
         if not path.exists():
-            _refuse_unless_writable(path)
+            refuse_unless_writable(path)
             return
         if not path.is_dir():
             raise InputError(f"{path}: expected a folder for the output, got a file")
         if Path.cwd().resolve().is_relative_to(path.resolve()):
             raise InputError(f"{path}: the output needs a folder of its own, not the one you are working in")
-        _refuse_unless_writable(path)
+        refuse_unless_writable(path)
         foreign = foreign_entry(path)
     except OSError as error:
         raise _cannot_write(path, error) from error
     if foreign:
         raise _holds_foreign(path, foreign)
-
-
-def _refuse_unless_writable(path: Path) -> None:
-    """Refuse when the nearest existing folder above the path is no folder or cannot be written to."""
-    above = path.parent
-    while not above.exists() and above != above.parent:
-        above = above.parent
-    if not above.is_dir():
-        raise InputError(f"{path}: cannot write the output: '{above}' is not a folder")
-    if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: cannot write the output: no right to write to '{above}'")
 
 
 def _make_parents(folder: Path) -> list[Path]:

@@ -25,6 +25,37 @@ def write_whole(path: Path, content: bytes) -> None:
         raise
 
 
+def refuse_unless_own(target: Path, *, is_own: Callable[[Path], bool], kind: str) -> None:
+    """Refuse a place that a file must not be written to; call it early, before any long work.
+
+    Args:
+        target: The file.
+        is_own: Whether a file is of the kind and written by cellplan.
+        kind: What it is called in messages.
+
+    Raises:
+        InputError: The place holds something else, or no file can be there.
+    """
+    if target.is_symlink() or (target.exists() and not is_own(target)):
+        raise InputError(f"{target}: holds something that is no {kind}; choose another file with -o")
+    refuse_unless_writable(target)
+
+
+def refuse_unless_writable(path: Path) -> None:
+    """Refuse a place below something that is no folder, or that nothing may be written to.
+
+    Raises:
+        InputError: The nearest existing folder above is none, or may not be written to.
+    """
+    above = path.parent
+    while not above.exists() and above != above.parent:
+        above = above.parent
+    if not above.is_dir():
+        raise InputError(f"{path}: cannot write the output: '{above}' is not a folder")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot write the output: no right to write to '{above}'")
+
+
 def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool], kind: str) -> None:
     """Write a file whole or not at all, where there is none or an older one of its kind.
 
@@ -37,8 +68,7 @@ def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool],
     Raises:
         InputError: The place holds something else, or cannot be written.
     """
-    if target.is_symlink() or (target.exists() and not is_own(target)):
-        raise InputError(f"{target}: holds something that is no {kind}; choose another file with -o")
+    refuse_unless_own(target, is_own=is_own, kind=kind)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, content)

@@ -216,8 +216,8 @@ class ExclusionEntry(Entry):
     """A pair of bodies that the collision check leaves out."""
 
     bodies: tuple[Text, Text] = Field(
-        description="Two bodies: ROBOT/LINK, ROBOT/tool, ROBOT/tool_2, ROBOT/pedestal, ROBOT/ATTACHMENT, part or a "
-        "name of the environment."
+        description="Two bodies: ROBOT/LINK (all pieces of it), ROBOT/tool, ROBOT/tool_2, ROBOT/pedestal, "
+        "ROBOT/ATTACHMENT, ROBOT (all of it), part or a name of the environment."
     )
     reason: Reason = Field(description="Why they may touch; it is repeated in the report.")
 

@@ -29,6 +29,11 @@ class ControllerZeroEntry(Entry):
         default={},
         description="By joint, the factors of the controller positions of earlier joints of its kind that are added.",
     )
+    limits_deg: dict[str, tuple[Angle, Angle]] = Field(
+        default={},
+        description="By revolute joint, the smallest and the largest position that the controller allows of what it "
+        "shows: of a coupled joint too, whose range in the model depends on the others.",
+    )
     source: Text = Field(default="not stated", description="Where this is known from.")
 
     @model_validator(mode="after")

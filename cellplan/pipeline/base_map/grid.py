@@ -46,6 +46,27 @@ class BaseGrid:
         Raises:
             InputError: There are too many, or a number is not usable.
         """
+        x, y = self._axes(robot, part)
+        if len(x) * len(y) > MOST_PLACES:
+            raise InputError(f"--grid: expected at most {MOST_PLACES} places, got {len(x)} x {len(y)}: a larger step")
+        yaw = None if self.yaw is None or self.yaw == TOWARD else float(np.radians(self.yaw))
+        return Places.of(robot.X_WB, x, y, yaw=yaw, toward=part if self.yaw == TOWARD else None)
+
+    def refuse(self, robot: Robot) -> None:
+        """Refuse numbers that are not usable wherever the part is; call it early, before any long work.
+
+        Args:
+            robot: The robot.
+
+        Raises:
+            InputError: There are too many places, or a number is not usable.
+        """
+        x, y = self._axes(robot, np.zeros(3))
+        if (len(x) - 1) * (len(y) - 1) > MOST_PLACES:  # one more or less, as the part is elsewhere
+            raise InputError(f"--grid: expected at most {MOST_PLACES} places, got {len(x)} x {len(y)}: a larger step")
+
+    def _axes(self, robot: Robot, part: Array) -> tuple[Array, Array]:
+        """Values of x and y in [mm]."""
         if not (math.isfinite(self.step) and self.step > 0.0):
             raise InputError(f"--grid: expected millimetres above 0, got {self.step:g}")
         reach = MM * (arm_reach(robot.model) + float(np.linalg.norm(robot.tool.X_FT[:3, 3])))
@@ -53,10 +74,7 @@ class BaseGrid:
             self._values(option, span, MM * float(middle), reach)
             for option, span, middle in (("--x", self.x, part[0]), ("--y", self.y, part[1]))
         )
-        if len(x) * len(y) > MOST_PLACES:
-            raise InputError(f"--grid: expected at most {MOST_PLACES} places, got {len(x)} x {len(y)}: a larger step")
-        yaw = None if self.yaw is None or self.yaw == TOWARD else float(np.radians(self.yaw))
-        return Places.of(robot.X_WB, x, y, yaw=yaw, toward=part if self.yaw == TOWARD else None)
+        return x, y
 
     def _values(self, option: str, span: Span | None, middle: float, reach: float) -> Array:
         """Values along one axis in [mm]: multiples of the step where no span is given, else from where it begins."""

@@ -102,7 +102,7 @@ def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent
         InputError: There is no such operator, the grid is not usable, or the cell is of a kind that is not mapped.
         StartNotFoundError: A start posture is to be found, and there is none at the present base.
     """
-    _refuse_other_jobs(cell, robot)
+    refuse_map(cell, robot, grid)
     scene = Scene.from_cell(cell)
     paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     start = chosen_start(scene, paths, progress=progress).start
@@ -133,8 +133,18 @@ def requested_cell(request: MapRequest) -> Cell:
     return with_overrides(cell, request.settings, mode=request.mode)
 
 
-def _refuse_other_jobs(cell: Cell, name: str) -> None:
-    """Refuse robots that are no operators, and jobs whose motion is not one synchronous pseudo-inverse motion."""
+def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
+    """Refuse a map that cannot be made; call it early, before any long work.
+
+    Args:
+        cell: The cell.
+        name: Name of the operator.
+        grid: Where its base is tried.
+
+    Raises:
+        InputError: The robot is no operator, the grid is not usable, or the job is not one synchronous pseudo-inverse
+            motion.
+    """
     operators = [task.robot for task in cell.tasks if task.robot not in cell.positioners]
     if name not in operators:
         raise InputError(
@@ -142,6 +152,7 @@ def _refuse_other_jobs(cell: Cell, name: str) -> None:
             f"({', '.join(dict.fromkeys(operators)) or 'there is none'}), got '{name}'"
         )
     refuse_other_jobs(cell, "a map of bases")
+    grid.refuse(cell.robot(name))
 
 
 def _standing(scene: Scene, robot: str) -> tuple[MountedPair, ...]:

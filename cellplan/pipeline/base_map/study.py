@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +11,7 @@ from typing import Any, Final
 from cellplan.io.input.files import digest
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.base_map.judged import finished_record
-from cellplan.pipeline.base_map.prepared import MapRequest, prepared_request
+from cellplan.pipeline.base_map.prepared import MapRequest, prepared_request, refuse_map, requested_cell
 from cellplan.pipeline.base_map.tiles import Tiles, evaluate
 from cellplan.pipeline.write_run import versions
 from cellplan.report.page.base_map import map_files
@@ -61,6 +62,18 @@ def map_study(
     """
     require_formats(request.formats)
     sent = request.anywhere
+    cell = requested_cell(request)
+    refuse_map(cell, request.robot, request.grid)
+    header = {
+        "kind": "map",
+        "cell": cell.name,
+        **request.record,
+        "inputs": dict(cell.inputs),
+        "versions": versions(),
+        "best": BEST.record,
+    }
+    study = Study(folder=folder, header=header, size=1, propose=lambda _: (), best=BEST, noun=NOUN, total=0)
+    study.refuse(resume=resume)
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
@@ -68,24 +81,14 @@ def map_study(
         ready = prepared_request(sent)
         progress("finding starts", 0.0)
         tiles = Tiles.of(ready.asked, *ready.starts())
-        header = {
-            "kind": "map",
-            "cell": ready.cell.name,
-            **request.record,
-            "inputs": dict(ready.cell.inputs),
-            "versions": versions(),
-            "best": BEST.record,
-        }
 
         def propose(finished: Sequence[Trial]) -> Sequence[Mapping[str, Any]]:
             return [] if finished else tiles.values
 
         count = len(tiles.values)
-        study = Study(
-            folder=folder, header=header, size=max(1, count), propose=propose, best=BEST, noun=NOUN, total=count
-        )
         limits = Limits(seconds=TILE_LIMIT)
-        finished = study.run(partial(evaluate, sent), workers=pool, limits=limits, resume=resume, progress=progress)
+        whole = replace(study, size=max(1, count), propose=propose, total=count)
+        finished = whole.run(partial(evaluate, sent), workers=pool, limits=limits, resume=resume, progress=progress)
         trials = finished.trials
         record = finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
     files = map_files(record, request.formats)

@@ -30,6 +30,7 @@ from cellplan.model.units import MM
 from cellplan.pipeline.export.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
 from cellplan.pipeline.export.played import Played, Stretch
 from cellplan.pipeline.export.schedule_at import schedule_at
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
 Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
@@ -202,22 +203,31 @@ def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple
 
 
 def clearance_findings(rows: PathRows) -> Iterator[str]:
-    """The pairs of bodies that are found first to touch or not to keep their distance; others are not searched then."""
+    """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
     scene = _demanding(rows)
-    bound = certify(scene, stacked(scene.cell, rows.q)[rows.is_break], with_minimum=False, with_curves=False)
-    if bound.is_kept:
+    q = stacked(scene.cell, rows.q)[rows.is_break]
+    if certify(scene, q, with_minimum=False, with_curves=False).is_kept:
         return
-    found = [pair for pair in bound.pairs if pair.touches or pair.unproved or pair.distance < pair.demand]
-    for pair in found:
+    bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs
+    for pair in bound.pairs:
+        if pair.is_kept:
+            continue
         first, second = bound.names(pair)
         sample = min((*pair.touches, *pair.unproved), default=pair.at)
         at_s = float(np.interp(sample, np.arange(rows.is_break.sum()), rows.times[rows.is_break]))
-        kept = "touch" if pair.touches else "are not proved to keep their distance"
-        if not pair.touches and pair.distance < pair.demand:
+        kept = f"are proved to keep {MM * pair.proved:.4g} mm only"
+        if np.isfinite(pair.distance) and pair.distance < pair.demand:
             kept = f"come as near as {MM * pair.distance:.4g} mm or nearer"
-        yield f"clearance: {first} and {second} {kept}, at {at_s:.3f} s, demanded {MM * pair.demand:.4g} mm"
-    if not found:
-        yield "clearance: not certified"
+        if pair.touches:
+            kept = "touch"
+        usual = rows.scene.pairs[pair.row]
+        added = pair.demand - (usual.demand if usual.rule is Rule.CLEARANCE else 0.0)
+        wide, cure = "", "let them pass farther apart"
+        if rows.is_off and added > 0.0:
+            wide = f", {MM * added:.2g} mm of it for what rows may be off by rounding"
+            cure = f"leave out less (--thin-mm, --thin-deg), so that rounding takes less, or {cure}"
+        demanded = f"demanded {MM * pair.demand:.4g} mm{wide}"
+        yield f"clearance: {first} and {second} {kept}, at {at_s:.3f} s, {demanded}; {cure}"
 
 
 def _demanding(rows: PathRows) -> Scene:

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import check_accelerations, joint_peaks, part_acceleration
 from cellplan.checks.joints.demanded_feeds import check_feeds
-from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
@@ -38,6 +38,7 @@ def position_findings(played: Played) -> Iterator[str]:
             times = times + np.tile([0.0, 1e-6], len(low))
         uses = joint_uses(robot, times, q)
         yield from _failed(check for check in check_joints(uses, times, q) if check.name == POSITION)
+        yield from _failed(check_shown(robot, times_of(rows), rows.q))
 
 
 def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:

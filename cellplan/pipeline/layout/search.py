@@ -3,11 +3,12 @@
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
+from cellplan.model.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
@@ -17,7 +18,7 @@ from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals
 from cellplan.pipeline.layout.record import head_of, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result_file import file_records, result_files
-from cellplan.pipeline.layout.searched import read_attempts
+from cellplan.pipeline.layout.searched import read_attempts, searched_cell
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.layout.workers import layout_workers
 from cellplan.pipeline.write_run import versions
@@ -92,16 +93,8 @@ class _Search:
         """The study, without the candidates that were rejected."""
         rejected = frozenset(self.tried)
         is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
-        cell = self.ready.cell
-        header = {
-            "kind": "layout",
-            "cell": cell.name,
-            **self.request.record,
-            "inputs": dict(cell.inputs),
-            "versions": versions(),
-        }
-        best = BESTS[self.request.objective]
-        return Study(folder=self.folder, header=header, size=SIZE, propose=self.proposals, best=best, enough=is_enough)
+        study = _study(self.request, self.ready.cell, self.folder)
+        return replace(study, propose=self.proposals, enough=is_enough)
 
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
@@ -162,9 +155,9 @@ def search_layout(
     with ExitStack() as opened:
         pool = workers
         if isinstance(workers, int):
+            refuse_search(request, folder, resume=resume)
             pool = opened.enter_context(layout_workers(workers, request))
         ready = prepared(request)
-        read_attempts(request, ready.cell)  # what is wrong with one is said before anything is tried
         search = _Search(
             request=request,
             folder=folder,
@@ -178,6 +171,39 @@ def search_layout(
         finished, best = search.run(resume=resume)
         progress("writing the result", 1.0)
         return _written(search, finished, best)
+
+
+def refuse_search(request: LayoutRequest, folder: Path, *, resume: bool = False) -> Cell:
+    """Refuse a search of which its files say already that it cannot be; call it before any process begins.
+
+    Args:
+        request: What is searched for.
+        folder: Folder of the study.
+        resume: Whether an earlier study is continued.
+
+    Returns:
+        The cell that is searched.
+
+    Raises:
+        InputError: A cell cannot be read or searched, or the folder cannot be used.
+    """
+    cell = searched_cell(request)
+    read_attempts(request, cell)
+    _study(request, cell, folder).refuse(resume=resume)
+    return cell
+
+
+def _study(request: LayoutRequest, cell: Cell, folder: Path) -> Study:
+    """The study of a search, which proposes nothing yet."""
+    header = {
+        "kind": "layout",
+        "cell": cell.name,
+        **request.record,
+        "inputs": dict(cell.inputs),
+        "versions": versions(),
+    }
+    best = BESTS[request.objective]
+    return Study(folder=folder, header=header, size=SIZE, propose=lambda _finished: (), best=best)
 
 
 def finish_of(ready: Prepared, progress: Progress, *, workers: int | Executor) -> Finish:

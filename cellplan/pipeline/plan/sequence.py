@@ -80,6 +80,7 @@ def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
         InputError: The tasks cannot be worked with, or in no order.
         NoSolutionError: No start or home was found, a tool lost its path, or a robot finds no way.
     """
+    _refuse_other_paths(cell)
     scenes = StageScenes.of(cell)
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
@@ -95,6 +96,13 @@ def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
         runs = _Worked(solved, scenes, progress).runs()
     stages = _joined(solved, scenes, runs, progress=progress)
     return PlannedProgram(cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks))
+
+
+def _refuse_other_paths(cell: Cell) -> None:
+    """Refuse paths and times of all tasks that cannot be worked with, the last ones too, before anything is planned."""
+    for stage in program_stages(cell):
+        if stage.phase.tasks:
+            clock_paths(stage.cell, [build_toolpath(task, stage.cell.part) for task in stage.cell.tasks])
 
 
 class _Worked:

@@ -21,9 +21,11 @@ from cellplan.model.phase import Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.rehearsal import CorrectedProgram, IsoFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import Check, Report, TaskAccuracy
+from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.rehearsal.correct import Pass, correct_from_pass_to_pass, correct_within_the_pass
 from cellplan.pipeline.solution import Run
 from cellplan.pipeline.solve import render_program, solve, with_verdict
+from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.scene.scene import Scene
 
@@ -82,9 +84,10 @@ def rehearse(
             f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
             "measured errors of transfer moves; rehearse its tasks without this key"
         )
-    solution = solve(cell, is_reported=False, progress=progress)
     trials = errors.trials if errors.is_random else 1
-    _refuse_too_many(solution.runs, trials, errors)
+    _refuse_too_many(ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
+    solution = solve(cell, is_reported=False, progress=progress)
+    _refuse_too_many([run.schedule for run in solution.runs], trials, errors)  # again: a retimed one has other samples
     options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
     runs = tuple(
         _rehearse_run(solution.cell, run, errors, trials=trials, options=options, progress=progress)
@@ -113,9 +116,9 @@ def _without_tool_errors(report: Report) -> Report:
     return replace(report, checks=tuple(check for check in report.checks if check.name not in TOOL_ERRORS))
 
 
-def _refuse_too_many(runs: Sequence[Run], trials: int, errors: CellErrors) -> None:
+def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErrors) -> None:
     """Refuse more trials than fit into memory."""
-    kept = sum(len(run.schedule.times) * len(run.schedule.tasks) for run in runs)
+    kept = sum(len(schedule.times) * len(schedule.tasks) for schedule in schedules)
     most = MAX_ERRORS // kept
     if trials > max(most, 1):
         raise InputError(

@@ -10,7 +10,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.io.run.content import is_run_folder
 from cellplan.io.run.folder import MANIFEST
 from cellplan.io.run.stored import StoredRun, read_stored_run
-from cellplan.io.run.whole_file import replace_own
+from cellplan.io.run.whole_file import refuse_unless_own, replace_own
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
@@ -27,6 +27,7 @@ from cellplan.report.page.view import is_view_page, view_page
 from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
 from cellplan.study.folder import JOURNAL, RESULT
 
+PAGE: Final = "3-D page"  # in messages
 STUDY_PAGE: Final = "study-view.html"  # in the folder of a study
 ADVICE: Final = "advice.json"  # in the folder of a repair
 
@@ -37,19 +38,21 @@ class ViewRequest:
 
     Attributes:
         path: A run folder, a cell file, or the folder of a layout search.
+        output: The page; None for the usual place.
         cell: The cell file of a run or a search that depends on further files; None where the folder is enough.
         settings: Values of a cell file that is shown, as ``KEY=VALUE``.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
     """
 
     path: Path
+    output: Path | None = None
     cell: Path | None = None
     settings: Sequence[str] = field(default=())
     allow_dirs: Sequence[Path] = field(default=())
 
 
 def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewRecord, Path]:
-    """The record of a page, and where the page belongs unless the user says otherwise.
+    """The record of a page, and where the page belongs; a place that it may not take is refused first.
 
     Args:
         request: What is to be shown.
@@ -67,18 +70,28 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
                 f"{path}: expected a run, a layout search or a cell file, got a repair: show '{path / BEST}'"
             )
         if (path / MANIFEST).exists() or is_run_folder(path):
-            return _view_of_run(request, progress), path / VIEW_PAGE
+            target = _target(request, path / VIEW_PAGE)
+            return _view_of_run(request, progress), target
         if (path / RESULT).exists() or (path / JOURNAL).exists():
-            return _view_of_study(request, progress), path / STUDY_PAGE
+            target = _target(request, path / STUDY_PAGE)
+            return _view_of_study(request, progress), target
         raise InputError(f"{path}: expected a run, a layout search or a cell file, got a folder that holds none")
     if request.cell is not None:
         raise InputError(f"--cell: expected a run or a layout search with it, got '{path}'")
     cell = with_overrides(load_cell(path, allow_dirs=request.allow_dirs), request.settings)
+    target = _target(request, Path("outputs") / f"{cell.name}-view.html")
     geometries = Geometries()
     scene = unsolved_scene(cell, geometries, progress=progress)
     record = _record("cell", cell, geometries, [scene])
     record["source"], record["settings"] = path.as_posix(), list(request.settings)
-    return record, Path("outputs") / f"{cell.name}-view.html"
+    return record, target
+
+
+def _target(request: ViewRequest, usual: Path) -> Path:
+    """Where the page is written."""
+    target = request.output or usual
+    refuse_unless_own(target, is_own=is_view_page, kind=PAGE)
+    return target
 
 
 def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
@@ -127,7 +140,7 @@ def write_view(record: ViewRecord, target: Path) -> int:
         InputError: The place holds something else, or cannot be written.
     """
     content = view_page(record).encode()
-    replace_own(target, content, is_own=is_view_page, kind="3-D page")
+    replace_own(target, content, is_own=is_view_page, kind=PAGE)
     return len(content)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from io import StringIO
 from typing import TYPE_CHECKING, Final
 
@@ -34,6 +35,8 @@ TEXT_SHARE: Final = 0.012  # [-] height of texts by the size of the plan
 TICK: Final = 0.5  # [-] half length of a tick by the height of texts
 DIMENSION_TYPE: Final = 32  # a linear dimension with a block of its own
 
+NO_DXF: Final = "--format dxf: expected the package ezdxf, got none: pip install 'cellplan[dxf]', or use --format svg"
+
 
 def floor_plan_dxf(plan: FloorPlan) -> str:
     """A floor plan as the text of a DXF file; equal plans give equal text.
@@ -59,15 +62,23 @@ def floor_plan_dxf(plan: FloorPlan) -> str:
     return MARK + stream.getvalue()
 
 
+def require_dxf() -> None:
+    """Refuse what needs ezdxf where that is not installed.
+
+    Raises:
+        InputError: It is not.
+    """
+    if find_spec("ezdxf") is None:
+        raise InputError(NO_DXF)
+
+
 def _document() -> "Drawing":
     """An empty drawing in millimetres with all layers."""
     try:
         from ezdxf.filemanagement import new
         from ezdxf.units import MM
     except ImportError as error:
-        raise InputError(
-            "--format dxf: expected the package ezdxf, got none: pip install 'cellplan[dxf]', or use --format svg"
-        ) from error
+        raise InputError(NO_DXF) from error
     with _fixed_meta_data():
         document = new(VERSION, setup=["linetypes"])
     document.units = MM

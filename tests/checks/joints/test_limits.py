@@ -1,10 +1,14 @@
 """Joint positions and speeds against motions with known extremes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from builders.scene_builders import arm_model, placed
 
-from cellplan.checks.joints.limits import check_joints, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
 from cellplan.model.cell import Robot, Tool
+from cellplan.model.controller import ControllerZero
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
 
 
@@ -82,3 +86,35 @@ def test_endless_joint_has_no_position_limit():
     use, checks = report(one_joint_robot(lower=-np.inf, upper=np.inf), 10.0 * TIMES)
     assert checks["joint_position"].passed
     assert use.margin == np.inf
+
+
+def coupled(robot: Robot, limits: tuple[float, float]) -> Robot:
+    """The robot whose controller shows the third joint plus the second, within limits in [deg]."""
+    n = len(robot.model.joints)
+    coupling, stated = np.zeros((n, n)), np.full((n, 2), (-np.inf, np.inf))
+    coupling[2, 1], stated[2] = 1.0, np.deg2rad(limits)
+    counting = ControllerZero(zero=np.zeros(n), sign=np.ones(n), coupling=coupling, source="test", limits=stated)
+    return replace(robot, model=replace(robot.model, controller=counting))
+
+
+@pytest.mark.parametrize(("upper", "passed"), [(50.0, True), (49.0, False)])
+def test_a_limit_of_a_coupled_angle_is_checked(upper: float, passed: bool) -> None:
+    """Joints 2 and 3 pass 20 and 30 deg, each within its own limits: shown are 50 deg."""
+    robot = coupled(placed("a", arm_model()), (-90.0, upper))
+    times, q = np.array([0.0, 1.0, 2.0]), np.zeros((3, len(robot.model.joints)))
+    q[1, 1:3] = np.deg2rad([20.0, 30.0])
+
+    (check,) = check_shown(robot, times, q)
+
+    name = robot.model.joints[2].name
+    assert (check.name, check.subject, check.passed) == ("controller_position", f"a/{name}", passed)
+    assert (check.at_s, check.unit) == (1.0, "deg")
+    assert check.value == pytest.approx(50.0)
+    if not passed:
+        assert "as the controller shows it is 1 deg beyond its limit 49 deg" in check.message
+
+
+def test_without_stated_limits_nothing_shown_is_checked() -> None:
+    robot = placed("a", arm_model())
+
+    assert check_shown(robot, np.array([0.0, 1.0]), np.zeros((2, len(robot.model.joints)))) == []

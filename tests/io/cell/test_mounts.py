@@ -210,11 +210,11 @@ def test_a_mount_that_cannot_be_is_refused(refuse: Callable[..., list[str]], new
 
 def test_a_robot_table_states_its_counting_in_degrees_and_millimetres(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
-    more = "controller: {zero_deg: {B: 90}, sign: {C: -1}, coupling: {C: {B: 1}}, source: sheet}\n"
+    more = "controller: {zero_deg: {B: 90}, sign: {C: -1}, coupling: {C: {B: -1}}, source: sheet}\n"
     path.write_text(ARM + more, encoding="utf-8")
 
     controller = read_robot_table(path).controller
 
     assert controller is not None
     assert controller.source == "sheet"
-    np.testing.assert_allclose(np.rad2deg(controller.from_model(np.deg2rad([10.0, 20.0, 30.0]))), [10, 110, 80])
+    np.testing.assert_allclose(np.rad2deg(controller.from_model(np.deg2rad([10.0, 20.0, 30.0]))), [10, 110, -140])

@@ -14,7 +14,7 @@ from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.export.corners import row_shares
 from cellplan.model.controllers import ControllerKind, RobotControl
 from cellplan.model.exported import Interpolation, ProgramRows, Promise, RobotRows
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.pipeline.export.compare_rows import other_rows
 from cellplan.pipeline.export.judge import judge
 from cellplan.pipeline.export.resample import lead_time, resampled
@@ -155,6 +155,20 @@ def test_robots_that_meet_are_found(turns: VerifiedRun) -> None:
 
     assert found[0].startswith("robot 'right' holds from 0.000 to 2.000 s: joint B is ")
     assert any(finding.startswith("first: clearance: left/") and " touch, at " in finding for finding in found[1:])
+
+
+def test_pairs_that_come_nearer_than_demanded_are_named_with_the_amount_and_a_cure(run: VerifiedRun) -> None:
+    """Rows as they are, of a cell that demands half a metre: findings say which pair, how near, and what helps."""
+    strict = replace(run.cell, checks=replace(run.cell.checks, clearance=0.5))
+    job = job_of(run, full_rows(run), promise=Promise.SEQUENCE_ONLY)
+
+    found = judge(replace(run, cell=strict, token=ACCESS_TOKEN), dialect(decimals=9), job, read_back(job, decimals=9))
+
+    near = [finding for finding in found.findings if finding.startswith("clearance: ")]
+    assert len(near) > 1
+    kept = r"(come as near as|are proved to keep) [0-9.]+ mm"
+    form = rf"clearance: \S+ and \S+ {kept} .*, at [0-9.]+ s, demanded 500 mm; let "
+    assert all(re.match(form, finding) for finding in near)
 
 
 def test_every_program_of_a_run_is_judged(turns: VerifiedRun) -> None:
