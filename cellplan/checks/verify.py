@@ -9,6 +9,7 @@ from cellplan.checks.clearance.check import UNKNOWN, check_clearance
 from cellplan.checks.clearance.idle import check_idle
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.skew import allowed_skew, has_clocks
+from cellplan.checks.clearance.standoff import check_standoffs, standoffs
 from cellplan.checks.clearance.stops import check_stops, stop_report
 from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
@@ -97,7 +98,8 @@ def verify_motion(
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
     depths = tool_depths(cell, schedule, scene.chains, q)
-    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths)]
+    tips = standoffs(cell, schedule, scene.chains, q)
+    checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths), *check_standoffs(cell, tips)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
@@ -125,6 +127,7 @@ def verify_motion(
         qd={name: np.diff(values, axis=0) / np.diff(schedule.times)[:, None] for name, values in q.items()},
         closures=closures,
         depths=depths,
+        standoffs=tips,
         accelerations=accelerations,
         loads=loads,
     )

@@ -76,6 +76,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("mount_depth", "depth of tools in the arm within the depth of their mounting", "Tool too deep in the arm"),
     CheckKind("standing_depth", "depth of mounted bodies in their supports within its limit", "Body too deep in its support"),
     CheckKind("tool_depth", "tool depth in the part within its limit", "Tool too deep in the part", concern=NEAR),
+    CheckKind("standoff", "tool tips at their distance from the part", "Tool tip off the part", excess=DISTANCE),
     CheckKind("stop_depth", "tool depth in the part within its limit where a robot stops", "Tool too deep in the part where a robot stops"),
     CheckKind("joint_position", "joint positions within their limits", "Joint beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("controller_position", "positions that controllers show within their limits", "Shown position beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),

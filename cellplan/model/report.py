@@ -151,6 +151,31 @@ class ToolDepth:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Standoff:
+    """How far the tip of one task's tool is from the part along its path, in [m].
+
+    Attributes:
+        task: Name of the task.
+        nearest: Smallest and largest distance from the nearest point of the part; 0 where the tip is inside it.
+        along: The same along the tool's axis; inf where the axis does not meet the part ahead of the tip.
+        worst_nearest: Distance from the nearest point where the tip is farthest from what the task states.
+        worst_along: The same along the tool's axis.
+        at_s: Instant in [s] of these two; None where a path is judged before it has a clock.
+        is_off: Whether the tip is not where the task states, or not at the surface where it states nothing.
+        excused: Length of path in [m] of each stretch, by its name, that the task excuses.
+    """
+
+    task: str
+    nearest: tuple[float, float]
+    along: tuple[float, float]
+    worst_nearest: float
+    worst_along: float
+    at_s: float | None
+    is_off: bool
+    excused: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JointUse:
     """How one joint is used, in [rad] or [m], and where it is worst."""
 
@@ -321,6 +346,7 @@ class Report(Presented):
         closures: Closure errors, one entry per holder but the first.
         repeatability: Whether the joints come back with the tools; None when not all tools come back.
         depths: Depth of tools in the part, one entry per task on it.
+        standoffs: Distance of tool tips from the part, one entry per task on it.
         accelerations: Accelerations, jerk and process speeds.
         loads: Load of each robot.
         phases: All phases on the nominal time of the program; times of this report count from the begin of its own.
@@ -346,6 +372,7 @@ class Report(Presented):
     closures: tuple[ClosureAccuracy, ...] = ()
     repeatability: Repeatability | None = None
     depths: tuple[ToolDepth, ...] = ()
+    standoffs: tuple[Standoff, ...] = ()
     accelerations: MotionAccelerations = UNKNOWN_ACCELERATIONS
     loads: tuple[LoadUse, ...] = ()
     phases: tuple[Phase, ...] = ()

@@ -20,6 +20,14 @@ class PlaneName(StrEnum):
     XZ = "xz"
 
 
+class OffPart(StrEnum):
+    """Stretch of a path on which a tool tip may be off the part."""
+
+    RUN_IN = "run_in"
+    RUN_OUT = "run_out"
+    CUT = "cut"
+
+
 class RunDirection(StrEnum):
     """Direction of a closed path, seen from outside the surface."""
 
@@ -255,6 +263,9 @@ class Task:
         relative_to: Frame that path and axes are given in. In the world, the first holder's task says where the part
             is carried; P then reads W in everything that is said of the task.
         tool_depth: Largest depth in [m] that the tool may have in the part, along its axis.
+        standoff: Smallest and largest distance in [m] of the tool tip from the part along the path, measured along the
+            tool's axis, or to the nearest point where the smallest is zero; None where it is not stated.
+        off_part: Stretches of the path on which the tip may be elsewhere.
         after: Names of the tasks of any robots that must be done before it begins.
         start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
             if the task is its first one, and for one that is to be searched otherwise.
@@ -286,6 +297,8 @@ class Task:
     dwell: float = 0.0
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
+    standoff: tuple[float, float] | None = None
+    off_part: tuple[OffPart, ...] = ()
     after: tuple[str, ...] = ()
     spin: float = 0.0
     start_posture: Array | None = None

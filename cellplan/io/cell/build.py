@@ -38,6 +38,7 @@ from cellplan.model.robot import RobotModel
 from cellplan.model.task import (
     CirclePath,
     Frame,
+    OffPart,
     PathSpec,
     PlaneName,
     PolygonPath,
@@ -155,6 +156,8 @@ def build_task(
         dwell=entry.dwell_s,
         relative_to=Frame(entry.relative_to),
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
+        standoff=None if entry.standoff_mm is None else (entry.standoff_mm[0].si, entry.standoff_mm[1].si),
+        off_part=tuple(OffPart(name) for name in entry.off_part),
         after=entry.preceding,
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),

@@ -233,6 +233,17 @@ class TaskEntry(Entry):
         default=None,
         description="Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent.",
     )
+    standoff_mm: tuple[StandOff, StandOff] | None = Field(
+        default=None,
+        description="Smallest and largest distance of the tool tip from the part along the path, below the surface to "
+        "tool_depth_mm: along the tool's axis, or to the nearest point where the smallest is 0. When absent a tip with "
+        "a process is within 2 mm of the part.",
+    )
+    off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = Field(
+        default=(),
+        description="Stretches of the path on which the tip need not keep that distance: its begin, its end, and where "
+        "a cut leaves the part between them.",
+    )
     time_law: TimeLawChoice | None = Field(
         default=None, description="Law of each stretch between stops; the motion's when absent."
     )
@@ -250,13 +261,16 @@ class TaskEntry(Entry):
                 raise rule("unexpected key, process decides how fast the tool moves along its path", key)
         if self.relative_to == "world" and self.path.project is not None:
             raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
-        if self.relative_to == "world" and self.tool_depth_mm is not None:
-            raise rule("unexpected key, a tool in the world does not work on the part", "tool_depth_mm")
         if self.start_deg is not None and self.start is not None:
             raise rule("expected either start_deg or start, got both", "start")
         if self.holder_deg is not None and self.holder is not None:
             raise rule("expected either holder_deg or holder, got both", "holder")
-        for name, words in (("axes", self.axes), ("free", self.free), ("after", self.preceding)):
+        for name, words in (
+            ("axes", self.axes),
+            ("free", self.free),
+            ("off_part", self.off_part),
+            ("after", self.preceding),
+        ):
             require_each_once(words, name)
         if self.spin_deg and self.free:
             raise rule("unexpected key, the spin is free: leave out one of them", "spin_deg")
@@ -264,6 +278,17 @@ class TaskEntry(Entry):
             raise rule(f"expected at least approach_s = {self.approach_s:g}, got {self.start_s:g}", "start_s")
         if self.settle_s and self.approach_mm:
             raise rule("expected no time to settle, as the tool comes to its path by an approach", "settle_s")
+        return self
+
+    @model_validator(mode="after")
+    def _agrees_with_part(self) -> Self:
+        """Only a tool on the part is deep in it or off it; the smallest distance comes first."""
+        for key in ("tool_depth_mm", "standoff_mm", "off_part") if self.relative_to == "world" else ():
+            if key in self.model_fields_set and getattr(self, key) is not None:
+                raise rule("unexpected key, a tool in the world does not work on the part", key)
+        if self.standoff_mm is not None and self.standoff_mm[0] > self.standoff_mm[1]:
+            low, high = (f"{value:g}" for value in self.standoff_mm)
+            raise rule(f"expected [low, high], got [{low}, {high}]: the smaller distance comes first", "standoff_mm")
         return self
 
     @property

@@ -5,6 +5,7 @@ from typing import Annotated, TypedDict
 
 from cellplan.model.cell import Cell
 from cellplan.model.payload import LoadUse
+from cellplan.model.report import Standoff
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 from cellplan.report.record.controller import ZeroRecord, zero_record
@@ -30,15 +31,28 @@ class RestsOnRecord(TypedDict):
     lines: Annotated[list[str], "one line on each value that was not stated and therefore not judged"]
 
 
-def rests_on_record(cell: Cell, loads: Sequence[LoadUse]) -> RestsOnRecord:
+def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standoff] = ()) -> RestsOnRecord:
     """Assumptions, and one line on each value that was not stated."""
     return {
         "bodies": bodies_record(cell),
         "body_accuracy": "add" if cell.checks.adds_accuracy else "report",
         "payload": loads_record(loads),
         "zero": {robot.name: zero_record(robot.model) for robot in cell.robots},
-        "lines": [*(text for _, text in missing_tools(cell)), *unstated_bodies(cell), *unjudged_loads(loads)],
+        "lines": [
+            *(text for _, text in missing_tools(cell)),
+            *unstated_bodies(cell),
+            *unjudged_loads(loads),
+            *unstated_standoffs(cell, tips),
+        ],
     }
+
+
+def unstated_standoffs(cell: Cell, tips: Sequence[Standoff]) -> list[str]:
+    """One line on the tasks without a process whose tips are off the part and that state no distance."""
+    off = {each.task: each.worst_nearest for each in tips if each.is_off}
+    silent = [name for name in off if cell.task(name).standoff is None and cell.task(name).process is None]
+    words = ", ".join(f"{name} (tip {MM * off[name]:.1f} mm off the part)" for name in silent)
+    return [f"standoff_mm of {words} not stated"] if silent else []
 
 
 def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:

@@ -158,7 +158,7 @@ def run_record(
         **idle_record(cell, report),
         **origin_record(cell, provenance),
         "caution": CAUTION,
-        "rests_on": rests_on_record(cell, report.loads),
+        "rests_on": rests_on_record(cell, report.loads, report.standoffs),
         "closest_pairs": closest_pairs_record(clearance),
         "clearance_proof": clearance_proof_record(clearance),
         "open_surfaces": open_surfaces_record(cell),

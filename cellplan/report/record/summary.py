@@ -103,7 +103,7 @@ def summary_record(
         "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
         "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
-        "rests_on": rests_on_record(cell, worst_loads(runs)),
+        "rests_on": rests_on_record(cell, worst_loads(runs), [tip for report in runs for tip in report.standoffs]),
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver, transfers=transfers),

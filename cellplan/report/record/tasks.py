@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import ProcessSpeed
 from cellplan.model.cell import Cell
 from cellplan.model.path_direction import run_direction
-from cellplan.model.report import Report, TaskAccuracy, ToolDepth
+from cellplan.model.report import Report, Standoff, TaskAccuracy, ToolDepth
 from cellplan.model.task import Task
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import AXES, Number, Record, number
@@ -70,7 +70,20 @@ class DepthRecord(TypedDict, total=False):
     allowed_tool_depth_mm: Annotated[Number, "admissible depth"]
 
 
-class TaskRecord(BetweenRowsRecord, DepthRecord, DirectionRecord):
+class StandoffRecord(TypedDict, total=False):
+    """Distance of a tool tip from the part along its path; not for tasks in the world."""
+
+    min_standoff_mm: Annotated[Number, "smallest distance of the tip from the part; 0 where it is inside"]
+    max_standoff_mm: Annotated[Number, "largest one"]
+    min_standoff_along_axis_mm: Annotated[
+        Number, "smallest distance along the tool's axis; null where it meets nothing"
+    ]
+    max_standoff_along_axis_mm: Annotated[Number, "largest one; null where the axis does not meet the part somewhere"]
+    standoff_mm: Annotated[list[Number] | None, "stated distances; null where none are"]
+    off_part_mm: Annotated[dict[str, Number], "by stretch that the task excuses: its length"]
+
+
+class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
 
     robot: Annotated[str, "the operator"]
@@ -104,13 +117,18 @@ class TaskRecord(BetweenRowsRecord, DepthRecord, DirectionRecord):
 def tasks_record(report: Report, cell: Cell) -> dict[str, TaskRecord]:
     """Everything about each task of a run, by name."""
     depths = {depth.task: depth for depth in report.depths}
+    tips = {tip.task: tip for tip in report.standoffs}
     return {
-        accuracy.task: _task_record(accuracy, report, cell, depth=depths.get(accuracy.task))
+        accuracy.task: _task_record(
+            accuracy, report, cell, depth=depths.get(accuracy.task), tip=tips.get(accuracy.task)
+        )
         for accuracy in report.accuracy
     }
 
 
-def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell, *, depth: ToolDepth | None) -> TaskRecord:
+def _task_record(
+    accuracy: TaskAccuracy, report: Report, cell: Cell, *, depth: ToolDepth | None, tip: Standoff | None
+) -> TaskRecord:
     task = cell.task(accuracy.task)
     first = task.first_judged(report.times)
     times = report.times[first:]
@@ -142,6 +160,7 @@ def _task_record(accuracy: TaskAccuracy, report: Report, cell: Cell, *, depth: T
         **direction_record(task),
         **between_record(accuracy.between),
         **_depth_record(depth),
+        **_standoff_record(tip, task),
         "process_speed": _process_record(report.accelerations.process.get(task.name)),
     }
 
@@ -182,6 +201,20 @@ def _depth_record(depth: ToolDepth | None) -> DepthRecord:
         "max_tool_depth_at_s": number(depth.at_s),
         "deepest_body": depth.body if depth.body == AXIS else f"{depth.robot}/{depth.body}",
         "allowed_tool_depth_mm": number(MM * depth.limit),
+    }
+
+
+def _standoff_record(tip: Standoff | None, task: Task) -> StandoffRecord:
+    """Distance of the tip of a task; empty for a task in the world."""
+    if tip is None:
+        return {}
+    return {
+        "min_standoff_mm": number(MM * tip.nearest[0]),
+        "max_standoff_mm": number(MM * tip.nearest[1]),
+        "min_standoff_along_axis_mm": number(MM * tip.along[0]),
+        "max_standoff_along_axis_mm": number(MM * tip.along[1]),
+        "standoff_mm": None if task.standoff is None else [number(MM * value) for value in task.standoff],
+        "off_part_mm": {name: number(MM * length) for name, length in tip.excused.items()},
     }
 
 
