@@ -4,6 +4,7 @@ from typing import Any, Final
 
 from cellplan.report.page.first_screen import clearance_shift
 from cellplan.report.page.times import Shifts
+from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, small, stated
 from cellplan.report.text.notes import accuracy_note, clock_note
@@ -182,6 +183,8 @@ def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
     if whole["minimum_mm"] is None:
         return figure("Smallest clearance", value, "mm", note=required)
     rests_on = accuracy_note(whole["pair"] or (), whole["accuracies_mm"])
+    classes = other_classes(record["clearance"])
+    others = [f"{words} {floored(each['minimum_mm'])} mm" for words, each in classes.items()]
     return figure(
         "Smallest clearance",
         value if whole["exact"] else f"at least {value}",
@@ -189,6 +192,6 @@ def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
         where=" and ".join(whole["pair"] or ()),
         at_s=whole["at_s"],
         shift=clearance_shift(record, shift),
-        note=f"{required}{f'; {rests_on}' if rests_on else ''}",
+        note="; ".join([required, *([rests_on] if rests_on else []), *others]),
         is_bad=whole["minimum_mm"] < record["required_clearance_mm"],
     )

@@ -18,6 +18,7 @@ from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
 from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
+from cellplan.report.record.clearance import CLASSES
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, power, range_bar, small, stated, worst
 from cellplan.report.record.tasks import direction_text
@@ -28,13 +29,6 @@ MODES: Final = {
     "simultaneous": "all robots move",
     "pairwise": "the positioner and one operator move at a time",
     "part_at_rest": "the positioner is at rest",
-}
-CLASSES: Final = {
-    "whole": "whole cell",
-    "robot_robot": "robot to robot",
-    "self": "robot to itself",
-    "part": "part",
-    "environment": "environment",
 }
 EXECUTION_TITLES: Final = {
     "before": "as solved",
@@ -139,7 +133,7 @@ def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) ->
 def _render(name: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
     texts = {
         "modes": MODES,
-        "classes": CLASSES,
+        "classes": {"whole": "whole cell", **CLASSES},
         "narrow": NARROW_FRACTION,
         "fast": FAST_FRACTION,
         "many": len(cell.robots) > MAX_UNFOLDED,

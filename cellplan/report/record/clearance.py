@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Annotated, TypedDict
+from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.model.left_out import LeftOut
 from cellplan.model.report import ASSUMPTION, MARGIN, ClearanceClass, ClearanceMinimum, ClearanceReport
@@ -10,6 +10,12 @@ from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
 
 Accuracies = list[Number]
+CLASSES: Final = {
+    "robot_robot": "robot to robot",
+    "part": "part",
+    "self": "own bodies",
+    "environment": "surroundings",
+}  # what each class is called
 
 Contact = TypedDict(
     "Contact",
@@ -165,3 +171,14 @@ def clearance_proof_record(clearance: ClearanceReport) -> ProofRecord:
 def left_out_record(left_out: Iterable[LeftOut]) -> list[LeftOutRecord]:
     """Everything that was not judged in full, except pairs of links in one robot's model."""
     return [{"kind": str(each.kind), "bodies": list(each.bodies), "reason": each.reason} for each in left_out]
+
+
+def other_classes(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Minima of the classes that the smallest one of all does not belong to, by what each is called.
+
+    Args:
+        record: The clearance of the record of a run.
+    """
+    whole = record["whole"]
+    minima = {words: record[kind] for kind, words in CLASSES.items() if kind in record}
+    return {words: each for words, each in minima.items() if each["minimum_mm"] is not None and each != whole}

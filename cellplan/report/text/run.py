@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
+from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Record
 from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 from cellplan.report.text.columns import Row, aligned
@@ -79,7 +80,7 @@ def motion_text(record: Record) -> str:
 
 def _rows(record: Record) -> Iterator[Row]:
     """The worst values: distances, margins and speeds first, errors of the tools after them."""
-    yield from _clearance_rows(record["clearance"]["whole"])
+    yield from _clearance_rows(record["clearance"])
     yield from _margin_rows(record["joints"])
     yield from _speed_rows(record["joints"])
     yield from acceleration_rows(record)
@@ -183,14 +184,18 @@ def _drift_rows(repeatability: Record) -> Iterator[Row]:
                 yield "largest joint drift", f"{drift:.4g} {unit}", f"{found[joint]} in {where} of {subject}"
 
 
-def _clearance_rows(whole: Record) -> Iterator[Row]:
-    if whole["minimum_mm"] is not None and whole["pair"]:
-        first, second = whole["pair"]
-        proof = "certified" if whole["certified"] else "not certified"
-        least = "" if whole.get("exact", True) else "at least "
-        rests_on = accuracy_note(whole["pair"], whole.get("accuracies_mm"))
-        where = f"{first} - {second}{_time(whole['at_s'])}{f', {rests_on}' if rests_on else ''}"
-        yield "smallest clearance", f"{least}{whole['minimum_mm']:.4g} mm, {proof}", where
+def _clearance_rows(clearance: Record) -> Iterator[Row]:
+    """The smallest distance of all, and those of the classes that it does not belong to."""
+    for words, found in {"smallest clearance": clearance["whole"], **other_classes(clearance)}.items():
+        if found["minimum_mm"] is None or not found["pair"]:
+            continue
+        first, second = found["pair"]
+        proof = "certified" if found["certified"] else "not certified"
+        least = "" if found.get("exact", True) else "at least "
+        rests_on = accuracy_note(found["pair"], found.get("accuracies_mm"))
+        where = f"{first} - {second}{_time(found['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        label = words if found is clearance["whole"] else f"  {words}"
+        yield label, f"{least}{found['minimum_mm']:.4g} mm, {proof}", where
 
 
 def _slack_rows(slack: Record | None) -> Iterator[Row]:

@@ -1,0 +1,182 @@
+"""Distance of tool tips from the part along their paths: to the nearest point, along the axis, stated or not."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders.scene_builders import body, fixed_part, make_cell, placed, slide_model, work
+
+from cellplan.checks.clearance.standoff import check_standoffs, standoff_on, standoffs
+from cellplan.geometry.mesh.tessellation import tessellate
+from cellplan.geometry.shapes import Box, Cylinder, Mesh, Solid, Sphere
+from cellplan.geometry.transforms import pose
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.cell import Cell, Tool
+from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.report import Check, Standoff
+from cellplan.model.task import Frame, OffPart, Process, Task, Tolerance
+from cellplan.report.record.rests_on import unstated_standoffs
+
+PLATE = Box((0.2, 0.2, 0.02))
+DOWN = (np.pi, 0.0, 0.0)  # z of the tool points against z of the part
+WELD = Process(feed=0.01, tolerance=0.05, on_delay=0.0, off_delay=0.0, ramp=0.1)
+TOOL = Tool(
+    X_FT=pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0)), bodies=(body("tool", 0, shape=Cylinder(0.003, 0.1), at=(0, 0, 0.05)),)
+)
+
+
+def cell_with(part: Solid, **task: object) -> Cell:
+    """A tool that looks down and slides up and down over a part whose frame is the world's."""
+    model = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
+    robot = placed("gun", model, base=pose((0.0, 0.0, 0.1), DOWN), tool=TOOL)
+    tolerance = Tolerance(position=1e-4, orientation=1e-3)
+    own: Task = replace(work("gun"), tolerance=tolerance, **task)
+    return make_cell(robot, part=fixed_part(part, np.eye(4)), tasks=(own,))
+
+
+def judged(
+    points: Sequence[Sequence[float]], part: Solid = PLATE, *, rpy: tuple[float, float, float] = DOWN, **task: object
+) -> tuple[Standoff, list[Check]]:
+    """What is said of a tip that passes these points."""
+    cell = cell_with(part, **task)
+    X_PT = np.array([pose((x, y, z), rpy) for x, y, z in points])
+    found = standoff_on(cell, cell.tasks[0], X_PT, times=np.arange(len(points), dtype=float))
+    return found, check_standoffs(cell, [found])
+
+
+@pytest.mark.parametrize("part", [PLATE, tessellate(PLATE)])
+@pytest.mark.parametrize(
+    ("point", "rpy", "nearest", "along"),
+    [
+        ((0.0, 0.0, 0.01), DOWN, 0.0, 0.0),
+        ((0.0, 0.0, 0.07), DOWN, 0.06, 0.06),
+        ((0.0, 0.0, 0.005), DOWN, 0.0, 0.0),  # inside: its depth is another check
+        ((0.16, 0.0, 0.0), DOWN, 0.06, np.inf),  # beside the edge, looking past it
+        ((0.11, 0.0, 0.01), (0.0, -3 * np.pi / 4, 0.0), 0.01, 0.01 * np.sqrt(2.0)),  # 10 mm beside it, at 45 deg to it
+        ((0.0, 0.0, 0.05), (np.pi + np.pi / 3, 0.0, 0.0), 0.04, 0.08),  # leaning by 60 deg
+        ((0.0, 0.0, 0.07), (0.0, 0.0, 0.0), 0.06, np.inf),  # looking away
+    ],
+)
+def test_both_distances_are_those_of_the_closed_form(
+    part: Solid, point: tuple[float, ...], rpy: tuple[float, float, float], nearest: float, along: float
+) -> None:
+    found, _ = judged([point], part, rpy=rpy)
+
+    assert found.worst_nearest == pytest.approx(nearest, abs=6e-5)
+    assert found.worst_along == pytest.approx(along, abs=1e-9)
+
+
+@pytest.mark.parametrize("part", [Sphere(0.05), Cylinder(0.05, 0.02), tessellate(Cylinder(0.05, 0.02), 96)])
+def test_round_parts_are_as_far_as_their_surface(part: Solid) -> None:
+    found, _ = judged([(0.08, 0.0, 0.0)], part, rpy=(0.0, -np.pi / 2, 0.0))
+
+    sagitta = 0.05 * (1.0 / np.cos(np.pi / 96) - 1.0) if isinstance(part, Mesh) else 0.0
+    assert found.worst_nearest == pytest.approx(0.03, abs=6e-5 + sagitta)
+    assert found.worst_along == pytest.approx(0.03, abs=1e-9 + sagitta)
+
+
+def test_a_seam_in_the_air_fails_with_its_distances_and_the_keys() -> None:
+    found, (check,) = judged([(x, 0.0, 0.07) for x in (0.0, 0.01, 0.02)], process=WELD)
+
+    assert found.is_off
+    assert not check.passed
+    assert check.message == (
+        "standoff of task 'work_of_gun': the tip is 60.0 mm from the part at 0.000 s, 60.0 mm along its axis; "
+        "allowed 0 to 2 mm and its tolerance (standoff_mm): put the path on the part, state the distance of the "
+        "process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"
+    )
+
+
+@pytest.mark.parametrize(("height", "passes"), [(0.0, True), (0.0019, True), (0.00205, True), (0.0023, False)])
+def test_a_process_that_states_nothing_is_at_the_surface_within_two_millimetres_and_its_tolerance(
+    height: float, *, passes: bool
+) -> None:
+    assert judged([(0.0, 0.0, 0.01 + height)], process=WELD)[1][0].passed is passes
+
+
+def test_a_task_without_process_and_statement_is_only_named() -> None:
+    found, checks = judged([(0.0, 0.0, 0.07)])
+
+    assert not checks
+    lines = unstated_standoffs(cell_with(PLATE), [found])
+    assert lines == ["standoff_mm of work_of_gun (tip 60.0 mm off the part) not stated"]
+    assert not unstated_standoffs(cell_with(PLATE), [judged([(0.0, 0.0, 0.01)])[0]])
+    assert not unstated_standoffs(cell_with(PLATE, process=WELD), [found])
+
+
+@pytest.mark.parametrize(
+    ("height", "lean", "passes"),
+    [(0.2, 0.0, True), (0.1, 0.0, False), (0.31, 0.0, False), (0.2, np.pi / 3, False), (0.13, np.pi / 6, True)],
+)
+def test_a_gun_keeps_its_distance_along_its_axis(height: float, lean: float, *, passes: bool) -> None:
+    plate = Box((2.0, 2.0, 0.02))
+
+    (check,) = judged([(0.0, 0.0, 0.01 + height)], plate, rpy=(np.pi + lean, 0.0, 0.0), standoff=(0.15, 0.3))[1]
+
+    assert check.passed is passes
+    assert check.value == pytest.approx(1e3 * height / np.cos(lean), abs=1e-6)
+
+
+def test_a_stated_distance_of_zero_is_no_excuse_for_two_millimetres() -> None:
+    _, (check,) = judged([(0.0, 0.0, 0.0115)], standoff=(0.0, 0.0))
+
+    assert not check.passed
+    assert "(standoff_mm = [0, 0])" in check.message
+    assert judged([(0.0, 0.0, 0.01)], standoff=(0.0, 0.0))[1][0].passed
+
+
+CUT = [(x, 0.0, 0.008) for x in (-0.12, -0.11, -0.09, 0.0, 0.09, 0.11, 0.12, 0.13)]
+
+
+def test_run_in_and_run_out_are_excused_by_name_only() -> None:
+    assert not judged(CUT, process=WELD)[1][0].passed
+    assert not judged(CUT, process=WELD, off_part=(OffPart.RUN_IN,))[1][0].passed
+
+    found, (check,) = judged(CUT, process=WELD, off_part=(OffPart.RUN_IN, OffPart.RUN_OUT))
+
+    assert check.passed
+    assert dict(found.excused) == pytest.approx({"run_in": 0.03, "run_out": 0.02})
+    assert check.message.endswith("; excused: run_in over 30.0 mm, run_out over 20.0 mm")
+
+
+def test_a_cut_that_leaves_the_part_is_excused_by_name_only() -> None:
+    hop = [(0.0, 0.0, 0.01), (0.01, 0.0, 0.05), (0.02, 0.0, 0.05), (0.03, 0.0, 0.01)]
+
+    assert not judged(hop, process=WELD, off_part=(OffPart.RUN_IN, OffPart.RUN_OUT))[1][0].passed
+    assert judged(hop, process=WELD, off_part=(OffPart.CUT,))[1][0].passed
+
+
+def test_no_name_excuses_a_path_that_is_nowhere_at_the_part() -> None:
+    points = [(x, 0.0, 0.07) for x in (0.0, 0.01, 0.02)]
+
+    found, (check,) = judged(points, process=WELD, off_part=tuple(OffPart))
+
+    assert not check.passed
+    assert not found.excused
+
+
+def test_written_rows_count_from_the_start_of_the_path_to_its_end() -> None:
+    cell = cell_with(PLATE, process=WELD, start=1.0)
+    q = np.array([0.09, 0.01, 0.01, 0.09])[:, None]  # away, on the path, away
+    times = np.array([0.0, 1.0, 2.0, 3.0])
+
+    def found(task: Task) -> tuple[Standoff, ...]:
+        scheduled = TaskSchedule(
+            task=task,
+            X_PT=np.broadcast_to(np.eye(4), (4, 4, 4)),
+            V_PT_P=np.zeros((4, 6)),
+            travelled=np.zeros(4),
+            length=1.0,
+            end=2.0,
+        )
+        chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
+        return standoffs(cell, Schedule(times=times, tasks=(scheduled,)), chains, {"gun": q})
+
+    (at_path,) = found(cell.tasks[0])
+    (throughout,) = found(replace(cell.tasks[0], start=0.0))
+
+    assert at_path.nearest == pytest.approx((0.0, 0.0), abs=1e-5)
+    assert not at_path.is_off
+    assert throughout.nearest[1] == pytest.approx(0.08, abs=1e-4)
+    assert found(replace(cell.tasks[0], relative_to=Frame.WORLD)) == ()
