@@ -284,7 +284,7 @@ class TaskEntry(Entry):
     def _agrees_with_part(self) -> Self:
         """Only a tool on the part is deep in it or off it; the smallest distance comes first."""
         for key in ("tool_depth_mm", "standoff_mm", "off_part") if self.relative_to == "world" else ():
-            if key in self.model_fields_set and getattr(self, key) is not None:
+            if getattr(self, key) not in (None, ()):
                 raise rule("unexpected key, a tool in the world does not work on the part", key)
         if self.standoff_mm is not None and self.standoff_mm[0] > self.standoff_mm[1]:
             low, high = (f"{value:g}" for value in self.standoff_mm)

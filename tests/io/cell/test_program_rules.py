@@ -116,6 +116,19 @@ def changes(*, program: str = "{}", order: str = "", second: str = "", motion: s
             "c:24: program.attach: expected attach and detach, or none of them, in a program of 2 cycles, got attach "
             "only: add detach, or set cycles: 1",
         ),
+        (
+            {"program": "{attach: {at: {}, rests_on: [floor, flor, floor]}}"},
+            "c:24: program.attach.rests_on[1]: expected a body of the environment (floor), got 'flor', did you mean "
+            "'floor'?\n"
+            "c:24: program.attach.rests_on[2]: expected each body once, got 'floor' twice",
+        ),
+        (
+            {"program": "{attach: {at: {}, rests_on: 7, rest_gap_mm: 11, clamped: maybe, contact_mm: -1}}"},
+            "c:24: program.attach.rests_on: expected the name of a body or a list of them, got 7\n"
+            "c:24: program.attach.rest_gap_mm: expected a number of millimetres of at most 10, got 11\n"
+            "c:24: program.attach.clamped: expected true or false, got 'maybe'\n"
+            "c:24: program.attach.contact_mm: expected a number of millimetres of at least 0, got -1",
+        ),
         ({"program": "{detach: {}}"}, "c:24: program.detach.at: missing, expected pose of the part frame in the world"),
         (
             {"program": "[]"},
@@ -153,6 +166,18 @@ def test_a_task_of_the_holder_begins_at_its_own_start(refuse: Refuse) -> None:
     assert refuse(*program) == [
         "c:22: tasks.second.holder_deg: unexpected key, 'holder' itself holds the part: give start_deg"
     ]
+
+
+def test_what_holds_a_part_where_it_lies_survives_being_written(load: Load, tmp_path: Path) -> None:
+    place = "{at: {}, rests_on: [floor], rest_gap_mm: 3, clamped: true, contact_mm: 30}"
+    cell = load(*changes(program=f"{{attach: {place}}}"))
+    (tmp_path / "again").write_text(render_cell(cell), encoding="utf-8")
+
+    for one in (cell, load_cell(tmp_path / "again")):
+        assert one.program is not None
+        lying = one.program.attach
+        assert lying is not None
+        assert (lying.supports, lying.is_clamped, lying.rest_gap, lying.contact) == (("floor",), True, 0.003, 0.03)
 
 
 def test_an_empty_program_makes_a_sequence_with_room_round_the_part(load: Load) -> None:

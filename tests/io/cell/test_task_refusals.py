@@ -49,6 +49,21 @@ Refuse = Callable[..., list[str]]
             "c:20: tasks.ring.tool_depth_mm: expected a number of millimetres of at most 100, got 101",
         ),
         (
+            "tool_axis: normal",
+            "standoff_mm: [300, 150]",
+            "c:20: tasks.ring.standoff_mm: expected [low, high], got [300, 150]: the smaller distance comes first",
+        ),
+        (
+            "tool_axis: normal",
+            "off_part: [run_in, run_in]",
+            "c:20: tasks.ring.off_part[1]: expected each word once, got 'run_in' twice",
+        ),
+        (
+            "tool_axis: normal",
+            "off_part: [runin]",
+            "c:20: tasks.ring.off_part[0]: expected run_in, run_out or cut, got 'runin', did you mean 'run_in'?",
+        ),
+        (
             "robot: worker",
             "robot: holder",
             "c:18: tasks.ring.robot: expected a robot that does not hold the part, got the positioner 'holder'",

@@ -81,6 +81,7 @@ def test_a_csv_that_is_named_only_is_written_with_its_defaults(cells: Path, tmp_
             "rhombus: {diagonals_mm: [200, 100], plane: xy, direction: clockwise, start_at: -y, angle_deg: 30}",
         ),
         ("tool_axis: normal", "tool_depth_mm: 2.5"),
+        ("tool_axis: normal", "standoff_mm: [0.3, 33.3]\n    off_part: [run_in, cut]"),
         ("environment:", "checks: {tool_depth_mm: 0.3, contact_zone_mm: 50}\nenvironment:"),
         ("tool_axis: normal", "axes: [x, y]\n    tool_axis: [0, 0.3, -0.7]\n    tool_turn_deg: 33.3"),
         ("tool_axis: normal", "time_law: {trapezoid: {ramp: 0.3}}\n    corners: {blend_mm: 2.5}\n    feed_mm_s: 33.3"),
