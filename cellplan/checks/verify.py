@@ -97,8 +97,7 @@ def verify_motion(
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
-    depths = tool_depths(cell, schedule, scene.chains, q)
-    tips = standoffs(cell, schedule, scene.chains, q)
+    tips, depths = standoffs(cell, schedule, scene.chains, q), tool_depths(cell, schedule, scene.chains, q)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths), *check_standoffs(cell, tips)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     uses, joint_checks = _joints(cell, schedule.times, q)
@@ -107,8 +106,11 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += check_payload(loads)
+    checks += [
+        *check_feeds(scene, schedule, q, X_WP),
+        *check_idle(cell, idle, schedule.times, q),
+        *check_payload(loads),
+    ]
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
