@@ -92,8 +92,7 @@ def verify_motion(
     cell = scene.cell
     q = _positions(cell, schedule, tables)
     at_work = [scheduled.task.name for scheduled in schedule.tasks]
-    if idle is None:
-        idle = [name for name in idle_robots(cell, at_work) if name not in moving]
+    idle = [name for name in idle_robots(cell, at_work) if name not in moving] if idle is None else idle
     progress("checking tool errors and joints", 0.0)
     X_WP = part_poses(cell, scene.chains, q)
     accuracy, closures = _errors(scene, schedule, q, X_WP)
@@ -106,17 +105,13 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [
-        *check_feeds(scene, schedule, q, X_WP),
-        *check_idle(cell, idle, schedule.times, q),
-        *check_payload(loads),
-    ]
+    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(at_work),
         idle=tuple(idle),
-        checks=tuple(checks),
+        checks=(*checks, *check_payload(loads)),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
