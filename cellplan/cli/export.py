@@ -17,7 +17,7 @@ from cellplan.errors import ExitStatus, InputError
 if TYPE_CHECKING:
     from cellplan.model.exported import Promise, Targets
     from cellplan.model.progress import Progress
-    from cellplan.model.verified_run import VerifiedRun
+    from cellplan.model.verified_run import ReadRun, VerifiedRun
     from cellplan.pipeline.export.several import Exported
 
 SCHEMA = "cellplan.exported/1"
@@ -114,7 +114,12 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.run.folder import PROGRAMS
         from cellplan.pipeline.export.choice import Choice
         from cellplan.pipeline.export.program import default_folder, refuse_choice
-        from cellplan.pipeline.export.several import chosen_formats, refuse_unfit_run, refuse_unless_writable
+        from cellplan.pipeline.export.several import (
+            NothingFitsError,
+            chosen_formats,
+            refuse_unfit_run,
+            refuse_unless_writable,
+        )
         from cellplan.pipeline.gate.open_gate import open_gate
 
         formats = chosen_formats(form)
@@ -127,12 +132,15 @@ def export(  # noqa: PLR0913, PLR0917 - the options of the command
         folder = output or (default_folder(run, single) if single else run / PROGRAMS)
         refuse_unless_writable([folder] if single else [folder / name for name in formats], run)
         with progress_listener(quiet=quiet) as progress:
-            unfit = partial(refuse_unfit_run, formats=formats, choice=Choice(**choice))
-            verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), refuse=unfit, progress=progress)
-            if single:
-                result = _one(verified, folder, single, choice=choice, progress=progress)
-            else:
-                result = _several(verified, folder, form, choice=choice, progress=progress)
+            unfit = partial(refuse_unfit_run, formats=formats, choice=Choice(**choice), folder=folder)
+            try:
+                verified = open_gate(run, cell=cell, allow_dirs=allow_dir or (), refuse=unfit, progress=progress)
+                if single:
+                    result = _one(verified, folder, single, choice=choice, progress=progress)
+                else:
+                    result = _several(verified, folder, form, choice=choice, progress=progress)
+            except NothingFitsError as nothing:
+                result = _result_of_several(nothing.run, folder, nothing.refused)
     present(result, as_json=as_json)
     raise typer.Exit(result.status)
 
@@ -148,7 +156,12 @@ def _one(verified: "VerifiedRun", folder: Path, form: str, *, choice: dict[str, 
     status = {"status": "exported", "exit": int(ExitStatus.PASSED)}
     about = {"folder": str(folder), "format": form, "run": verified.digest, "files": list(files)}
     remarks = {"remarks": list(verified.remarks), "export": record}
-    lines = [f"{verified.cell.name}: exported", *promise_lines(record), *_notes(verified), f"programs: {folder}"]
+    lines = [
+        f"{verified.cell.name}: exported",
+        *promise_lines(record),
+        *_notes(verified.remarks),
+        f"programs: {folder}",
+    ]
     return Result(status=ExitStatus.PASSED, lines=lines, record={"schema": SCHEMA, **status, **about, **remarks})
 
 
@@ -159,23 +172,30 @@ def _several(
     from cellplan.pipeline.export.choice import Choice
     from cellplan.pipeline.export.several import export_programs
 
-    found = export_programs(verified, folder, formats=forms, choice=Choice(**choice), progress=progress)
+    exports = export_programs(verified, folder, formats=forms, choice=Choice(**choice), progress=progress)
+    return _result_of_several(verified, folder, exports, remarks=verified.remarks)
+
+
+def _result_of_several(
+    run: "VerifiedRun | ReadRun", folder: Path, found: "Sequence[Exported]", *, remarks: Sequence[str] = ()
+) -> Result:
+    """What to say of several formats."""
     status, written = _status(found), [each.form for each in found if each.refusal is None]
     word = "exported" if status == ExitStatus.PASSED else "refused"
-    about = {"status": word, "exit": int(status), "folder": str(folder) if written else None, "run": verified.digest}
+    about = {"status": word, "exit": int(status), "folder": str(folder) if written else None, "run": run.digest}
     record = {
         "schema": SCHEMA,
         **about,
-        "remarks": list(verified.remarks),
+        "remarks": list(remarks),
         "exports": [_record(each) for each in found],
     }
-    lines = [f"{verified.cell.name}: exported {', '.join(written) or 'nothing'}"]
+    lines = [f"{run.cell.name}: exported {', '.join(written) or 'nothing'}"]
     for each in found:
         lines += [f"  {each.form}: {'refused' if each.refusal else each.folder}"]
         lines_of_it = error_lines(each.refusal) if each.refusal else promise_lines(each.record or {"files": ()})
         lines += [f"  {line}" if each.record else f"    {line.removeprefix('error: ')}" for line in lines_of_it]
     place = [f"programs: {folder}"] if written else []
-    return Result(status=status, lines=[*lines, *_notes(verified), *place], record=record)
+    return Result(status=status, lines=[*lines, *_notes(remarks), *place], record=record)
 
 
 def _status(found: Sequence["Exported"]) -> ExitStatus:
@@ -202,9 +222,9 @@ def _record(each: "Exported") -> dict[str, Any]:
     return {**about, "status": "exported", "exit": 0, "files": list(each.files), "export": each.record}
 
 
-def _notes(verified: "VerifiedRun") -> list[str]:
+def _notes(remarks: Sequence[str]) -> list[str]:
     """What to know before relying on the run."""
-    return [f"  note: {remark}" for remark in verified.remarks]
+    return [f"  note: {remark}" for remark in remarks]
 
 
 def promise_lines(record: Mapping[str, Any]) -> Iterator[str]:

@@ -119,7 +119,7 @@ def test_findings_about_the_errors_come_all_at_once(pair: str, capsys: pytest.Ca
     ],
 )
 def test_a_wrong_number_is_refused(pair: str, capsys: pytest.CaptureFixture[str], option: str, finding: str) -> None:
-    status = run(["rehearse", pair, "--errors", "errors.yaml", option])
+    status = run(["rehearse", pair, "--errors", "errors.yaml", "--feedback", option])
 
     assert (status, capsys.readouterr().err) == (2, finding)
 

@@ -222,7 +222,8 @@ def test_a_format_that_was_named_and_is_refused_is_an_error(
     assert (given, reported["exit"], reported["status"]) == (status, status, "refused")
     assert by_name["krl"]["status"] == "refused"
     assert by_name["krl"]["errors"] == [
-        "error: robots.left.controller: expected the controller that plays krl, got none"
+        f"robots.{robot}.controller: expected the controller that plays krl, got none"
+        for robot in ("left", "right", "idle")
     ]
     for name, each in by_name.items():
         assert (tmp_path / "out" / name / "export.json").exists() is (each["status"] == "exported")

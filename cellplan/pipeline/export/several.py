@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from cellplan.cache import nothing_kept
-from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
+from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
 from cellplan.model.progress import Progress, silent
@@ -100,42 +100,48 @@ def export_programs(
         return tuple(_each(Shared(run), folder, chosen, choice, progress))
 
 
-def refuse_unfit_run(run: ReadRun, formats: Iterable[str], choice: Choice) -> None:
+class NothingFitsError(NotVerifiedError):
+    """None of several formats can take a run, as its files say already.
+
+    Attributes:
+        run: The run as it was read.
+        refused: Why not, format by format.
+    """
+
+    def __init__(self, run: ReadRun, refused: tuple[Exported, ...]) -> None:
+        """Join all that speaks against the formats."""
+        super().__init__([f"{each.form}: {line}" for each in refused for line in str(each.refusal).splitlines()])
+        self.run, self.refused = run, refused
+
+
+def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, *, folder: Path) -> None:
     """Refuse an export of which none of the formats can be, as the files of the run say already.
 
     Args:
         run: The run as it was read, before anything is verified.
-        formats: Names of formats.
+        formats: Names of formats, and whether each was asked for by its name.
         choice: What of the run, and how.
+        folder: Where the folders of the formats would go.
 
     Raises:
-        InputError: There is no such robot, or something is not stated in the cell, or does not fit.
-        NotVerifiedError: No promise of a format can be kept with this motion.
+        InputError: There is no such robot; or the only format needs something that is not stated, or does not fit.
+        NotVerifiedError: No promise of the only format can be kept with this motion.
+        NothingFitsError: One of these holds of each of several formats.
     """
     _refuse_unknown(run, choice.robots)
-    refused: dict[str, InputError | NotVerifiedError] = {}
-    for form in (names := tuple(formats)):
+    refused: list[Exported] = []
+    for form, is_named in formats.items():
         dialect = EXPORTERS[form]
         try:
             refuse_choice(form, choice)
             if isinstance(dialect, Dialect):
                 refuse_unfit(run, dialect, choice)
         except (InputError, NotVerifiedError) as error:
-            refused[form] = error
-    if len(refused) < len(names):
-        return
-    if len(refused) == 1:
-        raise refused[names[0]]
-    if all(isinstance(error, InputError) for error in refused.values()):
-        raise InvalidFileError([InputError(f"{form}: {line}") for form, line in _lines(refused)])
-    raise NotVerifiedError(
-        [line if line.startswith(("  ", f"{form}: ")) else f"{form}: {line}" for form, line in _lines(refused)]
-    )
-
-
-def _lines(refused: Mapping[str, Exception]) -> Iterator[tuple[str, str]]:
-    """Every line of what speaks against the formats."""
-    return ((form, line) for form, error in refused.items() for line in str(error).splitlines())
+            refused.append(Exported(form=form, folder=folder / form, is_named=is_named, refusal=error))
+            if len(formats) == 1 and is_named:
+                raise
+    if len(refused) == len(formats):
+        raise NothingFitsError(run, tuple(refused))
 
 
 def refuse_unless_writable(folders: Iterable[Path], run: Path) -> None:

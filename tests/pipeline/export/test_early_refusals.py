@@ -39,7 +39,7 @@ def on(read: ReadRun, kind: ControllerKind, *, handshake: Handshake | None = Non
 
 
 def refusing(form: str, choice: Choice) -> Callable[[ReadRun], None]:
-    return partial(refuse_unfit_run, formats=[form], choice=choice)
+    return partial(refuse_unfit_run, formats={form: True}, choice=choice, folder=Path("out"))
 
 
 @pytest.mark.parametrize(
@@ -120,8 +120,10 @@ def test_the_cure_is_no_controller_that_all_robots_have_already(read: ReadRun) -
 
 
 def test_of_several_formats_that_all_are_refused_each_says_why(read: ReadRun) -> None:
-    with pytest.raises(InputError) as refusal:
-        refuse_unfit_run(read, ["krl", "val3"], Choice(robots=("left",)))
+    formats = {"krl": True, "val3": False}
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        refuse_unfit_run(read, formats, Choice(robots=("left",)), folder=Path("out"))
 
     assert str(refusal.value).splitlines() == [
         f"{form}: robots.left.controller: expected the controller that plays {form}, got none"
@@ -132,7 +134,7 @@ def test_of_several_formats_that_all_are_refused_each_says_why(read: ReadRun) ->
 def test_a_format_that_can_be_written_keeps_several_from_being_refused(read: ReadRun) -> None:
     stages: list[str] = []
 
-    refuse_unfit_run(read, ["krl", "csv"], Choice())
+    refuse_unfit_run(read, {"krl": True, "csv": True}, Choice(), folder=Path("out"))
     stages.append("verified")
 
     assert stages == ["verified"]
