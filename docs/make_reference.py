@@ -87,6 +87,9 @@ bytes.
   they do not know.
 - **Units are in the keys** (`_mm`, `_deg`, `_s`, `_mm_s`, `_deg_s`) or in a `unit` beside the value. Every key that
   ends with `at_s` is a time on the common clock.
+- **Times of a program** count from the begin of their phase. In the `report.json` of a program each of them has its
+  phase beside it, under the same key with `phase` instead of `at_s`: `phase` beside `at_s`, `margin_phase` beside
+  `margin_at_s`. The report of a phase, in the folder with its name, has it once, as `phase`.
 - **`null`** stands for a value that does not exist: the limit of an endless joint, a distance without a pair.
 - Numbers have twelve significant digits and are taken over **all** samples. The arrays of `series.json` have seven.
 - Names of robots, joints, tasks and bodies are those of the cell file.

@@ -12,8 +12,10 @@ from cellplan.pipeline.cell_drawings import STILL, DrawnPhase, phase_drawings, p
 from cellplan.pipeline.gate.compare_drawings import foreign_piece, is_same_drawing
 from cellplan.pipeline.still.instant import worst_instant
 from cellplan.pipeline.still.picture import MARKED, materials, still_picture
+from cellplan.report.page.first_screen import worst_instant as worst_page_instant
 from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
+from cellplan.report.record.summary import summary_record
 from cellplan.report.still.picture import StillPicture
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -175,3 +177,40 @@ def test_the_noise_of_the_arithmetic_does_not_change_a_drawing(solved: Solution,
         for name, text in phase_drawings(phase).items():
             assert is_same_drawing(others[name], text)
             assert foreign_piece(others[name], text) is None
+
+
+@pytest.mark.parametrize("nearer", [1.0, 1.0 - 1e-15, 0.9])
+def test_the_picture_of_a_program_is_of_the_phase_that_its_report_names(solved: Solution, nearer: float) -> None:
+    """Phases that are alike but for the noise of the arithmetic, and one that comes nearer."""
+    first = solved.runs[0].report
+    minima = {
+        kind: replace(each, minimum=None if each.minimum is None else nearer * each.minimum)
+        for kind, each in first.clearance.minima.items()
+    }
+    second = replace(first, phase="second", clearance=replace(first.clearance, minima=minima))
+    one, other = phases(solved)
+    reports = {"first": first, "second": second}
+    record = summary_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
+
+    picture = program_drawings(solved.cell, [one._replace(report=first), other._replace(report=second)])[STILL]
+
+    shown = worst_page_instant(record)
+    assert shown is not None
+    assert shown["phase"] == ("second" if nearer == 0.9 else "first")
+    assert f"at {shown['at_s']:.3f} s of {shown['phase']}" in picture
+
+
+def test_a_failure_without_a_time_does_not_choose_the_phase_of_the_picture(solved: Solution) -> None:
+    first, second = (run.report for run in solved.runs)
+    timeless = replace(first, checks=(failed("payload", "left", at_s=None),))
+    timed = replace(second, checks=(failed("joint_acceleration_assumed", "right/J1", at_s=0.5),))
+    one, other = phases(solved)
+    reports = {"first": timeless, "second": timed}
+    record = summary_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
+
+    picture = program_drawings(solved.cell, [one._replace(report=timeless), other._replace(report=timed)])[STILL]
+
+    shown = worst_page_instant(record)
+    assert shown is not None
+    assert (shown["phase"], shown["at_s"]) == ("second", 0.5)
+    assert "at 0.500 s of second" in picture

@@ -7,10 +7,10 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.pipeline.gate.equal_text import NOISE, is_same
+from cellplan.report.record.phases import AT, PHASE
 
 Record = Mapping[str, Any]
 
-TIME_SUFFIX: Final = "at_s"  # ends the names of times
 TEXT_KEYS: Final = frozenset({"message", "pair", "axis", "joint", "sliding_joint", "busiest_joint"})
 NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences over short times enlarge the noise
     "acceleration": 1e-5,
@@ -84,7 +84,7 @@ def _is_left_out(path: tuple[str, ...], key: str) -> bool:
 
 def _is_of_a_tie(key: str) -> bool:
     """Whether a key says when or where an extreme is: another version may choose another one of two that are alike."""
-    return key.endswith(TIME_SUFFIX) or key in TEXT_KEYS
+    return key.endswith((AT, PHASE)) or key in TEXT_KEYS
 
 
 def _noise(path: tuple[str, ...]) -> float:

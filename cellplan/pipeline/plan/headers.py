@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from cellplan.io.input.findings import listed
 from cellplan.io.run.joint_tables import TableHeader
-from cellplan.model.acceleration import MotionAccelerations
+from cellplan.model.acceleration import JointAcceleration, MotionAccelerations
 from cellplan.model.cell import Cell
 from cellplan.model.idle import not_in_program
 from cellplan.model.phase import NOT_IN_PROGRAM, Phase
@@ -13,7 +13,6 @@ from cellplan.model.report import Report
 from cellplan.report.record.accelerations import table_line
 from cellplan.report.record.controller import zero_text
 from cellplan.report.record.idle import missing_moves
-from cellplan.report.record.merging import merge_accelerations
 
 
 def table_headers(
@@ -36,7 +35,7 @@ def table_headers(
         remark="; ".join(filter(None, [remark, left_out_of_program(cell, phases)])),
     )
     moved = zip(phases, reports, strict=True)
-    accelerations = merge_accelerations([_on_clock(report.accelerations, phase.begin) for phase, report in moved])
+    accelerations = _hardest([_on_clock(report.accelerations, phase.begin) for phase, report in moved])
     return {
         robot.name: replace(header, accelerations=table_line(accelerations, robot.name), zero=zero_text(robot.model))
         for robot in cell.robots
@@ -61,3 +60,16 @@ def _on_clock(accelerations: MotionAccelerations, begin: float) -> MotionAcceler
         for use in accelerations.joints
     )
     return replace(accelerations, joints=tuple(joints))
+
+
+def _hardest(phases: Sequence[MotionAccelerations]) -> MotionAccelerations:
+    """Of each joint the largest acceleration and the largest jerk of all phases."""
+    uses: dict[tuple[str, str], list[JointAcceleration]] = {}
+    for use in (use for phase in phases for use in phase.joints):
+        uses.setdefault((use.robot, use.joint), []).append(use)
+    joints = []
+    for of_joint in uses.values():
+        jerk = max(of_joint, key=lambda use: use.peak_jerk)
+        most = max(of_joint, key=lambda use: use.peak)
+        joints.append(replace(most, peak_jerk=jerk.peak_jerk, peak_jerk_at_s=jerk.peak_jerk_at_s))
+    return MotionAccelerations(joints=tuple(joints))

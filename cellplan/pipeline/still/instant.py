@@ -10,6 +10,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import GRAVITY
 from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
+from cellplan.report.record.clearance import smallest_minimum
+from cellplan.report.record.common import number
 
 NOTE_WIDTH: Final = 74  # [characters] of a line below the title, in a wide type
 MOST_NOTES: Final = 2
@@ -43,11 +45,10 @@ def worst_instant(report: Report, cell: Cell) -> Instant:
     if failed:
         return _of_check(min(failed, key=_gravity), report, cell)
     timeless = next((check for check in report.checks if not check.passed), None)
-    known = [each for each in report.clearance.minima.values() if each.minimum is not None and each.at_s is not None]
-    if not known:
+    smallest = smallest_minimum(report.clearance.minima)
+    if smallest.at_s is None:
         return _narrowest(report, timeless)
-    smallest = min(known, key=lambda each: each.minimum or 0.0)
-    return Instant(at_s=smallest.at_s or 0.0, check=timeless, minimum=smallest, bodies=smallest.pair or ())
+    return Instant(at_s=smallest.at_s, check=timeless, minimum=smallest, bodies=smallest.pair or ())
 
 
 def _narrowest(report: Report, check: Check | None) -> Instant:
@@ -66,15 +67,15 @@ def is_exact(minimum: ClearanceMinimum) -> bool:
 
 def graver(instant: Instant) -> tuple[float, ...]:
     """Order of the worst times of several runs, the gravest first: failures, then the smallest clearances."""
-    if instant.check is not None:
+    if instant.check is not None and instant.is_failure:
         return (0.0, *_gravity(instant.check))
-    distance = np.inf if instant.minimum is None else float(instant.minimum.minimum or 0.0)
+    distance = np.inf if instant.minimum is None else number(instant.minimum.minimum) or 0.0
     return (1.0, distance)
 
 
 def _gravity(check: Check) -> tuple[float, float]:
-    """Order of failed checks, the gravest first: by kind, then by the excess over the limit."""
-    return GRAVITY[check.name], -check.severity
+    """Order of failed checks, the gravest first: by kind, then by the excess over the limit as it is printed."""
+    return GRAVITY[check.name], -check.kind.severity(number(check.value) or 0.0, number(check.limit) or 0.0)
 
 
 def _of_check(check: Check, report: Report, cell: Cell) -> Instant:

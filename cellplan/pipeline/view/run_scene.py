@@ -25,6 +25,7 @@ from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
 from cellplan.report.record.common import Record, rounded_down
 from cellplan.report.record.common import number as plain
+from cellplan.report.record.phases import instant_text
 from cellplan.report.record.view import (
     ClearanceCurveRecord,
     ContactViewRecord,
@@ -299,7 +300,8 @@ def _facts(record: Record) -> list[list[str]]:
     if whole["minimum_mm"] is not None:
         word = "certified" if whole["certified"] else "not certified"
         distance = f"{rounded_down(whole['minimum_mm']):.1f} mm"
-        facts.append(["smallest clearance", f"{distance}, {word}: {' – '.join(whole['pair'] or [])}"])
+        where = " – ".join(whole["pair"] or [])
+        facts.append(["smallest clearance", f"{distance}, {word}: {where} {instant_text(whole)}"])
     return facts
 
 

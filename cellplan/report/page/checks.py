@@ -25,7 +25,7 @@ def failure_groups(record: Record) -> Entries:
     """The failed checks of a record by kind, most severe kind first and the worst of each first.
 
     Each group has a ``title``, all its ``rows`` and the number of those ``listed`` on the first screen; a row has the
-    check as ``message``, and what of it as ``where``, ``amount``, ``when`` (the word before it), ``at_s`` and ``run``.
+    check as ``message``, and what of it as ``where``, ``amount``, ``when`` (the word before it), ``at_s``, ``phase``.
     """
     groups: dict[str, list[Record]] = {}
     for check in record["checks"]:
@@ -48,7 +48,7 @@ def _row(check: Record, record: Record) -> dict[str, Any]:
         "amount": _amount(check),
         "when": "from" if check["name"] == "collision" else "at",
         "at_s": check["at_s"],
-        "run": check.get("run", ""),
+        "phase": check.get("phase", ""),
         "message": check["message"],
     }
 

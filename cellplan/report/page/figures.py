@@ -2,11 +2,10 @@
 
 from typing import Any, Final
 
-from cellplan.report.page.first_screen import clearance_shift
-from cellplan.report.page.times import Shifts
 from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, small, stated
+from cellplan.report.record.phases import phase_key
 from cellplan.report.text.notes import accuracy_note, clock_note
 
 BETWEEN: Final = "_between_rows"  # part of the keys of errors there
@@ -17,27 +16,31 @@ Use = tuple[str, str, Record]  # robot, joint, and how it is used
 def key_figures(record: Record) -> Entries:
     """The key figures of a run: its duration, its clearance, what is nearest to a limit, and its tool errors.
 
-    Each has a ``label``, a ``value`` and a ``unit``; ``where`` and ``at_s`` of the worst, ``shift`` from which that
-    instant counts on the page's clock, and a ``note``. The joint that is nearest to any limit ``is_nearest``.
+    Each has a ``label``, a ``value`` and a ``unit``; ``where``, ``at_s`` and ``phase`` of the worst; a ``note``. The
+    joint that is nearest to any limit ``is_nearest``.
     """
-    shift = Shifts(record)
-    joints = [*_joint_figures(record, shift), *_acceleration_figures(record, shift)]
+    joints = [*_joint_figures(record), *_acceleration_figures(record)]
     nearest = max(joints, key=lambda each: each["used"], default=None)
     if nearest is not None:
         nearest["is_nearest"] = True
     return [
         _cycle_figure(record),
-        _clearance_figure(record, shift),
+        _clearance_figure(record),
         *joints,
-        *_closure_figures(record, shift),
-        *_error_figures(record, shift),
+        *_closure_figures(record),
+        *_error_figures(record),
     ]
 
 
 def figure(label: str, value: str, unit: str, **further: Any) -> dict[str, Any]:
     """A figure with what templates ask of each."""
-    absent = {"where": "", "at_s": None, "shift": 0.0, "note": "", "is_bad": False, "is_nearest": False}
+    absent = {"where": "", "at_s": None, "phase": "", "note": "", "is_bad": False, "is_nearest": False}
     return {"label": label, "value": value, "unit": unit, **absent, **further}
+
+
+def _when(entry: Record, key: str) -> dict[str, Any]:
+    """Time and phase of a figure."""
+    return {"at_s": entry[key], "phase": entry.get(phase_key(key)) or ""}
 
 
 def _cycle_figure(record: Record) -> dict[str, Any]:
@@ -53,14 +56,14 @@ def _cycle_figure(record: Record) -> dict[str, Any]:
     return figure("Cycle time", fixed(record["cycle_time_s"], 2), "s", note=f"{note}; {clock}" if clock else note)
 
 
-def _error_figures(record: Record, shift: Shifts) -> Entries:
+def _error_figures(record: Record) -> Entries:
     """Largest position and orientation error of all tasks."""
     if not record["tasks"]:
         return []
-    return [_error_figure(record, shift, name, unit) for name, unit in (("position", "mm"), ("orientation", "deg"))]
+    return [_error_figure(record, name, unit) for name, unit in (("position", "mm"), ("orientation", "deg"))]
 
 
-def _error_figure(record: Record, shift: Shifts, name: str, unit: str) -> dict[str, Any]:
+def _error_figure(record: Record, name: str, unit: str) -> dict[str, Any]:
     tasks = record["tasks"]
     found = [
         (entry[f"max_{name}_error{where}_{unit}"], where, task)
@@ -70,20 +73,18 @@ def _error_figure(record: Record, shift: Shifts, name: str, unit: str) -> dict[s
     ]
     value, where, task = max(found, key=lambda one: one[0])
     worst, allowed = tasks[task], tasks[task]["tolerance"][f"between_rows_{unit}" if where else f"{name}_{unit}"]
-    at = worst[f"max_{name}_error{where}_at_s"]
     return figure(
         f"Largest {name} error",
         against(value, allowed),
         unit,
         where=f"{task} ({worst['robot']})",
-        at_s=at,
-        shift=shift(f"{name}_error{where}", task, at),
+        **_when(worst, f"max_{name}_error{where}_at_s"),
         note=f"{'between the rows; ' if where else ''}allowed {stated(allowed)} {unit}",
         is_bad=value > allowed,
     )
 
 
-def _closure_figures(record: Record, shift: Shifts) -> Entries:
+def _closure_figures(record: Record) -> Entries:
     """Largest deviation of a co-holder's tool from its grasp."""
     closures = record["closure"]
     if not closures:
@@ -96,15 +97,14 @@ def _closure_figures(record: Record, shift: Shifts) -> Entries:
         against(value, allowed),
         "mm",
         where=robot,
-        at_s=worst["at_s"],
-        shift=shift("closure_position_error", robot, worst["at_s"]),
+        **_when(worst, "at_s"),
         note=f"allowed {stated(allowed)} mm",
         is_bad=value > allowed,
     )
     return [found]
 
 
-def _joint_figures(record: Record, shift: Shifts) -> Entries:
+def _joint_figures(record: Record) -> Entries:
     """Smallest margin, of revolute joints unless only prismatic ones exceed their limits, and highest speed."""
     uses = _uses(record)
     bounded = [use for use in uses if use[2]["margin"] is not None]
@@ -114,9 +114,9 @@ def _joint_figures(record: Record, shift: Shifts) -> Entries:
         exceeded = [use for use in bounded if use[2]["margin"] < 0.0]
         revolute = [use for use in bounded if use[2]["unit"] == "deg"]
         shown = [use for use in revolute if use in exceeded] or exceeded or revolute or bounded
-        figures.append(_margin_figure(shift, min(shown, key=lambda use: use[2]["margin"])))
+        figures.append(_margin_figure(min(shown, key=lambda use: use[2]["margin"])))
     if moving:
-        figures.append(_speed_figure(shift, max(moving, key=lambda use: use[2]["velocity_ratio"])))
+        figures.append(_speed_figure(max(moving, key=lambda use: use[2]["velocity_ratio"])))
     return figures
 
 
@@ -124,7 +124,7 @@ def _uses(record: Record) -> list[Use]:
     return [(robot, name, joint) for robot, named in record["joints"].items() for name, joint in named.items()]
 
 
-def _margin_figure(shift: Shifts, use: Use) -> dict[str, Any]:
+def _margin_figure(use: Use) -> dict[str, Any]:
     robot, name, joint = use
     lower, upper = joint["lower"], joint["upper"]
     half = 0.5 * (upper - lower) if None not in (lower, upper) else 0.0
@@ -133,30 +133,28 @@ def _margin_figure(shift: Shifts, use: Use) -> dict[str, Any]:
         floored(joint["margin"]),
         joint["unit"],
         where=f"{robot} {name}",
-        at_s=joint["margin_at_s"],
-        shift=shift("joint_position", f"{robot}/{name}", joint["margin_at_s"]),
+        **_when(joint, "margin_at_s"),
         note=f"allowed {fixed(lower, 1)} to {fixed(upper, 1)} {joint['unit']}",
         is_bad=joint["margin"] < 0.0,
         used=1.0 - joint["margin"] / half if half > 0.0 else 0.0,
     )
 
 
-def _speed_figure(shift: Shifts, use: Use) -> dict[str, Any]:
+def _speed_figure(use: Use) -> dict[str, Any]:
     robot, name, joint = use
     return figure(
         "Highest joint speed",
         percent(joint["velocity_ratio"]).removesuffix(" %"),
         "% of limit",
         where=f"{robot} {name}",
-        at_s=joint["peak_velocity_at_s"],
-        shift=shift("joint_velocity", f"{robot}/{name}", joint["peak_velocity_at_s"]),
+        **_when(joint, "peak_velocity_at_s"),
         note=f"{fixed(joint['peak_velocity'], 1)} of {fixed(joint['velocity_limit'], 1)} {joint['unit']}/s",
         is_bad=joint["velocity_ratio"] > 1.0,
         used=joint["velocity_ratio"],
     )
 
 
-def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
+def _acceleration_figures(record: Record) -> Entries:
     """The joint with the largest fraction of its limit; nothing if no joint has one."""
     limited = [use for use in _uses(record) if use[2].get("acceleration_ratio") is not None]
     if not limited:
@@ -168,8 +166,7 @@ def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
         percent(ratio).removesuffix(" %"),
         f"% of {'assumed' if is_assumed else 'stated'} limit",
         where=f"{robot} {name}",
-        at_s=joint["peak_acceleration_at_s"],
-        shift=shift("joint_acceleration", f"{robot}/{name}", joint["peak_acceleration_at_s"]),
+        **_when(joint, "peak_acceleration_at_s"),
         note=f"{joint['peak_acceleration']:.1f} of {joint['acceleration_limit']:.1f} {joint['unit']}/s²",
         is_bad=ratio > 1.0,
         used=ratio,
@@ -177,7 +174,7 @@ def _acceleration_figures(record: Record, shift: Shifts) -> Entries:
     return [found]
 
 
-def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
+def _clearance_figure(record: Record) -> dict[str, Any]:
     whole, required = record["clearance"]["whole"], f"required {stated(record['required_clearance_mm'])} mm"
     value = floored(whole["minimum_mm"])
     if whole["minimum_mm"] is None:
@@ -190,8 +187,7 @@ def _clearance_figure(record: Record, shift: Shifts) -> dict[str, Any]:
         value if whole["exact"] else f"at least {value}",
         "mm",
         where=" and ".join(whole["pair"] or ()),
-        at_s=whole["at_s"],
-        shift=clearance_shift(record, shift),
+        **_when(whole, "at_s"),
         note="; ".join([required, *([rests_on] if rests_on else []), *others]),
         is_bad=whole["minimum_mm"] < record["required_clearance_mm"],
     )

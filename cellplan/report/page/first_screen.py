@@ -1,14 +1,13 @@
 """First screen of a report: process speeds, what was not judged, and the instant that its picture shows."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import TITLES, LeftOutKind, left_out_lines
 from cellplan.model.units import MM
 from cellplan.report.page.checks import failure_groups
-from cellplan.report.page.times import Shifts, phase_begins
+from cellplan.report.page.times import phase_begins
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import floored, small
 
@@ -16,57 +15,33 @@ BY_NAME: Final = frozenset({LeftOutKind.EXCLUDED, LeftOutKind.SRDF})  # excluded
 MAX_SPEEDS: Final = 4  # tasks on the first screen; all of them have a line in the table of process speeds
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorstInstant:
-    """What the picture of a report shows."""
+def worst_instant(record: Record) -> Record | None:
+    """The instant of the first failed check that has one, else that of the closest pair; None without either.
 
-    at_s: float  # the instant in [s], on the clock of its run
-    shift: float | None  # time in [s] on the page's clock from which it counts; None if that is not known
-    text: str  # what is worst there
-
-
-def worst_instant(record: Record) -> WorstInstant | None:
-    """The instant of the first failed check that has one, else that of the closest pair; None without either."""
-    begins = phase_begins(record)
+    That is the one which the picture of the run shows: its ``at_s``, its ``phase`` and, as ``text``, what is worst.
+    """
     for group in failure_groups(record):
         for row in group["rows"]:
             if row["at_s"] is not None:
-                shift = begins.get(row["run"]) if row["run"] else 0.0
-                return WorstInstant(at_s=row["at_s"], shift=shift, text=f"{group['title']}: {row['where']}")
+                return {"at_s": row["at_s"], "phase": row["phase"], "text": f"{group['title']}: {row['where']}"}
     whole = record["clearance"]["whole"]
     if whole["at_s"] is None:
         return None
-    pair = " – ".join(whole["pair"] or ())
-    return WorstInstant(
-        at_s=whole["at_s"],
-        shift=clearance_shift(record, Shifts(record)),
-        text=f"Closest pair: {pair}, {'' if whole['exact'] else 'at least '}{floored(whole['minimum_mm'])} mm",
-    )
-
-
-def clearance_shift(record: Record, shift: Shifts) -> float | None:
-    """Time in [s] on the page's clock from which the instant of the smallest clearance counts."""
-    whole = record["clearance"]["whole"]
-    kinds = (name for name, each in record["clearance"].items() if name != "whole" and each["pair"] == whole["pair"])
-    return shift("clearance", next(kinds, ""), whole["at_s"])
+    pair, least = " – ".join(whole["pair"] or ()), "" if whole["exact"] else "at least "
+    text = f"Closest pair: {pair}, {least}{floored(whole['minimum_mm'])} mm"
+    return {"at_s": whole["at_s"], "phase": whole.get("phase", ""), "text": text}
 
 
 def process_speeds(record: Record, cell: Cell) -> Entries:
     """Speed along its path of every task, with the feed that is demanded; failed ones first."""
     failed = {check["subject"] for check in record["checks"] if check["name"] == "process_feed" and not check["passed"]}
-    begins = {
-        role.removeprefix("work: "): phase["begin_s"]
-        for phase in reversed(record["phases"])
-        for role in phase["roles"].values()
-        if role.startswith("work: ")
-    }
     rows = [
         {
             "task": name,
             "robot": task["robot"],
             "speed": task["process_speed"],
             "demanded": _demanded(cell, name),
-            "shift": begins.get(name) if "runs" in record else 0.0,
+            "shift": phase_begins(record).get(task.get("phase", "")) if "runs" in record else 0.0,
             "is_bad": name in failed,
         }
         for name, task in record["tasks"].items()

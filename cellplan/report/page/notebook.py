@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from cellplan.report.page.render import template
 from cellplan.report.record.common import Entries, Record
-from cellplan.report.record.numbers import fixed
+from cellplan.report.record.phases import instant_text
 
 MOST_ROWS: Final = 10  # [-] of a table
 DIGITS: Final = 4  # [-] significant, of numbers in tables
@@ -73,8 +73,7 @@ def card_html(card: Card) -> str:
 
 def _detail(figure: Record) -> str:
     """Where and when a key figure is found, and what else there is to say."""
-    at = "" if figure["at_s"] is None else f"at {fixed(figure['at_s'] + figure['shift'], 3)} s"
-    place = " ".join(part for part in (figure["where"], at) if part)
+    place = " ".join(part for part in (figure["where"], instant_text(figure)) if part)
     return "; ".join(part for part in (place, figure["note"]) if part)
 
 

@@ -11,11 +11,11 @@ from cellplan.model.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures
-from cellplan.report.page.first_screen import MAX_SPEEDS, clearance_shift, not_judged, process_speeds, worst_instant
+from cellplan.report.page.first_screen import MAX_SPEEDS, not_judged, process_speeds, worst_instant
 from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
-from cellplan.report.page.times import Shifts, TimeLinks, page_begin, phase_begins
+from cellplan.report.page.times import TimeLinks, page_begin, phase_begins
 from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.clearance import CLASSES
@@ -102,7 +102,7 @@ def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Li
 
 def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, object]:
     """What the pages of one run and of several have in common."""
-    shift, view = Shifts(record), view_link(record.get("phase"))
+    view, begins = view_link(record.get("phase")), phase_begins(record)
     return {
         "figures": key_figures(record),
         "failures": failure_groups(record),
@@ -112,12 +112,10 @@ def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, objec
         "left_out": left_out_notes(record),
         "grips": grip_notes(record),
         "open_surfaces": [line for _, line in open_surface_notes(record["open_surfaces"])],
-        "begins": phase_begins(record),
+        "begins": begins,
         "worst": worst_instant(record),
         "line": time_line(record, cell),
-        "shift": shift,
-        "whole_shift": clearance_shift(record, shift),
-        "at": TimeLinks(view, page_begin(record)),
+        "at": TimeLinks(view, page_begin(record), begins if "runs" in record else {}),
         "view": view,
         "still": svg_element(beside.get("still", "")),
         "floor_plan_svg": svg_element(beside.get("floor_plan", "")),

@@ -1,11 +1,13 @@
 """Times on a page: each may be chosen there, and leads to the 3-D page."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Final
 
 from cellplan.report.record.common import Record
 from cellplan.report.record.numbers import fixed
+from cellplan.report.record.phases import AT, phase_key
 
 DIGITS: Final = 4  # decimals of an instant in an address, in [s]
 
@@ -17,10 +19,11 @@ class TimeLink:
     text: str  # what is printed
     at: float  # the instant in [s] on the clock of the page
     address: str  # address of the 3-D page at that instant
+    after: str = ""  # what follows in the line, as HTML
 
     def __html__(self) -> str:
         """The element; templates take it as it is."""
-        return f'<a class="at" data-at="{self.at}" href="{escape(self.address)}">{self.text}</a>'
+        return f'<a class="at" data-at="{self.at}" href="{escape(self.address)}">{self.text}</a>{self.after}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,7 @@ class TimeLinks:
 
     view: str  # where the 3-D page lies from the page
     begin: float = 0.0
+    begins: Mapping[str, float] = field(default_factory=dict)  # time in [s] of each phase on the page's clock
 
     def __call__(self, at: float | None, shift: float | None = 0.0) -> str | TimeLink:
         """An instant that may be chosen.
@@ -45,6 +49,31 @@ class TimeLinks:
             return fixed(at, 3)
         chosen = round(shift + at, DIGITS)
         return TimeLink(fixed(at, 3), chosen, self.address(chosen))
+
+    def of(self, entry: Record, key: str = AT) -> str | TimeLink:
+        """An instant in a table, with its phase where the record is that of a program.
+
+        Args:
+            entry: What holds the figure.
+            key: Key of its time.
+        """
+        phase = self._phase(entry, key)
+        return self._followed(entry, key, f' <span class="soft">{escape(phase)}</span>' if phase else "")
+
+    def said(self, entry: Record, key: str = AT) -> str | TimeLink:
+        """The same in a sentence: ``1.626 s of work-2``."""
+        phase = self._phase(entry, key)
+        return self._followed(entry, key, f" s of {escape(phase)}" if phase else " s")
+
+    def _phase(self, entry: Record, key: str) -> str:
+        """Name of the phase of an instant; empty where its clock is that of the page."""
+        return entry.get(phase_key(key)) or ""
+
+    def _followed(self, entry: Record, key: str, after: str) -> str | TimeLink:
+        """An instant with what follows it."""
+        phase = self._phase(entry, key)
+        link = self(entry[key], self.begins.get(phase) if phase else 0.0)
+        return replace(link, after=after) if isinstance(link, TimeLink) else link
 
     def address(self, t: float) -> str:
         """Address of the 3-D page at an instant of the page's clock in [s]."""
@@ -62,35 +91,3 @@ def phase_begins(record: Record) -> dict[str, float]:
     for phase in record["phases"]:
         begins.setdefault(phase["name"], phase["begin_s"])
     return begins
-
-
-class Shifts:
-    """Times from which those of figures count on a page's clock, ``shift("clearance", "self", 2.2)``.
-
-    In a run that is always 0. The figures of a program are the worst of its phases, on the clock of a phase each; the
-    check that says the same tells which one it was.
-    """
-
-    def __init__(self, record: Record) -> None:
-        """Index the checks of a program.
-
-        Args:
-            record: Of a run or of a program.
-        """
-        self._is_run = "runs" not in record
-        self._begins: dict[tuple[str, str, float | None], float] = {}
-        begins = {} if self._is_run else phase_begins(record)
-        for check in record["checks"]:
-            if check.get("run") in begins:
-                name = check["name"].removesuffix("_assumed")
-                self._begins.setdefault((name, check["subject"], check["at_s"]), begins[check["run"]])
-
-    def __call__(self, name: str, subject: str, at: float | None) -> float | None:
-        """The time in [s]; None if it is not known.
-
-        Args:
-            name: Name of the check that the figure is from.
-            subject: Its subject.
-            at: The instant in [s].
-        """
-        return 0.0 if self._is_run else self._begins.get((name, subject, at))

@@ -18,6 +18,7 @@ SCRIPTS: Final = (
     "camera",
     "webgl",
     "painter",
+    "sight",
     "stage",
     "traces",
     "dom",

@@ -93,19 +93,19 @@ def clearance_record(minima: Mapping[ClearanceClass, ClearanceMinimum]) -> dict[
     """Smallest distance of the whole cell and of each class."""
     known = {minimum.pair: minimum.accuracies for minimum in minima.values() if minimum.pair is not None}
     order = (ClearanceClass.ROBOT_ROBOT, ClearanceClass.SELF, ClearanceClass.PART, ClearanceClass.ENVIRONMENT)
-    shown = {"whole": _whole(minima), **{str(kind): minima.get(kind, ClearanceMinimum()) for kind in order}}
+    shown = {"whole": smallest_minimum(minima), **{str(kind): minima.get(kind, ClearanceMinimum()) for kind in order}}
     return {
         name: _minimum_record(minimum, None if minimum.pair is None else known.get(minimum.pair))
         for name, minimum in shown.items()
     }
 
 
-def _whole(minima: Mapping[ClearanceClass, ClearanceMinimum]) -> ClearanceMinimum:
-    """The smallest of all classes; it is certified if every class is."""
+def smallest_minimum(minima: Mapping[ClearanceClass, ClearanceMinimum]) -> ClearanceMinimum:
+    """The smallest of all classes, the first of those that are printed alike; it is certified if every class is."""
     measured = [minimum for minimum in minima.values() if minimum.minimum is not None]
     if not measured:
         return ClearanceMinimum()
-    smallest = min(measured, key=lambda minimum: minimum.minimum or 0.0)
+    smallest = min(measured, key=lambda minimum: number(minimum.minimum) or 0.0)
     return replace(smallest, certified=all(minimum.certified for minimum in measured))
 
 
@@ -179,6 +179,7 @@ def other_classes(record: Mapping[str, Any]) -> dict[str, Any]:
     Args:
         record: The clearance of the record of a run.
     """
-    whole = record["whole"]
+    of_all = (record["whole"]["pair"], record["whole"]["minimum_mm"])
     minima = {words: record[kind] for kind, words in CLASSES.items() if kind in record}
-    return {words: each for words, each in minima.items() if each["minimum_mm"] is not None and each != whole}
+    known = {words: each for words, each in minima.items() if each["minimum_mm"] is not None}
+    return {words: each for words, each in known.items() if (each["pair"], each["minimum_mm"]) != of_all}

@@ -45,7 +45,7 @@ class CheckRecord(TypedDict):
 class RunCheckRecord(CheckRecord):
     """A verified statement about one of several runs."""
 
-    run: Annotated[str, "name of the run"]
+    phase: Annotated[str, "name of its phase"]
 
 
 class OriginRecord(TypedDict):

@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, TypedDict
+from typing import Annotated, Any, TypedDict
 
 from cellplan.model.acceleration import JointAcceleration
 from cellplan.model.cell import Cell
 from cellplan.model.repeatability import Repeatability
 from cellplan.model.report import JointUse, Report
 from cellplan.model.units import MM
-from cellplan.report.record.common import Number, number
+from cellplan.report.record.common import Number, Record, number
+from cellplan.report.record.phases import AT, PHASE
 
 
 class JointAccelerationRecord(TypedDict, total=False):
@@ -98,7 +99,7 @@ def joints_record(
 
 def _joint_record(use: JointUse, acceleration: JointAcceleration | None) -> JointRecord:
     unit, scale = use.display_unit
-    return {
+    record: JointRecord = {
         "unit": unit,
         "min": number(scale * use.min),
         "max": number(scale * use.max),
@@ -110,10 +111,11 @@ def _joint_record(use: JointUse, acceleration: JointAcceleration | None) -> Join
         "velocity_limit": number(scale * use.velocity_limit),
         "velocity_ratio": number(velocity_ratio(use)),
         "peak_velocity_at_s": number(use.peak_velocity_at_s),
-        "worst_at_s": number(use.margin_at_s if _is_position_worse(use) else use.peak_velocity_at_s),
+        "worst_at_s": None,
         "travel": number(scale * use.travel),
         **_acceleration_record(acceleration),
     }
+    return with_worst_time(record)
 
 
 def _acceleration_record(use: JointAcceleration | None) -> JointAccelerationRecord:
@@ -141,12 +143,20 @@ def velocity_ratio(use: JointUse) -> float:
     return 0.0 if use.peak_velocity == 0.0 else math.inf
 
 
-def _is_position_worse(use: JointUse) -> bool:
-    """Whether the joint is closer to its position limit than to its speed limit, each as a fraction of the limit."""
-    half_range = 0.5 * (use.upper - use.lower)
-    if not math.isfinite(half_range):
+def with_worst_time(record: Any) -> Any:
+    """A joint with the time, and the phase if it has one, at which it is nearest to a limit of its own."""
+    source = "margin" if _is_position_worse(record) else "peak_velocity"
+    times = {f"worst_{key}": record[f"{source}_{key}"] for key in (AT, PHASE) if f"{source}_{key}" in record}
+    return {**record, **times}
+
+
+def _is_position_worse(record: Record) -> bool:
+    """Whether a joint is closer to its position limit than to its speed limit, each as a fraction of the limit."""
+    if record["lower"] is None or record["upper"] is None:
         return False
-    return use.margin <= half_range * (1.0 - velocity_ratio(use)) if half_range > 0.0 else True
+    half_range = 0.5 * (record["upper"] - record["lower"])
+    ratio = math.inf if record["velocity_ratio"] is None else record["velocity_ratio"]
+    return bool(record["margin"] <= half_range * (1.0 - ratio)) if half_range > 0.0 else True
 
 
 def repeatability_record(report: Report) -> dict[str, RepeatabilityRecord]:

@@ -1,7 +1,6 @@
 """Payloads in the record of a run: load and rated load of each robot, and what could not be judged."""
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import Annotated, Final, TypedDict
 
 from cellplan.model.payload import AxisUse, LoadUse
@@ -53,32 +52,12 @@ def loads_record(loads: Iterable[LoadUse]) -> dict[str, LoadRecord]:
     return {use.robot: _load_record(use) for use in loads}
 
 
-def worst_loads(runs: Iterable[Report]) -> list[LoadUse]:
-    """Load of each robot over several runs: the largest values of each axis."""
-    merged: dict[str, LoadUse] = {}
+def hardest_loads(runs: Iterable[Report]) -> list[LoadUse]:
+    """Load of each robot in that of several runs in which it is felt most."""
+    uses: dict[str, list[LoadUse]] = {}
     for use in (use for run in runs for use in run.loads):
-        merged[use.robot] = _merged(merged[use.robot], use) if use.robot in merged else use
-    return list(merged.values())
-
-
-def _merged(first: LoadUse, second: LoadUse) -> LoadUse:
-    """The larger values of two runs."""
-    harder = max(first, second, key=lambda use: use.felt or 0.0)
-    axes = []
-    for one, other in zip(first.axes, second.axes, strict=True):
-        static = max(one, other, key=lambda axis: axis.static_moment)
-        moving = max(one, other, key=lambda axis: axis.moment)
-        inert = max(one, other, key=lambda axis: axis.inertia)
-        axes.append(
-            replace(
-                moving,
-                static_moment=static.static_moment,
-                static_at_s=static.static_at_s,
-                inertia=inert.inertia,
-                inertia_at_s=inert.inertia_at_s,
-            )
-        )
-    return replace(harder, axes=tuple(axes))
+        uses.setdefault(use.robot, []).append(use)
+    return [max(of_robot, key=lambda use: use.felt or 0.0) for of_robot in uses.values()]
 
 
 def _load_record(use: LoadUse) -> LoadRecord:

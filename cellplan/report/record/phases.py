@@ -1,10 +1,13 @@
 """Phases of the program in the record of a run."""
 
-from collections.abc import Iterable
-from typing import Annotated, TypedDict
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.model.phase import Phase
-from cellplan.report.record.common import Number, number
+from cellplan.report.record.common import Number, Record, number
+
+AT: Final = "at_s"  # ends the key of an instant, which counts from the begin of its phase
+PHASE: Final = "phase"  # ends the key of its phase instead
 
 
 class PhaseRecord(TypedDict):
@@ -29,3 +32,43 @@ def phases_record(phases: Iterable[Phase]) -> list[PhaseRecord]:
         }
         for phase in phases
     ]
+
+
+def phase_key(key: str) -> str:
+    """Key of the phase of an instant: ``margin_phase`` of ``margin_at_s``, ``phase`` of ``at_s``."""
+    return key.removesuffix(AT) + PHASE
+
+
+def in_phase(record: Record, phase: str) -> Any:
+    """A record of one phase, and of the records in it, in which every instant names that phase.
+
+    Args:
+        record: Figures of the phase.
+        phase: Its name.
+    """
+    named: dict[str, Any] = {}
+    for key, value in record.items():
+        named[key] = _in_phase(value, phase)
+        if key.endswith(AT) and not isinstance(value, list):
+            named[phase_key(key)] = None if value is None else phase
+    return named
+
+
+def _in_phase(value: Any, phase: str) -> Any:
+    """The same of what stands within a record."""
+    if isinstance(value, Mapping):
+        return in_phase(value, phase)
+    return [_in_phase(each, phase) for each in value] if isinstance(value, list) else value
+
+
+def instant_text(entry: Record, key: str = AT) -> str:
+    """When a figure is reached: its time, and its phase in the record of a program; empty without a time.
+
+    Args:
+        entry: What holds the figure.
+        key: Key of the time.
+    """
+    if entry[key] is None:
+        return ""
+    phase = entry.get(phase_key(key))
+    return f"at {entry[key]:.3f} s" + (f" of {phase}" if phase else "")

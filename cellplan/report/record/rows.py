@@ -73,7 +73,8 @@ def run_tables(records: Sequence[Record]) -> Tables:
 
     def each(make: Callable[[Record], Iterable[Row]], names: Sequence[str] = ()) -> Table:
         def rows() -> Iterator[Row]:
-            return ({"phase": _phase(record), **row} for record in records for row in make(record))
+            rows = ((row.get("phase") or _phase(record), row) for record in records for row in make(record))
+            return ({"phase": phase} | row | {"phase": phase} for phase, row in rows)
 
         return lambda: columns_of(rows(), ["phase", *names] if names else ())
 

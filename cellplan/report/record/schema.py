@@ -6,10 +6,12 @@ from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_
 
 from cellplan.report.record.advice import AdviceRecord
 from cellplan.report.record.layout import LayoutRecord
+from cellplan.report.record.phases import AT, phase_key
 from cellplan.report.record.run import RunRecord
 from cellplan.report.record.series import SeriesRecord
 from cellplan.report.record.summary import SummaryRecord
 
+PHASE_OF_INSTANT: Final = Annotated[str | None, "its phase; only in the record of a program"]
 DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
 TYPES: Final[Mapping[object, str]] = {
     str: "string",
@@ -28,6 +30,8 @@ def report_schema(*, closed: bool = False) -> dict[str, Any]:
     """
     definitions: dict[str, dict[str, Any]] = {}
     forms = [_schema(form, definitions, closed=closed) for form in (RunRecord, SummaryRecord)]
+    for definition in definitions.values():
+        definition["properties"] = _with_phases(definition["properties"])
     return {
         "$schema": DIALECT,
         "title": "cellplan.report/1",
@@ -35,6 +39,16 @@ def report_schema(*, closed: bool = False) -> dict[str, Any]:
         "oneOf": forms,
         "$defs": definitions,
     }
+
+
+def _with_phases(properties: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a record, each of an instant followed by that of its phase; see ``in_phase``."""
+    named: dict[str, Any] = {}
+    for key, schema in properties.items():
+        named[key] = schema
+        if key.endswith(AT) and schema.get("type") != "array":
+            named.setdefault(phase_key(key), properties.get(phase_key(key), _schema(PHASE_OF_INSTANT, {}, closed=True)))
+    return named
 
 
 def layout_schema() -> dict[str, Any]:

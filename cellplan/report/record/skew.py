@@ -1,12 +1,13 @@
 """Allowed skew of the clocks of controllers in printed units."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Annotated, Final, TypedDict
 
 from cellplan.model.report import Report
 from cellplan.model.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewReport, ToolSkew
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, number
+from cellplan.report.record.phases import in_phase
 
 MS: Final = 1e3  # [ms/s]
 
@@ -68,11 +69,12 @@ class SkewKey(TypedDict, total=False):
     ]
 
 
-def least_skew_record(reports: Sequence[Report]) -> SkewKey:
-    """The allowed skew of that run of several, one after another, that allows least."""
-    found = [report for report in reports if report.skew is not None]
-    least = min(found, key=lambda report: MOST_SKEW if report.skew is None else report.skew.allowed, default=None)
-    return {} if least is None else skew_record(least)
+def least_skew_record(reports: Mapping[str, Report]) -> SkewKey:
+    """The allowed skew of that run of several by name, one after another, that allows least; see ``skew_record``."""
+    known = {name: report.skew.allowed for name, report in reports.items() if report.skew is not None}
+    least = min(known, key=known.__getitem__, default=None)
+    record: SkewKey = {} if least is None else in_phase(skew_record(reports[least]), least)
+    return record
 
 
 def skew_record(report: Report) -> SkewKey:

@@ -1,12 +1,12 @@
 """``report.json`` of a program whose tasks have a report each: the worst values of all of them."""
 
-from collections.abc import Mapping
-from typing import Annotated, TypedDict
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any, TypedDict
 
 from cellplan.model.cell import Cell
 from cellplan.model.report import CAUTION, Report
 from cellplan.model.units import MM
-from cellplan.report.record.accelerations import accelerations_record
+from cellplan.report.record.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
 from cellplan.report.record.clearance import clearance_record, left_out_record
 from cellplan.report.record.clock import clock_from
 from cellplan.report.record.common import (
@@ -20,16 +20,16 @@ from cellplan.report.record.common import (
 )
 from cellplan.report.record.idle import missing_moves
 from cellplan.report.record.joints import joints_record, repeatability_record
-from cellplan.report.record.merging import merge_accelerations, merge_joint_uses, merge_minima
+from cellplan.report.record.merging import worst_of
 from cellplan.report.record.open_surfaces import open_surfaces_record
-from cellplan.report.record.payload import worst_loads
-from cellplan.report.record.phases import phases_record
+from cellplan.report.record.payload import hardest_loads, loads_record
+from cellplan.report.record.phases import in_phase, phases_record
 from cellplan.report.record.rests_on import rests_on_record
 from cellplan.report.record.run import SCHEMA, HeadRecord
 from cellplan.report.record.skew import SkewKey, least_skew_record
 from cellplan.report.record.solver import solver_record
 from cellplan.report.record.tasks import tasks_record
-from cellplan.report.record.tool_errors import ClosureRecord, worst_closures_record
+from cellplan.report.record.tool_errors import ClosureRecord, closures_record, without_means
 
 
 class _RunEntry(TypedDict):
@@ -68,7 +68,8 @@ def summary_record(
 ) -> SummaryRecord:
     """The record of several runs, one after another.
 
-    Tasks, joints, clearance and accelerations are the worst of all runs; everything else is in the report of each run.
+    Tasks, joints, clearance and accelerations are the worst of all runs, each with the phase it is from; everything
+    else is in the report of each run.
 
     Args:
         reports: Report by the name of the run, which is its phase and its folder.
@@ -76,10 +77,7 @@ def summary_record(
         provenance: Origin of the result.
         transfers: How the transfer moves of each phase were found, by the name of the phase.
     """
-    runs = list(reports.values())
-    tasks = {task.name for task in cell.tasks}
-    own = [report for report in runs if tasks.issuperset(report.tasks)]  # straight moves of holders have a report each
-    accelerations = merge_accelerations(report.accelerations for report in runs)
+    runs, merged = list(reports.values()), _merged(reports, cell)
     return {
         "schema": SCHEMA,
         "cell": cell.name,
@@ -88,28 +86,67 @@ def summary_record(
         "cycle_time_s": number(sum(report.cycle_time for report in runs)),
         "clock_from": clock_from(cell),
         "phases": phases_record(runs[0].phases),
-        "runs": {name: _run_entry(name, report, cell) for name, report in reports.items()},
-        **least_skew_record(runs),
-        "tasks": {name: record for report in own for name, record in tasks_record(report, cell).items()},
+        "runs": {name: in_phase(_run_entry(name, report, cell), name) for name, report in reports.items()},
+        **least_skew_record(reports),
+        "tasks": merged["tasks"],
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
-        "closure": worst_closures_record(runs, cell),
-        "joints": joints_record(
-            merge_joint_uses(use for report in runs for use in report.joints), accelerations.joints
-        ),
+        "closure": merged["closure"],
+        "joints": merged["joints"],
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
-        "clearance": clearance_record(merge_minima(runs)),
+        "clearance": merged["clearance"],
         "required_clearance_mm": number(MM * cell.checks.clearance),
         "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
-        "checks": [{"run": name, **check_record(check)} for name, report in reports.items() for check in report.checks],
+        "checks": [
+            {"phase": name, **check_record(check)} for name, report in reports.items() for check in report.checks
+        ],
         "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
-        "rests_on": rests_on_record(cell, worst_loads(runs), [tip for report in runs for tip in report.standoffs]),
+        "rests_on": merged["rests_on"],
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver, transfers=transfers),
-        "accelerations": accelerations_record(accelerations),
+        "accelerations": merged["accelerations"],
         "cycles": None if cell.program is None else cell.program.cycles,
     }
+
+
+def _merged(reports: Mapping[str, Report], cell: Cell) -> Any:
+    """The tasks of all runs, and the worst of joints, tools, part, distances and loads; times name their phases."""
+    runs, known = list(reports.values()), {task.name for task in cell.tasks}
+    accelerations = [accelerations_record(report.accelerations) for report in runs]
+    merged = worst_of(
+        [
+            in_phase(
+                {
+                    # straight moves of holders have a report each
+                    "tasks": tasks_record(report, cell) if known.issuperset(report.tasks) else {},
+                    "joints": joints_record(report.joints, report.accelerations.joints),
+                    "closure": _closures(report, cell),
+                    "clearance": clearance_record(report.clearance.minima),
+                    "accelerations": accelerations_record(report.accelerations),
+                    "payload": loads_record(report.loads),
+                },
+                name,
+            )
+            for name, report in reports.items()
+        ]
+    )
+    merged["accelerations"]["not_judged"] = _all_left(accelerations)
+    rests_on = rests_on_record(cell, hardest_loads(runs), [tip for report in runs for tip in report.standoffs])
+    return merged | {"rests_on": {**rests_on, "payload": merged["payload"]}}
+
+
+def _closures(report: Report, cell: Cell) -> dict[str, ClosureRecord]:
+    """Closure errors by robot, without what is a mean over one run."""
+    return {robot: without_means(record) for robot, record in closures_record(report, cell).items()}
+
+
+def _all_left(accelerations: Iterable[AccelerationsRecord]) -> list[NotJudgedRecord]:
+    """What was not judged in any of the runs, once each."""
+    left: list[NotJudgedRecord] = []
+    for record in accelerations:
+        left += [entry for entry in record["not_judged"] if entry not in left]
+    return left
 
 
 def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:

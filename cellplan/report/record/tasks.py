@@ -83,7 +83,13 @@ class StandoffRecord(TypedDict, total=False):
     off_part_mm: Annotated[dict[str, Number], "by stretch that the task excuses: its length"]
 
 
-class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord):
+class PhaseOfTask(TypedDict, total=False):
+    """Only of a program with several phases."""
+
+    phase: Annotated[str, "phase in which it is worked on, from whose begin its times count"]
+
+
+class TaskRecord(BetweenRowsRecord, DepthRecord, StandoffRecord, DirectionRecord, PhaseOfTask):
     """Tool error of a task, desired minus actual, over the components that the task constrains."""
 
     robot: Annotated[str, "the operator"]
@@ -157,12 +163,18 @@ def _task_record(
         "cycles": task.repeat,
         "start_s": number(accuracy.start_s),
         "end_s": number(accuracy.end_s),
+        **_phase_of(report),
         **direction_record(task),
         **between_record(accuracy.between),
         **_depth_record(depth),
         **_standoff_record(tip, task),
         "process_speed": _process_record(report.accelerations.process.get(task.name)),
     }
+
+
+def _phase_of(report: Report) -> PhaseOfTask:
+    """The phase of a report; nothing of the only one."""
+    return {} if report.phase is None else {"phase": report.phase}
 
 
 def _tolerance_record(task: Task, *, has_between: bool) -> ToleranceRecord:

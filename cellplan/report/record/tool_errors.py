@@ -1,7 +1,6 @@
 """Tool errors of tasks and grasps in printed units: at the rows of the tables and between them."""
 
-from collections.abc import Iterable
-from typing import Annotated, Final, Literal, TypedDict
+from typing import Annotated, TypedDict
 
 import numpy as np
 
@@ -11,25 +10,6 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import ClosureAccuracy, Report
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import AXES, Number, number
-
-ErrorKey = Literal[
-    "max_position_error_mm",
-    "max_orientation_error_deg",
-    "max_position_error_between_rows_mm",
-    "max_orientation_error_between_rows_deg",
-]
-TimeKey = Literal[
-    "at_s",
-    "max_orientation_error_at_s",
-    "max_position_error_between_rows_at_s",
-    "max_orientation_error_between_rows_at_s",
-]
-ERROR_KEYS: Final[tuple[tuple[ErrorKey, TimeKey], ...]] = (
-    ("max_position_error_mm", "at_s"),
-    ("max_orientation_error_deg", "max_orientation_error_at_s"),
-    ("max_position_error_between_rows_mm", "max_position_error_between_rows_at_s"),
-    ("max_orientation_error_between_rows_deg", "max_orientation_error_between_rows_at_s"),
-)
 
 
 class BetweenRowsRecord(TypedDict, total=False):
@@ -136,20 +116,8 @@ def _closure_record(closure: ClosureAccuracy, report: Report, cell: Cell) -> Run
     }
 
 
-def worst_closures_record(runs: Iterable[Report], cell: Cell) -> dict[str, ClosureRecord]:
-    """Closure errors by robot: the largest distance and the largest angle of all runs, each with its time."""
-    worst: dict[str, ClosureRecord] = {}
-    for report in runs:
-        for robot, record in closures_record(report, cell).items():
-            known = worst.setdefault(robot, _without_means(record))
-            for error, time in ERROR_KEYS:
-                if (record.get(error) or 0.0) > (known.get(error) or 0.0):
-                    known[error], known[time] = record[error], record[time]
-    return worst
-
-
-def _without_means(record: RunClosureRecord) -> ClosureRecord:
+def without_means(record: RunClosureRecord) -> ClosureRecord:
     """The record without what is a mean over one run."""
-    worst = record.copy()
-    del worst["mean_position_error_mm"], worst["mean_orientation_error_deg"]
-    return worst
+    rest = record.copy()
+    del rest["mean_position_error_mm"], rest["mean_orientation_error_deg"]
+    return rest

@@ -169,4 +169,4 @@ def _joint(joint: Record) -> dict[str, Any]:
 
 def _with_phase(check: Record) -> str:
     """A failed check with the phase it is of, where there are several."""
-    return f"{check['run']}: {check['message']}" if "run" in check else str(check["message"])
+    return f"{check['phase']}: {check['message']}" if "phase" in check else str(check["message"])

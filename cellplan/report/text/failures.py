@@ -19,8 +19,8 @@ def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
     groups: dict[str, list[str]] = {}
     for check in checks:
         if not check["passed"]:
-            run = f"{check['run']}: " if check.get("run") else ""
-            groups.setdefault(CHECK_KINDS[check["name"]].heading, []).append(f"{run}{check['message']}")
+            phase = f"{check['phase']}: " if check.get("phase") else ""
+            groups.setdefault(CHECK_KINDS[check["name"]].heading, []).append(f"{phase}{check['message']}")
     for title, messages in groups.items():
         yield f"  {title}: {len(messages)} failed"
         yield from (f"    FAILED {message}" for message in messages[:MOST_OF_A_GROUP])

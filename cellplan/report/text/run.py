@@ -9,6 +9,7 @@ from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
 from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Record
+from cellplan.report.record.phases import instant_text
 from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
@@ -105,7 +106,8 @@ def _method_text(solver: Record) -> str:
 
 def _task_rows(tasks: Record) -> Iterator[Row]:
     for name, task in tasks.items():
-        yield "largest tool error", _error_text(task), f"task {name} ({task['robot']})"
+        phase = f", {task['phase']}" if task.get("phase") else ""
+        yield "largest tool error", _error_text(task), f"task {name} ({task['robot']}){phase}"
     for name, task in tasks.items():
         if task.get("path_bulge_mm"):
             yield (
@@ -117,7 +119,7 @@ def _task_rows(tasks: Record) -> Iterator[Row]:
 
 def _closure_rows(closures: Record) -> Iterator[Row]:
     for robot, closure in closures.items():
-        yield "largest closure error", _error_text(closure), f"grasp of {robot}"
+        yield "largest closure error", _error_text(closure), f"grasp of {robot} {instant_text(closure)}"
 
 
 def _error_text(errors: Record) -> str:
@@ -137,26 +139,26 @@ def _margin_rows(joints: Record) -> Iterator[Row]:
     """The joint with the smallest margin, in degrees and in millimetres."""
     for unit in ("deg", "mm"):
         bounded = [
-            (use["margin"], f"{robot} {joint}", use["margin_at_s"])
+            (use["margin"], f"{robot} {joint} {instant_text(use, 'margin_at_s')}")
             for robot, uses in joints.items()
             for joint, use in uses.items()
             if use["unit"] == unit and use["margin"] is not None
         ]
         if bounded:
-            margin, joint, at_s = min(bounded)
-            yield "smallest joint margin", f"{margin:.4g} {unit}", f"{joint}{_time(at_s)}"
+            margin, where = min(bounded)
+            yield "smallest joint margin", f"{margin:.4g} {unit}", where
 
 
 def _speed_rows(joints: Record) -> Iterator[Row]:
     driven = [
-        (use["velocity_ratio"], f"{robot} {joint}", use["peak_velocity_at_s"])
+        (use["velocity_ratio"], f"{robot} {joint} {instant_text(use, 'peak_velocity_at_s')}")
         for robot, uses in joints.items()
         for joint, use in uses.items()
         if use["velocity_ratio"] is not None
     ]
     if driven:
-        ratio, joint, at_s = max(driven)
-        yield "largest joint speed", f"{100.0 * ratio:.4g} % of its limit", f"{joint}{_time(at_s)}"
+        ratio, where = max(driven)
+        yield "largest joint speed", f"{100.0 * ratio:.4g} % of its limit", where
 
 
 def _program_lines(record: Record) -> Iterator[str]:
@@ -193,7 +195,7 @@ def _clearance_rows(clearance: Record) -> Iterator[Row]:
         proof = "certified" if found["certified"] else "not certified"
         least = "" if found.get("exact", True) else "at least "
         rests_on = accuracy_note(found["pair"], found.get("accuracies_mm"))
-        where = f"{first} - {second}{_time(found['at_s'])}{f', {rests_on}' if rests_on else ''}"
+        where = f"{first} - {second} {instant_text(found)}{f', {rests_on}' if rests_on else ''}"
         label = words if found is clearance["whole"] else f"  {words}"
         yield label, f"{least}{found['minimum_mm']:.4g} mm, {proof}", where
 
@@ -201,7 +203,7 @@ def _clearance_rows(clearance: Record) -> Iterator[Row]:
 def _slack_rows(slack: Record | None) -> Iterator[Row]:
     """The largest task slack."""
     if slack and slack["max"]:
-        yield "largest task slack", f"{slack['max']:.2g}", f"{slack['unit']}{_time(slack['max_at_s'])}"
+        yield "largest task slack", f"{slack['max']:.2g}", f"{slack['unit']} {instant_text(slack, 'max_at_s')}"
 
 
 def _integration_lines(solver: Record) -> Iterator[str]:
@@ -225,7 +227,3 @@ def _place_lines(folder: Path) -> Iterator[str]:
 
 def _short(value: float | None) -> str:
     return "unknown" if value is None else f"{value:.2g}"
-
-
-def _time(at_s: float | None) -> str:
-    return "" if at_s is None else f" at {at_s:.3f} s"

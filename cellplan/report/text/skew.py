@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from cellplan.model.skew import MOST_SKEW, PairSkew, SkewReport
 from cellplan.report.record.common import Record
+from cellplan.report.record.phases import instant_text
 from cellplan.report.text.columns import Row
 
 DIGITS = 3  # significant ones of a skew
@@ -18,7 +19,7 @@ def skew_row(record: Record) -> Iterator[Row]:
     least = min(pair["limits"], key=lambda each: float(each["skew_ms"]))
     where = f"{pair['robots'][0]} - {pair['robots'][1]}"
     if least["subject"]:
-        where = f"{where}, {least['limit']} of {least['subject']}"
+        where = f"{where}, {least['limit']} of {least['subject']} {instant_text(least)}"
     yield "allowed skew", skew_text(float(pair["allowed_ms"]), or_more=pair["or_more"]), where
 
 

@@ -63,8 +63,8 @@ def test_the_worst_instant_is_that_of_the_closest_pair_unless_a_check_fails(pass
     record = record_of(passed_run)
     closest = worst_instant(record)
     assert closest is not None
-    assert closest.at_s == record["clearance"]["whole"]["at_s"]
-    assert " – ".join(record["clearance"]["whole"]["pair"]) in closest.text
+    assert closest["at_s"] == record["clearance"]["whole"]["at_s"]
+    assert " – ".join(record["clearance"]["whole"]["pair"]) in closest["text"]
 
     failed = worst_instant(
         record_of(
@@ -75,7 +75,7 @@ def test_the_worst_instant_is_that_of_the_closest_pair_unless_a_check_fails(pass
         )
     )
     assert failed is not None
-    assert (failed.at_s, failed.text) == (2.0, "Collision: a – c")
+    assert (failed["at_s"], failed["text"]) == (2.0, "Collision: a – c")
 
 
 def test_a_demanded_feed_stands_beside_the_speed_and_a_missed_one_comes_first(passed_run: Any) -> None:
@@ -143,7 +143,7 @@ def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: An
     rows = [row for group in failure_groups(record) for row in group["rows"]]
 
     assert page_begin(record) == 0.0
-    assert {row["run"] for row in rows} <= set(reports)
+    assert {row["phase"] for row in rows} <= set(reports)
     assert all(row["message"] for row in rows)
 
 

@@ -1,6 +1,7 @@
 """3-D pages in headless Chromium: no error, a picture, the instant of the address, controls that work."""
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -281,3 +282,107 @@ def test_nothing_sticks_out_of_a_narrow_window(browser: Browser, folder: Path, n
     """)
 
     assert wide == [390]
+
+
+FENCE = """\
+  fence: {box: {size_mm: [9000, 40, 4000]}, at: {xyz_mm: [700, -1500, 0]}}
+  rear: {box: {size_mm: [9000, 40, 4000]}, at: {xyz_mm: [700, 4500, 0]}}
+"""
+SHELTER = """\
+  shelter: {box: {size_mm: [9000, 8000, 40]}, at: {xyz_mm: [700, 1000, 2000]}}
+"""
+SEEN = """
+  const names = (indices) => [...indices].map((index) => app.stage.scene.bodies[index].name);
+  const faded = app.stage.frame(app.stage.at(app.player.t), app.camera.eye).bodies.filter((body) => body.opacity < 1);
+  return [names(app.stage.sight.from(app.camera.eye)), faded.length];
+"""
+
+
+def page_of(sound: Path, folder: Path, surroundings: str) -> Path:
+    """The 3-D page of the small cell with more surroundings."""
+    shutil.copytree(sound / "cell", folder)
+    cell = folder / "small.yaml"
+    cell.write_text(cell.read_text().replace("motion:", f"{surroundings}motion:"))
+    write_view(view(ViewRequest(path=cell))[0], folder / "page.html")
+    return folder / "page.html"
+
+
+@pytest.mark.parametrize("preset", ["front", "back", "top"])
+@pytest.mark.parametrize("name", ["browser", "without_webgl"])
+def test_robots_are_seen_through_what_stands_before_them(
+    sound: Path, tmp_path: Path, name: str, preset: str, request: pytest.FixtureRequest
+) -> None:
+    browser: Browser = request.getfixturevalue(name)
+    hiding = {"front": "fence", "back": "rear", "top": "shelter"}[preset]
+    pictures = {}
+    for page, surroundings in (("open", ""), ("fenced", SHELTER if preset == "top" else FENCE)):
+        browser.open(page_of(sound, tmp_path / page, surroundings), f"#view={preset}")
+        if page == "fenced":
+            names, faded = browser.run(SEEN)
+            assert hiding in names
+            assert faded == len(names) < 3
+        browser.run("app.camera.whole = app.stage.machines; app.camera.look(app.camera.preset); await drawn();")
+        pictures[page] = browser.picture()[STAGE]
+
+    # colours of robots stay colours: grey walls have none
+    vivid = {page: (image[..., :3].max(-1) - image[..., :3].min(-1) > 0.12).mean() for page, image in pictures.items()}
+    assert vivid["fenced"] > 0.5 * vivid["open"] > 0.001
+
+
+def test_what_touches_a_robot_is_not_faded(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "crate.html")
+
+    names, faded = browser.run(SEEN)
+
+    assert "crate" in names
+    assert faded < len(names)
+
+
+def test_the_view_from_above_holds_the_whole_cell(sound: Path, tmp_path: Path, browser: Browser) -> None:
+    browser.open(page_of(sound, tmp_path / "fenced", FENCE), "#view=top")
+
+    outside = browser.run("""
+      const matrix = app.camera.matrix();
+      const places = app.stage.whole.corners.map((corner) => projected(matrix, corner));
+      return places.filter(([x, y, , w]) => Math.abs(x) > w || Math.abs(y) > w).length;
+    """)
+
+    assert outside == 0
+    corners = browser.run("return [app.stage.whole, app.stage.machines].map((each) => each.corners.length);")
+    assert corners[0] > corners[1]
+
+
+@pytest.mark.parametrize("frame", ["world", "part"])
+def test_traces_follow_the_rows_of_a_long_program(browser: Browser, folder: Path, frame: str) -> None:
+    """A minute of motion with a turn of a tool each second: chords of a second would cut straight across."""
+    browser.open(folder / "run.html")
+    worst, count, end = browser.run(f"""
+      const stage = app.stage;
+      const rows = 60001;
+      const width = stage.motion.width;
+      stage.motion.count = rows;
+      stage.motion.times = Float64Array.from({{ length: rows }}, (_, i) => i / 1000);
+      stage.motion.q = Float32Array.from({{ length: rows * width }}, (_, i) => {{
+        const t = Math.floor(i / width) / 1000;
+        return 0.3 * Math.sin(2 * Math.PI * t + (i % width));
+      }});
+      stage.traces = new Traces(stage);
+      const {{ rows: shown, points }} = stage.traces.seenFrom("{frame}");
+      let worst = 0;
+      for (let i = 0; i + 1 < shown.length; i += 7) {{
+        const middle = stage.traces.tips("{frame}", (shown[i] + shown[i + 1]) >> 1);
+        middle.forEach((tip, robot) => {{
+          const [a, b] = [i, i + 1].map((at) => [...points[robot].subarray(3 * at, 3 * at + 3)]);
+          worst = Math.max(worst, offChord(tip, a, b));
+        }});
+      }}
+      stage.traceIn = "{frame}";
+      const state = stage.at(30.0123);
+      const rest = stage.traces.lines(state).filter((line) => line.isBrief)[0];
+      const tip = moved(inverseRigid(rest.place), tipOf(stage.scene.robots[0], state.links[0]));
+      return [worst, shown.length, length(subtract([...rest.points.subarray(3)], tip))];
+    """)
+
+    assert worst < 6e-4  # [m]
+    assert count < 20_000
+    assert end < 1e-6  # [m] the trace ends at the tool

@@ -17,7 +17,7 @@ from cellplan.model.acceleration import (
 from cellplan.model.report import JointUse
 from cellplan.report.record.accelerations import accelerations_record, table_line
 from cellplan.report.record.joints import joints_record
-from cellplan.report.record.merging import merge_accelerations
+from cellplan.report.record.merging import worst_of
 from cellplan.report.record.tasks import tasks_record
 
 TURNING = JointAcceleration(
@@ -99,11 +99,12 @@ def test_the_process_speed_of_a_task_is_recorded_in_millimetres_per_second(passe
 def test_the_worst_of_several_runs_counts() -> None:
     gentle = replace(FOUND, joints=(replace(TURNING, peak=0.1, peak_jerk=99.0), SLIDING), part=None)
 
-    merged = merge_accelerations([FOUND, gentle])
+    joints = worst_of([joints_record([use_of(TURNING)], found.joints) for found in (FOUND, gentle)])["kuka"]["A1"]
+    merged = worst_of([accelerations_record(found) for found in (FOUND, gentle)])
 
-    assert merged.joints[0].peak == TURNING.peak
-    assert merged.joints[0].peak_jerk == 99.0
-    assert merged.part == FOUND.part
+    assert joints["peak_acceleration"] == pytest.approx(math.degrees(TURNING.peak))
+    assert joints["peak_jerk"] == pytest.approx(math.degrees(99.0))
+    assert merged["part"] == accelerations_record(FOUND)["part"]
 
 
 @pytest.mark.parametrize(

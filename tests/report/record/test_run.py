@@ -16,7 +16,7 @@ from cellplan.model.cell import LockedJoint
 from cellplan.model.repeatability import JointDrift, Repeatability
 from cellplan.model.report import ClearanceClass, ClosureAccuracy
 from cellplan.report.record.common import as_json, number
-from cellplan.report.record.merging import merge_joint_uses
+from cellplan.report.record.merging import worst_of
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
@@ -194,11 +194,13 @@ def test_summary_of_several_runs_keeps_the_worst(pairwise_runs: Any) -> None:
     failed = record_of(pairwise_runs["rhombus"])
     assert summary["joints"]["kuka"]["B5"]["margin"] == failed["joints"]["kuka"]["B5"]["margin"]
     assert summary["clearance"]["whole"]["pair"] == ["kuka/B5", "abb/A5"]
-    assert {check["run"] for check in summary["checks"] if not check["passed"]} == {"rhombus"}
+    assert {check["phase"] for check in summary["checks"] if not check["passed"]} == {"rhombus"}
 
 
 def test_merging_one_run_changes_nothing(passed_run: Any) -> None:
-    assert merge_joint_uses(passed_run.report.joints) == list(passed_run.report.joints)
+    joints = record_of(passed_run)["joints"]
+
+    assert worst_of([joints]) == joints
 
 
 def test_same_run_gives_the_same_bytes(failed_run: Any) -> None:

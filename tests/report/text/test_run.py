@@ -91,7 +91,7 @@ def test_every_failed_check_has_a_line_and_no_tables_are_offered(record: dict[st
         "status": "failed",
         "checks": [
             {"name": "collision", "passed": False, "message": "first"},
-            {"name": "joint_position", "passed": False, "message": "second", "run": "ring"},
+            {"name": "joint_position", "passed": False, "message": "second", "phase": "ring"},
             {"name": "collision", "passed": True, "message": "fine"},
             {"name": "collision", "passed": False, "message": "third"},
         ],

@@ -48,6 +48,7 @@ class Bases {
     byId("yaml-text").value = this.yaml();
     byId("bases-note").hidden = changes.length === 0;
     stage.traces = new Traces(stage);
+    stage.sight = new Sight(stage);
     stage.moved = changes.length > 0;
     this.app.refresh();
   }

@@ -16,9 +16,7 @@ class Camera {
     this.canvas = canvas;
     this.onChange = onChange;
     this.pointers = new Map();
-    this.centre = [0, 0, 0];
-    this.radius = 1;
-    this.corners = [];
+    this.machines = this.whole = { centre: [0, 0, 0], radius: 1, corners: [] };
     this.target = [0, 0, 0];
     this.distance = 5;
     this.look("oblique");
@@ -34,18 +32,19 @@ class Camera {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
-  /** Show all that is to be seen from the direction of a preset, as near as the picture allows. */
+  /** Show the robots, from above the whole cell, from the direction of a preset, as near as the picture allows. */
   look(name) {
     [this.azimuth, this.elevation] = PRESETS[name].map(radians);
     this.preset = name;
-    this.target = [...this.centre];
+    const { centre, corners } = name === "top" ? this.whole : this.machines;
+    this.target = [...centre];
     const back = unit(subtract(this.eye, this.target));
     const right = unit(cross([0, 0, 1], back));
     const up = cross(back, right);
     const tall = Math.tan(FIELD_OF_VIEW / 2) * FILLED;
     const wide = (tall * (this.canvas.clientWidth || 1)) / (this.canvas.clientHeight || 1);
     this.distance = 0.1;
-    for (const corner of this.corners) {
+    for (const corner of corners) {
       const p = subtract(corner, this.target);
       const across = Math.max(Math.abs(dot(p, right)) / wide, Math.abs(dot(p, up)) / tall);
       this.distance = Math.max(this.distance, across + dot(p, back));
@@ -53,11 +52,10 @@ class Camera {
     this.onChange();
   }
 
-  /** What is to be seen: the middle of it, and the corners of boxes that hold it. */
-  fit(centre, radius, corners) {
-    this.centre = centre;
-    this.radius = radius;
-    this.corners = corners;
+  /** What is to be seen, of the robots and of the whole cell: the middle, and the corners of boxes that hold it. */
+  fit(machines, whole) {
+    this.machines = machines;
+    this.whole = whole;
   }
 
   /** Where the camera is, as a text: two angles in rad, the distance and the target in m. */
@@ -82,7 +80,7 @@ class Camera {
   /** From the world to the picture, both axes from -1 to 1. */
   matrix() {
     const aspect = (this.canvas.clientWidth || 1) / (this.canvas.clientHeight || 1);
-    const far = this.distance + 12 * this.radius;
+    const far = this.distance + Math.max(12 * this.machines.radius, 3 * this.whole.radius);
     const projection = perspective(FIELD_OF_VIEW, aspect, Math.max(0.01, this.distance * 0.02), far);
     return multiply(projection, lookingAt(this.eye, this.target, [0, 0, 1]));
   }
@@ -126,7 +124,7 @@ class Camera {
   }
 
   zoom(factor) {
-    this.distance = clamp(this.distance * factor, 0.05, 40 * this.radius);
+    this.distance = clamp(this.distance * factor, 0.05, 40 * this.whole.radius);
     this.onChange();
   }
 

@@ -55,7 +55,7 @@ class App {
     this.failure = -1;
     this.markedAt = null;
     this.player.setMotion(this.stage.motion);
-    this.camera.fit(this.stage.centre, this.stage.radius, this.stage.corners);
+    this.camera.fit(this.stage.machines, this.stage.whole);
     this.controls.setScene();
     this.panels.setScene();
     this.bases.setScene();
@@ -181,7 +181,7 @@ class App {
     const state = this.stage.at(this.player.t);
     if (this.stage.moved) Object.assign(state, { nearest: null, red: new Set() });
     this.fitCanvas();
-    this.view.draw(this.stage.frame(state), this.camera, background());
+    this.view.draw(this.stage.frame(state, this.camera.eye), this.camera, background());
     this.controls.update();
     this.panels.update(state);
     this.placeLabels(state);

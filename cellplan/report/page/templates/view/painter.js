@@ -20,14 +20,14 @@ class PaintedView {
     this.drawLines(frame.lines.filter((line) => line.isBelow), matrix);
     const triangles = frame.bodies.flatMap((body) => this.triangles(body, matrix, camera.eye));
     triangles.sort((a, b) => b.depth - a.depth);
-    for (const { corners, shade } of triangles) {
+    for (const { corners, shade, isSolid } of triangles) {
       context.fillStyle = context.strokeStyle = shade;
       context.lineWidth = 0.7;
       context.beginPath();
       for (const [x, y] of corners) context.lineTo(x, y);
       context.closePath();
       context.fill();
-      context.stroke(); // closes the gaps between neighbours
+      if (isSolid) context.stroke(); // closes the gaps between neighbours
     }
     this.drawLines(frame.lines.filter((line) => !line.isBelow), matrix);
   }
@@ -49,7 +49,8 @@ class PaintedView {
       const normal = unit(cross(subtract(world[b], world[a]), subtract(world[c], world[a])));
       const lamp = Math.abs(dot(normal, unit(subtract(eye, world[a]))));
       const depth = (corners[0][2] + corners[1][2] + corners[2][2]) / 3;
-      found.push({ corners, depth, shade: css(times(body.colour, 0.45 + 0.5 * lamp + 0.1 * normal[2])) });
+      const [opacity, colour] = [body.opacity ?? 1, times(body.colour, 0.45 + 0.5 * lamp + 0.1 * normal[2])];
+      found.push({ corners, depth, shade: css(colour, opacity), isSolid: opacity === 1 });
     }
     return found;
   }

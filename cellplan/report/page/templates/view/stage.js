@@ -6,6 +6,7 @@ const NEAR_LINE = [0.85, 0.2, 0.05, 1];
 const PART_COLOUR = [0.78, 0.66, 0.42];
 const FIXED_COLOUR = [0.55, 0.58, 0.62];
 const GRID_STEP = 0.5; // m
+const FADED = 0.16; // opacity of what stands before the robots
 
 class Stage {
   constructor(record) {
@@ -32,6 +33,7 @@ class Stage {
     this.traces = new Traces(this);
     this.grids = scene.bodies.filter((body) => this.isPlane(body)).map((body) => fromRows(body.pose));
     this.measure();
+    this.sight = new Sight(this);
     this.gridLines = gridLines(GRID_STEP * Math.ceil((1.3 * this.radius) / GRID_STEP), GRID_STEP);
     this.axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => Float32Array.from([0, 0, 0, ...times(axis, 0.4)]));
   }
@@ -141,19 +143,23 @@ class Stage {
     return mixed(plain, [1, 1, 1], isDark() ? 0.35 : 0.22);
   }
 
-  /** The picture of an instant: bodies, and lines in the order in which they are drawn. */
-  frame(state) {
+  /** The picture of an instant from a place of the camera: bodies, and lines in the order in which they are drawn. */
+  frame(state, eye = null) {
     const bodies = [];
     const marked = this.markedLinks(state);
+    const hiding = eye ? this.sight.from(eye) : new Set();
     this.scene.bodies.forEach((body, index) => {
       if (!this.isShown(body) || (body.replaced && this.shown.meshes && !marked.has(linkKey(body)))) return;
       const place = multiply(this.bodyPose(index, state.links, state.t), this.geometries[body.geometry].place);
-      bodies.push({ geometry: body.geometry, place, colour: this.colour(body, index, state.red) });
+      const isFaded = hiding.has(index) && !state.red.has(index) && !this.picked.has(index);
+      const opacity = isFaded ? FADED : 1;
+      bodies.push({ geometry: body.geometry, place, colour: this.colour(body, index, state.red), opacity });
     });
     if (this.shown.meshes) bodies.push(...this.visualBodies(state, marked));
     const lines = [...this.floorLines(), ...this.pathLines(state), ...this.traces.lines(state)];
     if (this.excludedLines) lines.push(this.excludedLine(state));
     if (this.shown.nearest && state.nearest) lines.push(this.nearestLine(state.nearest));
+    bodies.sort((a, b) => (b.opacity ?? 1) - (a.opacity ?? 1)); // what is seen through comes last
     return { bodies, lines: lines.filter(Boolean) };
   }
 
@@ -218,19 +224,25 @@ class Stage {
     return moved(this.bodyPose(index, links, t), moved(place, [0.5, 0.5, 0.5]));
   }
 
-  /** Where robots, tools and part are at the begin of the motion: corners of their boxes, and the middle of these. */
+  /** Where robots, tools and part are at the begin of the motion, and where all of the cell is. */
   measure() {
+    this.machines = this.extent((body) => body.kind !== "obstacle");
+    this.whole = this.extent(() => true);
+    Object.assign(this, this.machines);
+  }
+
+  /** Of some bodies the corners of their boxes, and the middle and half the diagonal of the box round these. */
+  extent(isMeant) {
     const links = allLinks(this.scene.robots, this.bases, this.motion.row(0));
-    this.corners = [];
+    const corners = [];
     this.scene.bodies.forEach((body, index) => {
-      if (this.isPlane(body) || body.kind === "obstacle") return;
+      if (this.isPlane(body) || !isMeant(body)) return;
       const whole = multiply(this.bodyPose(index, links, 0), this.geometries[body.geometry].place);
-      for (let i = 0; i < 8; i += 1) this.corners.push(moved(whole, [i & 1, (i >> 1) & 1, (i >> 2) & 1]));
+      for (let i = 0; i < 8; i += 1) corners.push(moved(whole, [i & 1, (i >> 1) & 1, (i >> 2) & 1]));
     });
-    const over = (pick) => [0, 1, 2].map((axis) => pick(...this.corners.map((corner) => corner[axis])));
-    const [low, high] = this.corners.length ? [over(Math.min), over(Math.max)] : [[-1, -1, 0], [1, 1, 1]];
-    this.centre = times(add(low, high), 0.5);
-    this.radius = 0.5 * length(subtract(high, low));
+    const over = (pick) => [0, 1, 2].map((axis) => pick(...corners.map((corner) => corner[axis])));
+    const [low, high] = corners.length ? [over(Math.min), over(Math.max)] : [[-1, -1, 0], [1, 1, 1]];
+    return { corners, centre: times(add(low, high), 0.5), radius: 0.5 * length(subtract(high, low)) };
   }
 }
 

@@ -14,6 +14,7 @@ precision highp float;
 in vec3 world;
 uniform vec3 eye;
 uniform vec3 colour;
+uniform float opacity;
 out vec4 pixel;
 void main() {
   vec3 toEye = normalize(eye - world);
@@ -21,7 +22,7 @@ void main() {
   normal *= sign(dot(normal, toEye) + 1e-6);
   vec3 side = normalize(cross(vec3(0.0, 0.0, 1.0), toEye) + vec3(1e-5));
   float lamp = max(dot(normal, normalize(toEye + 0.6 * side + vec3(0.0, 0.0, 0.5))), 0.0);
-  pixel = vec4(colour * (0.42 + 0.5 * lamp + 0.12 * normal.z), 1.0);
+  pixel = vec4(colour * (0.42 + 0.5 * lamp + 0.12 * normal.z), opacity);
 }`;
 const LINE_VERTEX = `#version 300 es
 layout(location = 0) in vec3 first;
@@ -56,7 +57,7 @@ class WebglView {
     if (!gl) throw new Error("WebGL 2 is missing");
     this.gl = gl;
     this.canvas = canvas;
-    this.bodies = this.program(BODY_VERTEX, BODY_FRAGMENT, ["place", "camera", "eye", "colour"]);
+    this.bodies = this.program(BODY_VERTEX, BODY_FRAGMENT, ["place", "camera", "eye", "colour", "opacity"]);
     this.lines = this.program(LINE_VERTEX, LINE_FRAGMENT, ["place", "camera", "viewport", "width", "lift", "colour"]);
     this.geometries = geometries.map((geometry) => geometry && this.upload(geometry));
     this.strips = new WeakMap(); // by the points of a line
@@ -122,10 +123,22 @@ class WebglView {
       const shape = this.geometries[body.geometry];
       gl.uniformMatrix4fv(this.bodies.place, false, body.place);
       gl.uniform3fv(this.bodies.colour, body.colour);
+      this.seeThrough(body.opacity ?? 1);
       gl.bindVertexArray(shape.array);
       gl.drawElements(gl.TRIANGLES, shape.count, shape.kind, 0);
     }
+    this.seeThrough(1);
     this.drawLines(frame.lines, matrix);
+  }
+
+  /** Opacity of the next bodies; what is seen through hides nothing that is drawn later. */
+  seeThrough(opacity) {
+    const gl = this.gl;
+    gl.uniform1f(this.bodies.opacity, opacity);
+    gl.depthMask(opacity === 1);
+    if (opacity === 1) gl.disable(gl.BLEND);
+    else gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
   }
 
   drawLines(lines, matrix) {
