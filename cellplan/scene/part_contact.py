@@ -30,27 +30,15 @@ WAY_TOL: Final = 1e-4  # [m] by which the tool of a straight move may be off it:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PartContact:
-    """A part that is picked up or put down.
+    """A part that is picked up or put down."""
 
-    Attributes:
-        key: Key of the place in the cell file.
-        place: The place.
-        grasp: How the part is held.
-        is_lying: Whether the part lies there while the tool comes to it or leaves it; else it is held, and comes or
-            leaves with the tool.
-    """
-
-    key: str
-    place: PartPlace
-    grasp: Grasp
-    is_lying: bool
+    key: str  # key of the place in the cell file
+    place: PartPlace  # the place
+    grasp: Grasp  # how the part is held
+    is_lying: bool  # whether the part lies there while the tool comes or leaves; else it comes or leaves with the tool
 
     def with_contacts(self, scene: Scene) -> Scene:
-        """The scene in which bodies that may touch at the place do so near it only.
-
-        Args:
-            scene: The scene with the part lying at the place, or held.
-        """
+        """The scene, the part lying at the place or held, in which what may touch at the place does so near it only."""
         rows = [row for row, pair in enumerate(scene.pairs) if self._touch(scene.cell, *_ends(scene, pair))]
         touching = [scene.pairs[row] for row in rows]
         spans, cuts, mounted = list[tuple[ScenePair, float, float]](), list[tuple[int, CollisionBody]](), []
@@ -59,13 +47,17 @@ class PartContact:
                 continue  # a straight way off a half-space does not lead through anything of it
             limit = self._limit(scene, pair)
             mounted.append(limit)
-            near = self._contact(limit) + WAY_TOL
+            stated = limit.limit if self.place.contact is None else self.place.contact
+            near = (stated if self.is_lying else max(stated, limit.limit)) + WAY_TOL
             spans += self._away(pair, near)
             if self.is_lying and (cut := self._cut(scene, pair, limit.limit, len(scene.engine.bodies) + len(cuts))):
                 cuts += cut[1]
                 spans.append((cut[0], 0.0, near))
         move = StraightMove(robot=self.grasp.robot, p_WT=(self.place.X_WP @ self.grasp.X_PT)[:3, 3], pairs=tuple(spans))
-        left = tuple(Excluded(pair.first, pair.second, self._reason, LeftOutKind.PUT_DOWN) for pair in touching)
+        reason = "the part is taken from it here or put on it: may touch near its place only"
+        if self.is_lying:
+            reason = f"{self.grasp.robot} grips the part here or lets it go: may touch near the grip only"
+        left = tuple(Excluded(pair.first, pair.second, reason, LeftOutKind.PUT_DOWN) for pair in touching)
         return replace(
             scene,
             pairs=tuple(pair for row, pair in enumerate(scene.pairs) if row not in rows),
@@ -75,12 +67,6 @@ class PartContact:
             cut_from=(*scene.cut_from, *(index for index, _ in cuts)),
             straight=move,
         )
-
-    @property
-    def _reason(self) -> str:
-        if not self.is_lying:
-            return "the part is taken from it here or put on it: may touch near its place only"
-        return f"{self.grasp.robot} grips the part here or lets it go: may touch near the grip only"
 
     def _touch(self, cell: Cell, part: SceneBody, other: SceneBody) -> bool:
         """Whether two bodies may touch at the place: the part, and what grips it or what it rests on."""
@@ -103,11 +89,6 @@ class PartContact:
             first=pair.first, second=pair.second, mount=mount, limit=limit, accuracy=accuracy, moves=True
         )
 
-    def _contact(self, limit: MountedPair) -> float:
-        """Distance in [m] of the tool from the grip within which the two may touch."""
-        stated = limit.limit if self.place.contact is None else self.place.contact
-        return stated if self.is_lying else max(stated, limit.limit)
-
     def _away(self, pair: ScenePair, near: float) -> Iterator[tuple[ScenePair, float, float]]:
         """The pair beyond its contact: free of contact until it can have its distance, then with the distance."""
         what = "grip" if self.is_lying else "place of the part"
@@ -119,13 +100,10 @@ class PartContact:
         self, scene: Scene, pair: ScenePair, depth: float, index: int
     ) -> tuple[ScenePair, list[tuple[int, CollisionBody]]] | None:
         """What of a body must not touch the part even at the grip; None where all of it may."""
-        part, holder = (
-            (pair.first, pair.second) if scene.bodies[pair.first].kind is Kind.PART else (pair.second, pair.first)
-        )
-        body = scene.bodies[holder]
+        holder, part = sorted((pair.first, pair.second), key=lambda index: scene.bodies[index].kind is Kind.PART)
+        body, robot = scene.bodies[holder], scene.cell.robot(self.grasp.robot)
         if self.grasp.bodies is not None or isinstance(body.shape, HalfSpace):
             return None
-        robot = scene.cell.robot(self.grasp.robot)
         X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
         zone = scene.cell.checks.contact_zone
         surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=depth + GRIP_TOL)

@@ -43,8 +43,7 @@ def standoffs(
         if task.relative_to is not Frame.PART:
             continue
         rows = np.flatnonzero((times >= max(task.start, task.judged_from)) & (times <= scheduled.end + task.off_delay))
-        if not len(rows):
-            rows = np.array([len(times) - 1])
+        rows = rows if len(rows) else np.array([len(times) - 1])
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(POSE_COUNT, len(rows))).round().astype(np.intp))]
         some = {name: values[rows] for name, values in q.items()}
         X_PT = inverse(part_poses(cell, chains, some)) @ chains[task.robot].tool_poses(some[task.robot])
@@ -63,7 +62,8 @@ def standoff_on(cell: Cell, task: Task, X_PT: Array, *, times: Array | None = No
     """
     X_ST = inverse(cell.part.X_PS) @ X_PT
     along = _along(cell.part.shape, X_ST)
-    nearest = np.where(along == 0.0, 0.0, _nearest(cell.part.shape, X_ST[:, :3, 3]))
+    nearest = np.zeros(len(X_PT))
+    nearest[along > 0.0] = _nearest(cell.part.shape, X_ST[along > 0.0, :3, 3])
     low, high = task.standoff or (0.0, UNSTATED)
     judged = along if low > 0.0 else nearest
     is_off = (judged > high + task.tolerance.position) | (judged < low - task.tolerance.position)
@@ -122,10 +122,8 @@ def _excused(task: Task, is_off: Flags, p_PT: Array) -> tuple[Flags, Mapping[str
         OffPart.CUT: (rows > on[0]) & (rows < on[-1]),
     }
     for name in task.off_part:
-        mine = stretches[name] & is_off
-        if np.any(mine):
-            excused |= mine
-            lengths[str(name)] = float(steps[mine].sum())
+        if np.any(mine := stretches[name] & is_off):
+            excused, lengths[str(name)] = excused | mine, float(steps[mine].sum())
     return excused, lengths
 
 
@@ -134,15 +132,11 @@ def _check(task: Task, found: Standoff) -> Check:
     low, high = task.standoff or (0.0, UNSTATED)
     judged = found.worst_along if low > 0.0 else found.worst_nearest
     when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
-    axis = (
-        "which its axis does not meet"
-        if np.isinf(found.worst_along)
-        else f"{MM * found.worst_along:.1f} mm along its axis"
-    )
+    meets = not np.isinf(found.worst_along)
+    axis = f"{MM * found.worst_along:.1f} mm along its axis" if meets else "which its axis does not meet"
     key = "standoff_mm" if task.standoff is None else f"standoff_mm = [{MM * low:g}, {MM * high:g}]"
-    message = (
-        f"standoff of task '{task.name}': the tip is {MM * found.worst_nearest:.1f} mm from the part{when}, {axis}"
-    )
+    where = f"the tip is {MM * found.worst_nearest:.1f} mm from the part{when}, {axis}"
+    message = f"standoff of task '{task.name}': {where}"
     cure = (
         f"allowed {MM * low:g} to {MM * high:g} mm and its tolerance ({key}): put the path on the part, state the "
         "distance of the process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"

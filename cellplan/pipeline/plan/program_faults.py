@@ -88,12 +88,10 @@ def _gaps(scene: Scene) -> dict[str, float]:
     part = next(index for index, body in enumerate(scene.bodies) if body.kind is Kind.PART)
     poses, gaps = scene.body_poses(np.zeros((1, scene.cell.joint_count))), {}
     for index, body in enumerate(scene.bodies):
-        if body.kind is not Kind.OBSTACLE:
-            continue
-        if is_ground(body):
+        if body.kind is Kind.OBSTACLE and is_ground(body):
             above = heights(scene.engine.bodies[part].hull, poses.R[part], poses.p[part], X_WS=body.X_BS)
             gaps[body.name] = max(0.0, float(above[0]))
-        else:
+        elif body.kind is Kind.OBSTACLE:
             gaps[body.name] = measure(scene.engine, (part, index), poses, sample=0).bound
     return gaps
 
