@@ -148,7 +148,7 @@ def layout(  # noqa: PLR0913, PLR0917 - the options of the command
         )
 
         if status:
-            say("\n".join(status_lines(cell, output)))
+            say("\n".join(status_lines(cell, output, tuple(allow_dir or ()))))
             return
         request = read_request(
             cell,

@@ -140,9 +140,9 @@ def default_folder(cell: Path, allow_dirs: tuple[Path, ...] = (), *, is_free: bo
     return Path("outputs") / f"{load_cell(cell, allow_dirs=allow_dirs).name}-{'fastest' if is_free else 'layout'}"
 
 
-def status_lines(cell: Path, output: Path | None) -> list[str]:
+def status_lines(cell: Path, output: Path | None, allow_dirs: tuple[Path, ...] = ()) -> list[str]:
     """How far a search is."""
-    folder = output or default_folder(cell)
+    folder = output or default_folder(cell, allow_dirs)
     return [f"{folder}: {read_status(folder).text()}"]
 
 

@@ -93,7 +93,7 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
 def test_a_wrong_option_is_one_line(
     options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    status = run(["layout", str(FOUR), "-q", "--workers", "1", "-o", str(tmp_path / "out"), *options])
+    status = run(["layout", str(FOUR), "-q", "-o", str(tmp_path / "out"), *options])
 
     assert status == 2
     assert capsys.readouterr().err.splitlines() == [message]
