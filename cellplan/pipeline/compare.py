@@ -16,6 +16,7 @@ from cellplan.io.cell.changes import plain_values, read_setting
 from cellplan.io.cell.differences import document_differences
 from cellplan.io.cell.load import load_cell
 from cellplan.io.cell.write import render_cell
+from cellplan.io.input.findings import listed
 from cellplan.io.run.stored import CELL, StoredRun, read_stored_run
 from cellplan.io.schema import CellDocument
 from cellplan.io.yaml.reader import parse_yaml
@@ -291,7 +292,13 @@ def _verified_outcome(job: CompareJob, path: Path) -> Outcome:
     stored = read_stored_run(path)
     status, proof, clearance = TrialStatus.FAILED, "it failed when it was solved", None
     failed = [check["message"] for check in stored.record["checks"] if not check["passed"]]
-    if stored.manifest.status == TrialStatus.PASSED:
+    if stored.manifest.status == TrialStatus.PASSED and stored.manifest.own_inputs:
+        status = TrialStatus.PASSED
+        proof = (
+            f"it depends on files beside its cell file ({listed(stored.manifest.own_inputs)}); "
+            f"cellplan verify {path} --cell {stored.manifest.cell_file} compares them"
+        )
+    elif stored.manifest.status == TrialStatus.PASSED:
         try:
             verified = open_gate(path, allow_dirs=job.allow_dirs)
             status, proof = TrialStatus.PASSED, "verified"

@@ -1,11 +1,13 @@
 """Joint positions and speeds that were read back, against their limits."""
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
+from cellplan.model.doubts import doubt_about_velocity
 from cellplan.model.report import Check, JointUse
 
 SHOWN_TOL: Final = 1e-9  # [rad] sums of rounded positions
@@ -29,7 +31,8 @@ def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Che
     """Position and speed of every joint."""
     checks = []
     for index, use in enumerate(uses):
-        checks += [_check_position(use, times, q[:, index]), _check_velocity(use)]
+        alike = [it.velocity_limit for it in uses if it is not use and it.is_revolute == use.is_revolute]
+        checks += [_check_position(use, times, q[:, index]), _check_velocity(use, alike)]
     return checks
 
 
@@ -125,11 +128,13 @@ def _check_position(use: JointUse, times: Array, q: Array) -> Check:
     )
 
 
-def _check_velocity(use: JointUse) -> Check:
-    """One joint's largest speed."""
+def _check_velocity(use: JointUse, alike: Sequence[float]) -> Check:
+    """One joint's largest speed; ``alike`` are the limits of the robot's other joints that move as it does."""
     unit, scale = use.display_unit
     passed = use.peak_velocity <= use.velocity_limit
     verdict = "has a peak velocity of" if passed else "exceeds its velocity limit:"
+    doubt = "" if passed else doubt_about_velocity(use.velocity_limit, alike, is_revolute=use.is_revolute)
+    doubt = doubt and f"; {doubt}"
     percent = 100 * use.peak_velocity / use.velocity_limit
     return Check(
         name="joint_velocity",
@@ -141,6 +146,7 @@ def _check_velocity(use: JointUse) -> Check:
         at_s=use.peak_velocity_at_s,
         message=(
             f"joint {use.robot}/{use.joint} {verdict} {scale * use.peak_velocity:.4g} {unit}/s "
-            f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} {unit}/s)"
+            f"at {use.peak_velocity_at_s:.3f} s ({percent:.4g} % of its limit {scale * use.velocity_limit:g} "
+            f"{unit}/s){doubt}"
         ),
     )

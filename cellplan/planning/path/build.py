@@ -14,7 +14,7 @@ from cellplan.model.task import Task, TimedPath
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.path.curve import path_curve
 from cellplan.planning.path.formatting import in_mm
-from cellplan.planning.path.plausible_size import refuse_unlikely_path
+from cellplan.planning.path.plausible_size import refuse_path_in_metres, refuse_unlikely_path
 from cellplan.planning.path.projection import project_path
 from cellplan.planning.path.tool_orientation import orient_tool
 
@@ -34,7 +34,9 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    curve = project_path(path_curve(task), task, part)
+    drawn = path_curve(task)
+    refuse_path_in_metres(drawn.curve, task=task, part=part)
+    curve = project_path(drawn, task, part)
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
     orientation = orient_tool(task, curve)

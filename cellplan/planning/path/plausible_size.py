@@ -11,11 +11,40 @@ from cellplan.geometry.shapes import bounding_box
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Part
 from cellplan.model.task import Frame, Task, TimedPath
-from cellplan.planning.path.formatting import in_mm, length
+from cellplan.planning.path.formatting import MM, in_mm, length
 
 SHORTEST: Final = 1e-4  # [m] of a path; a trajectory may turn the tool on the spot
 FARTHEST: Final = 10.0  # [m] from the box round the part, of a path on the part
+LONGEST_IN_METRES: Final = 3e-3  # [m] a longer path would be more than 3 m if its numbers were metres
+AROUND: Final = 0.25  # [-] of the size of the part: so far beside it a path may run
 LOOKED_AT: Final = 1025  # points of a path, beside its knots
+
+
+def refuse_path_in_metres(drawn: Curve, *, task: Task, part: Part) -> None:
+    """Refuse a path of a few millimetres at the origin of the part that would lie on the part if it were in metres.
+
+    Args:
+        drawn: The path as it is listed, in P, before it is projected.
+        task: The task.
+        part: The part.
+
+    Raises:
+        InputError: With its length, asking for the unit.
+    """
+    first, last = float(drawn.knots[0]), float(drawn.knots[-1])
+    p, _ = drawn.evaluate(np.union1d(drawn.knots, np.linspace(first, last, LOOKED_AT)), (first, last))
+    size = float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
+    if isinstance(task.path, TimedPath) or task.relative_to is not Frame.PART or size > LONGEST_IN_METRES:
+        return
+    X_SP = inverse(part.X_PS)
+    middle, half = bounding_box(part.shape)
+    across = np.ones(3) if task.project is None else np.abs(task.project) < np.abs(task.project).max()
+    beyond = np.abs(MM * p @ X_SP[:3, :3].T + X_SP[:3, 3] - middle) - half - AROUND * 2.0 * half.max()
+    if np.all((beyond <= 0.0) | (across == 0.0)) and MM * size > half.min():
+        raise InputError(
+            f"{task.where('path')}: expected a path in mm, got one of {length(size)} mm at the origin of the part: is "
+            "it in metres? A thousand times as large it lies on the part"
+        )
 
 
 def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part) -> None:

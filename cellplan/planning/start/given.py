@@ -15,6 +15,7 @@ from cellplan.errors import (
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.doubts import doubt_about_limits
 from cellplan.model.robot import Joint
 from cellplan.model.task import Frame, Task
 from cellplan.model.toolpath import Toolpath
@@ -144,7 +145,8 @@ def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]
     for joint, position in zip(robot.model.joints, () if q is None else q, strict=q is not None):
         if not joint.lower <= position <= joint.upper:
             limits = f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
-            yield joint, f"{_shown(joint, position)}, outside its limits {limits}"
+            doubt = doubt_about_limits(robot)
+            yield joint, f"{_shown(joint, position)}, outside its limits {limits}{f'; {doubt}' if doubt else ''}"
 
 
 def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Grasp, Robot
+from cellplan.model.doubts import doubt_about, doubt_about_all
 from cellplan.model.robot import Joint
 from cellplan.model.seeds import generator
 from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
@@ -69,7 +70,7 @@ def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) 
     return (
         f"{start_place(cell, cell.robot(contact.robot))}: no start configuration of '{contact.robot}' is free of "
         f"contact: '{own.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
-        f"{_cure(contact)}{more}"
+        f"{doubt_about(cell, cell.robot(contact.robot)) or _cure(contact)}{more}"
     )
 
 
@@ -98,11 +99,11 @@ def _cure(contact: Contact) -> str:
 def _frequent_words(search: StartSearch) -> str:
     """What to say where every contact can be avoided, but not all of them together."""
     tried = search.failures.touching
-    counted = contacts_between(search.trials, tried)[:SHOWN]
+    counted, doubt = contacts_between(search.trials, tried)[:SHOWN], doubt_about_all(search.cell)
     named = ", ".join(f"'{first}' touches '{second}' in {count}" for (first, second), count in counted)
     return (
         f"{search.cell.origin.at('robots')}: found no start configurations that reach the tasks without contact: of "
-        f"{len(tried)} combinations tried, {named}: move the bases apart, or change a tool"
+        f"{len(tried)} combinations tried, {named}: {doubt or 'move the bases apart, or change a tool'}"
     )
 
 
@@ -129,9 +130,10 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
     if search.is_holder_open and name not in cell.positioners[:1]:
         tried = f"{holder_count} configuration(s) of the positioner, {SEEDS_PER_HOLDER} attempts for each"
     desired = f"the tool of '{name}' to {_goal_words(search, name)}"
+    doubt = doubt_about(cell, robot)
     return (
         f"{start_place(cell, robot)}: no configuration within the joint limits brings {desired} ({tried}): "
-        f"{_shortfall(search, robot)}"
+        f"{f'{doubt}; ' if doubt else ''}{_shortfall(search, robot)}"
     )
 
 
