@@ -1,4 +1,4 @@
-"""What in a cell looks like a slip of a unit or a sign: asked first where something fails, before any larger cure."""
+"""What in a cell looks like a mistake of a unit or a sign: asked first where something fails, before any larger cure."""
 
 from collections.abc import Sequence
 from typing import Final

@@ -94,7 +94,7 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
 def _solids(faces: Indices, count: int) -> Indices:
     """Label of the closed surface that each triangle is of: solids that touch at an edge or a corner are several.
 
-    Where triangles of several solids cannot be told apart at their common edges, these solids are one.
+    Where it is not clear which triangles of a common edge are of which solid, these solids are one.
     """
     first, second, _ = _neighbours(faces)
     label = components(len(faces), np.stack([first, second], axis=1))

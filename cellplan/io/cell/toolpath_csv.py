@@ -105,16 +105,16 @@ def read_toolpath_csv(
     points = values[:, [columns.index(column) for column in POSITION]] * METRES_PER_MM
     rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
     if times is None:
-        is_kept = _apart(points, join, is_closed=is_closed)
+        is_apart = _apart(points, join, is_closed=is_closed)
         return SampledPath(
             source=name,
-            points=points[is_kept],
-            axes=None if axes is None else axes[is_kept],
-            rotations=None if rotations is None else rotations[is_kept],
+            points=points[is_apart],
+            axes=None if axes is None else axes[is_apart],
+            rotations=None if rotations is None else rotations[is_apart],
             is_smooth=is_smooth,
             is_closed=is_closed,
             join=join,
-            lines=tuple((np.flatnonzero(is_kept) + 2).tolist()),
+            lines=tuple((np.flatnonzero(is_apart) + 2).tolist()),
         )
     return TimedPath(source=name, times=times, points=points, axes=axes, rotations=rotations, is_closed=is_closed)
 
@@ -239,16 +239,16 @@ def _units(
 
 
 def _apart(points: Array, least: float, *, is_closed: bool) -> Flags:
-    """Which points are at least a distance from the one kept before, of a closed path also from the first one."""
-    is_kept = np.ones(len(points), dtype=bool)
+    """Which points are at least a distance from the last one taken, of a closed path also from the first one."""
+    is_apart = np.ones(len(points), dtype=bool)
     last = 0
     for k in range(1, len(points) if least > 0.0 else 0):
-        is_kept[k] = np.linalg.norm(points[k] - points[last]) >= least
-        last = k if is_kept[k] else last
+        is_apart[k] = np.linalg.norm(points[k] - points[last]) >= least
+        last = k if is_apart[k] else last
     while is_closed and last > 0 and np.linalg.norm(points[last] - points[0]) < least:
-        is_kept[last] = False
-        last = int(np.flatnonzero(is_kept)[-1])
-    return is_kept
+        is_apart[last] = False
+        last = int(np.flatnonzero(is_apart)[-1])
+    return is_apart
 
 
 def _examine_times(times: Array, findings: _Findings) -> None:
