@@ -1,4 +1,4 @@
-"""What in a cell looks like a mistake of a unit or a sign: asked first where something fails, before any larger cure."""
+"""What looks like a mistake of a unit or a sign in a cell: asked first where something fails, before larger cures."""
 
 from collections.abc import Sequence
 from typing import Final
