@@ -11,6 +11,9 @@ LIMIT = '<limit lower="-1" upper="2" velocity="3"/>'
 
 
 def joint(name: str, parent: str, child: str, inside: str = LIMIT, *, kind: str = "revolute") -> str:
+    """A joint about or along z where no other axis is written."""
+    if kind != "fixed" and "<ax" not in inside:
+        inside += '<axis xyz="0 0 1"/>'
     return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
 
 

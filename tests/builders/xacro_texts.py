@@ -27,7 +27,7 @@ SEGMENT = f"""\
 <xacro:macro name="segment" params="name parent length turn">
   <joint name="${{name}}_joint" type="revolute">
     <parent link="${{parent}}"/><child link="${{name}}"/>
-    <origin xyz="${{length}} 0 0.1" rpy="0 ${{turn}} 0.3"/><axis xyz="0 1 ${{2 * 0.5}}"/>
+    <origin xyz="${{length}} 0 0.1" rpy="0 ${{turn}} 0.3"/><axis xyz="0 0 ${{2 * 0.5}}"/>
     <limit lower="-1" upper="2" velocity="3" effort="1" damping="1"/>
   </joint>
   <link name="${{name}}"><collision><geometry><box size="0.1 0.1 ${{length}}"/></geometry></collision></link>

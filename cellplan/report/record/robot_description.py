@@ -34,7 +34,8 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
             "rpy_deg": [_rounded(DEG * value) for value in rpy_from_rotation(X[:3, :3])],
         },
         "flanges": [
-            {"link": each.link, "joints": list(each.joints), "obstacle": each.obstacle} for each in described.flanges
+            {"link": it.link, "joints": list(it.joints), "note": it.note, "obstacle": it.obstacle}
+            for it in described.flanges
         ],
         "mimics": [_mimic(mimic) for mimic in described.mimics],
         "locked": described.locked,

@@ -45,6 +45,7 @@ def _flange_lines(record: dict[str, Any]) -> Iterator[str]:
         (
             each["link"],
             each["obstacle"] or _joint_count(each["joints"]),
+            each["note"],
             "*" if each["link"] == record["flange"] else "",
         )
         for each in record["flanges"]
@@ -87,5 +88,7 @@ def _link_row(link: dict[str, Any]) -> tuple[str, ...]:
 def _block(head: str, rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Rows below their head, in columns; nothing where there are none."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))] if rows else []
-    texts = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    texts = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True) if width).rstrip() for row in rows
+    ]
     return [f"  {head}", *(f"    {text}" for text in texts)] if rows else []

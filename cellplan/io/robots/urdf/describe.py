@@ -14,10 +14,11 @@ from cellplan.geometry.shapes import support
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import read_document
+from cellplan.io.robots.urdf.flange import axis_along, choose_flange, flange_remarks, is_along, last_joint
 from cellplan.io.robots.urdf.limits import Lacking, lacking_limits, limits_to_state, with_blanks
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfStructure, urdf_model, urdf_structure
 from cellplan.io.robots.urdf.locks import lock_positions
-from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, choose_flange, links_in_order, moving_leaves
+from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, links_in_order, moving_leaves
 from cellplan.io.schema.robot import OTHERS
 from cellplan.io.yaml.writer import flow_text, yaml_text
 from cellplan.model.robot import Body, RobotModel
@@ -68,7 +69,12 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         links=tuple(_links(structure, bodies)),
         cell_lines=_cell_lines(structure, lacking, written=written, options=options),
         model=model,
-        remarks=(*tree.document.remarks, *shelf.remarks.lines, *_elsewhere(path, tree, shelf)),
+        remarks=(
+            *flange_remarks(tree, flange, is_named=not is_usual or options.flange is not None),
+            *tree.document.remarks,
+            *shelf.remarks.lines,
+            *_elsewhere(path, tree, shelf),
+        ),
     )
 
 
@@ -114,8 +120,17 @@ def _choices(tree: UrdfTree) -> Iterator[FlangeChoice]:
         yield FlangeChoice(
             link=link.name,
             joints=tuple(joint.name for joint in chain if joint.mimic is None),
+            note=_axis_note(tree, link.name),
             obstacle="" if mimic is None else f"carried by the mimic joint {mimic}",
         )
+
+
+def _axis_note(tree: UrdfTree, link: str) -> str:
+    """Which axis of a link lies along the last axis, where it is not z and the last joint turns."""
+    last, axis = last_joint(tree, link), axis_along(tree, link)
+    if last is None or last.kind == "prismatic" or axis == "z":
+        return ""
+    return f"{axis or 'none of x, y, z'} along the axis of {last.name}"
 
 
 def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | None) -> tuple[str, bool]:
@@ -126,7 +141,15 @@ def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | No
         fit = [choice for choice in choices if not choice.obstacle]
         if desired is not None or not fit:
             raise
-        return max(fit, key=lambda choice: (bool(TOOL_SIDE.search(choice.link)), len(choice.joints))).link, False
+        return max(
+            fit,
+            key=lambda it: (
+                bool(TOOL_SIDE.search(it.link)) and is_along(tree, it.link),
+                is_along(tree, it.link),
+                bool(TOOL_SIDE.search(it.link)),
+                len(it.joints),
+            ),
+        ).link, False
 
 
 def _joints(

@@ -12,6 +12,7 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.io.robots.urdf.flange import choose_flange, flange_remarks
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
 from cellplan.io.robots.urdf.locks import require_sound_locks, rest_position, unlocked_error, unlocked_joints
@@ -22,7 +23,6 @@ from cellplan.io.robots.urdf.tree import (
     ZeroConfiguration,
     assign_roles,
     build_tree,
-    choose_flange,
     known_joint,
     links_in_order,
     zero_configuration,
@@ -131,7 +131,11 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
         model=model,
         mesh_files=tuple(shelf.files),
         included=document.included,
-        remarks=(*document.remarks, *shelf.remarks.lines),
+        remarks=(
+            *flange_remarks(tree, flange, is_named=options.flange is not None),
+            *document.remarks,
+            *shelf.remarks.lines,
+        ),
     )
 
 

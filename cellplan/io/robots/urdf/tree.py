@@ -13,8 +13,6 @@ from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, UrdfLink
 from cellplan.model.robot import BASE
 from cellplan.model.units import DisplayUnit, joint_unit
 
-FLANGE_NAMES: Final = ("tool0", "flange")  # taken as the flange in this order when the user names none
-
 SHOWN_NAMES: Final = 12  # more names than these make a message unreadable
 MAX_DRIVEN: Final = 64  # joints between base and flange: more are no arm
 
@@ -88,29 +86,6 @@ def build_tree(document: UrdfDocument) -> UrdfTree:
     return UrdfTree(document=document, root=roots[0], joints=tuple(ordered), above=above)
 
 
-def choose_flange(tree: UrdfTree, desired: str | None) -> str:
-    """Name of the flange link: the desired one, else ``tool0``, else ``flange``, else the only moving leaf.
-
-    Raises:
-        InputError: The desired link does not exist, or there is no obvious one.
-    """
-    links = tree.document.links
-    if desired is not None:
-        if desired not in links:
-            raise InputError(f"{tree.document.file}: flange: unknown link '{desired}'{_known(desired, links)}")
-        return desired
-    for name in FLANGE_NAMES:
-        if name in links:
-            return name
-    leaves = moving_leaves(tree)
-    if not leaves:
-        raise InputError(f"{tree.document.file}: expected a joint that moves a link, got none")
-    if len(leaves) > 1:
-        names = listed(leaves)
-        raise InputError(f"{tree.document.file}: flange: expected the name of a link, as it could be any of: {names}")
-    return leaves[0]
-
-
 def moving_leaves(tree: UrdfTree) -> list[str]:
     """Links that carry no other link and are moved by a joint other than a mimic, in the order of the file."""
     parents = {joint.parent for joint in tree.joints}
@@ -177,6 +152,18 @@ def known_joint(document: UrdfDocument, name: str, key: str) -> UrdfJoint:
     if name not in document.joints:
         raise InputError(f"{document.file}: {key}: unknown joint '{name}'{_known(name, document.joints)}")
     return document.joints[name]
+
+
+def known_link(tree: UrdfTree, name: str, key: str) -> str:
+    """The name of a link that an option names.
+
+    Raises:
+        InputError: There is no such link.
+    """
+    links = tree.document.links
+    if name not in links:
+        raise InputError(f"{tree.document.file}: {key}: unknown link '{name}'{_known(name, links)}")
+    return name
 
 
 def links_in_order(tree: UrdfTree) -> list[UrdfLink]:

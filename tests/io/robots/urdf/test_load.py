@@ -23,6 +23,8 @@ def link(name: str, inside: str = "") -> str:
 
 
 def joint(name: str, parent: str, child: str, inside: str = LIMIT, *, kind: str = "revolute") -> str:
+    if kind != "fixed" and "<axis" not in inside:
+        inside += '<axis xyz="0 0 1"/>'
     return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>\n'
 
 
@@ -131,7 +133,8 @@ def test_a_second_body_never_takes_the_name_of_a_link(tmp_path: Path) -> None:
 
 
 def test_limits_and_names_are_taken_over(tmp_path: Path) -> None:
-    model = read_urdf(write(tmp_path, *arm()))
+    bare = joint("a1", "base", "tip").replace('<axis xyz="0 0 1"/>', "")
+    model = read_urdf(write(tmp_path, *arm()[:2], bare), UrdfOptions(flange="tip"))
 
     assert (model.name, model.source, model.joint_names) == ("rig", "robot.urdf", ("a1",))
     assert (model.lower.tolist(), model.upper.tolist(), model.velocity.tolist()) == ([-1.0], [2.0], [3.0])

@@ -46,10 +46,10 @@ HANDED = (
 )  # elements in lines 2 to 13
 HELD = "finger_mm: 0, head_deg: 5.729578, wing_mm: -20"
 BARE = (
-    *('<link name="base"/>', '<link name="a"/>', '<link name="b"/>', '<link name="tip"/>'),
+    *('<link name="base"/>', '<link name="a"/>', '<link name="b"/>', '<link name="tool0"/>'),
     joint("j1", "base", "a", limit(0.0, 0.0, 0.0)),
     joint("j2", "a", "b", '<limit velocity="1"/>', kind="continuous"),
-    joint("no", "b", "tip", "", kind="prismatic"),
+    joint("no", "b", "tool0", "", kind="prismatic"),
 )
 
 
@@ -105,8 +105,8 @@ def test_the_others_rest_at_the_nearest_position_and_their_mimics_follow(tmp_pat
 
     assert np.array_equal(places(together), places(named))
     assert together.followers == ()
-    turned = math.atan2(*np.linalg.multi_dot([head.X_BS[:3, :3].T, nod.X_BS[:3, :3]])[2:0:-1, 1])
-    assert turned == pytest.approx(-2 * 0.1 + 0.3, abs=1e-12)  # about x, the axis of both
+    turned = math.atan2(*np.linalg.multi_dot([head.X_BS[:3, :3].T, nod.X_BS[:3, :3]])[1::-1, 0])
+    assert turned == pytest.approx(-2 * 0.1 + 0.3, abs=1e-12)  # about z, the axis of both
 
 
 def test_a_joint_that_is_named_keeps_its_position_beside_the_others(tmp_path: Path) -> None:
@@ -192,7 +192,7 @@ def test_one_message_lists_every_limit_to_be_stated(tmp_path: Path) -> None:
 
 def test_joints_that_lack_the_same_are_listed_together(tmp_path: Path) -> None:
     still = limit(-1.0, 1.0, 0.0)
-    lines = [*BARE[:4], joint("j1", "base", "a", still), joint("j2", "a", "b"), joint("j3", "b", "tip", still)]
+    lines = [*BARE[:4], joint("j1", "base", "a", still), joint("j2", "a", "b"), joint("j3", "b", "tool0", still)]
 
     assert '2 joints lack limits (j1, j3: states velocity="0.0"):' in refused(tmp_path, *lines)
 

@@ -146,7 +146,7 @@ MIMIC = '<mimic joint="{}"/>'
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
-            [*ARM[:2], joint("a1", "base", "tip", '<limit velocity="3"/>', kind="prismatic")],
+            [ARM[0], '<link name="tool0"/>', joint("a1", "base", "tool0", '<limit velocity="3"/>', kind="prismatic")],
             "r.urdf:4: joint 'a1': states no lower and upper limit: "
             f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
@@ -170,7 +170,11 @@ MIMIC = '<mimic joint="{}"/>'
             f"{STATE}`limits: {{a1: {{lower_deg: …, upper_deg: …}}}}`",
         ),
         (
-            [*ARM[:2], joint("a1", "base", "tip", '<limit lower="0" upper="500" velocity="3"/>', kind="prismatic")],
+            [
+                ARM[0],
+                '<link name="tool0"/>',
+                joint("a1", "base", "tool0", '<limit lower="0" upper="500" velocity="3"/>', kind="prismatic"),
+            ],
             "r.urdf:4: joint 'a1': expected position limits within 20 m, got 500 m (is the unit mm?): "
             f"{STATE}`limits: {{a1: {{lower_mm: …, upper_mm: …}}}}`",
         ),
