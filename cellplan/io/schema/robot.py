@@ -216,8 +216,8 @@ class RobotEntry(Entry):
     )
     flange: Text | None = Field(
         default=None,
-        description="URDF link taken as the flange; when absent tool0, else flange, else the only last link, where z of "
-        "that is along the last axis.",
+        description="URDF link taken as the flange; when absent tool0, else flange, else the only last link, where its "
+        "z is along the last axis.",
     )
     base: PoseEntry = Field(
         default=PoseEntry(), description="Pose of the robot's base (root link of a URDF) in the world."

@@ -117,12 +117,9 @@ def _package_places(name: str, packages: Packages) -> dict[Path, str | None]:
         raise InputError("expected package://NAME/path")
     if not plain:
         return dict.fromkeys((root / package for root in packages.roots), "names no package, looked up without one")
-    places, stand_in = packages.places(package, plain)
+    places, remark = packages.places(package, plain)
     is_usual = not name.startswith("/") and rest == plain
-    remark = None if is_usual else "has too many slashes, read as package://NAME/path"
-    if stand_in is not None:
-        remark = f"no such package, read from the folder {shown(stand_in.resolve().name)}"
-    return dict.fromkeys(places, remark)
+    return dict.fromkeys(places, remark or (None if is_usual else "has too many slashes, read as package://NAME/path"))
 
 
 def _plain_places(

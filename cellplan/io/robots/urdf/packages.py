@@ -26,25 +26,31 @@ class Packages:
     package_dirs: tuple[Path, ...] = ()  # folders that hold packages, or are one
     within: AllowedFolders | None = None  # folders that a package must lie in; None for all
 
-    def places(self, package: str, rest: str) -> tuple[list[Path], Path | None]:
-        """Where a file of a package lies or would lie, and the folder that stands in for it if none has its name.
+    def places(self, package: str, rest: str) -> tuple[list[Path], str | None]:
+        """Where a file of a package lies or would lie, and a remark where no folder is the package beyond doubt.
 
-        In each of ``package_dirs``, then in ``folder`` and those above it, the package is a folder below with its name,
-        or the folder itself if it has the name. The name in a ``package.xml`` counts before that of the folder. Where
-        there is none, one of ``package_dirs`` that belongs to no package stands in for it if it contains the file.
+        In each of ``package_dirs``, then in ``folder`` and those above it, the package is a folder below, or the folder
+        itself, if its ``package.xml`` states the name or, where no folder does, if it is called so. Where there is
+        none, a folder that belongs to no package counts if it contains the file, and is one of ``package_dirs`` or has
+        the first part of the name for its own, as ``arm`` for ``arm_support``.
 
         Returns:
-            Paths within the allowed folders, at least one, those of existing files first; and the stand-in or None.
+            Paths within the allowed folders, at least one, those of existing files first; and the remark or None.
 
         Raises:
             InputError: There is no such package.
         """
-        places = [folder / rest for folder in dict.fromkeys(self._named(package))]
+        folders = dict.fromkeys(self._named(package))
+        stated = [folder for folder in folders if _stated_name(folder) in ("", package)]
+        places = [folder / rest for folder in stated or folders]
         if places:
-            return sorted(places, key=lambda place: not self._holds_file(place)), None
-        for root in self.package_dirs:
-            if self._holds_file(root / rest) and not self._name_around(root):
-                return [root / rest], root
+            others = "" if stated else _stated_name(next(iter(folders)))
+            remark = f"is read from a folder of that name, whose {MANIFEST} states {shown(others)}" if others else None
+            return sorted(places, key=lambda place: not self._holds_file(place)), remark
+        for root in self.roots:
+            is_likely = root in self.package_dirs or package.startswith(f"{root.resolve().name or package}_")
+            if is_likely and self._holds_file(root / rest) and not self._name_around(root):
+                return [root / rest], f"no such package, read from the folder {shown(root.resolve().name)}"
         where = listed(dict.fromkeys(str(root.absolute()) for root in self.roots))
         cure = "name the folder that holds it in `package_dirs`"
         raise InputError(f"no package {shown(package)}, looked through {where}: {cure}")
@@ -64,7 +70,9 @@ class Packages:
             places = [root / package, root]
             if root in self.package_dirs:
                 places += [manifest.parent for manifest in sorted(root.glob(f"*/{MANIFEST}"))]
-            yield from (place for place in places if place.is_dir() and _name_of(place) == package)
+            yield from (
+                each for each in places if each.is_dir() and package in (_stated_name(each), each.resolve().name)
+            )
 
     def _name_around(self, folder: Path) -> str:
         """Name of the package that a folder belongs to; empty for none."""
@@ -83,11 +91,6 @@ def is_file(place: Path) -> bool:
         return place.is_file()
     except (OSError, ValueError):
         return False
-
-
-def _name_of(folder: Path) -> str:
-    """Name of the package that a folder is: as its manifest states it, or as it is called itself."""
-    return _stated_name(folder) or folder.resolve().name
 
 
 def _stated_name(folder: Path) -> str:

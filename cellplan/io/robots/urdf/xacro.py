@@ -129,10 +129,9 @@ class _Files:
         package, _, rest = filename.removeprefix(PACKAGE).partition("/")
         if not filename.startswith(PACKAGE):
             return Path(filename)
-        places, stand_in = self._packages.places(package, rest)
-        if stand_in is not None:
-            text = f"no package {shown(package)} by name: its files were read from {shown(stand_in.resolve().name)}"
-            self._remarks.add(text, f"{self._path.name}: {text}")
+        places, remark = self._packages.places(package, rest)
+        if remark is not None:
+            self._remarks.add(f"{package} {remark}", f"{self._path.name}: package {shown(package)}: {remark}")
         return places[0]
 
 

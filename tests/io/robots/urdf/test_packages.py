@@ -32,14 +32,50 @@ def test_no_other_package_stands_in_for_a_missing_one(tmp_path: Path) -> None:
             assert str(package) in str(caught.value)
 
 
-def test_a_folder_of_the_right_name_is_not_taken_where_its_manifest_states_another(tmp_path: Path) -> None:
+def test_the_name_that_a_manifest_states_comes_before_that_of_a_folder(tmp_path: Path) -> None:
+    """Some collections call the folder of a package otherwise than its manifest does, and name it by the folder."""
     path = write_arm(tmp_path)
     package = tmp_path / "packages" / "arm_support"
     (package / "package.xml").write_text("<package><name>other_support</name></package>", encoding="utf-8")
+    settings = XacroSettings(package_dirs=(tmp_path / "packages",))
 
-    for dirs in ("packages", "packages/arm_support"):
-        with pytest.raises(InputError, match=r"arm\.urdf\.xacro:4: no package 'arm_support', looked through"):
-            read_document(path, XacroSettings(package_dirs=(tmp_path / dirs,)))
+    document = read_document(path, settings)
+
+    assert list(document.links) == ["base", "left_upper", "left_lower"]
+    assert document.remarks[0] == (
+        "arm.urdf.xacro: package 'arm_support': is read from a folder of that name, whose package.xml states "
+        "'other_support'"
+    )
+    right = tmp_path / "packages" / "fork"
+    (right / "urdf").mkdir(parents=True)
+    (right / "package.xml").write_text("<package><name>arm_support</name></package>", encoding="utf-8")
+    segment = (package / "urdf" / "segment.xacro").read_text(encoding="utf-8")
+    (right / "urdf" / "segment.xacro").write_text(segment.replace("${name}_joint", "${name}_turn"), encoding="utf-8")
+
+    document = read_document(path, settings)
+
+    assert list(document.joints) == ["left_upper_turn", "left_lower_turn"]
+    assert not any("package" in remark for remark in document.remarks)
+
+
+@pytest.mark.parametrize(("folder", "is_taken"), [("arm", True), ("support", False), ("hand", False), ("ar", False)])
+def test_a_folder_around_the_file_stands_in_only_where_its_name_begins_the_package(
+    tmp_path: Path, folder: str, is_taken: bool
+) -> None:
+    """Parts of a package that were copied without its manifest; a folder under ``package_dirs`` may have any name."""
+    place = tmp_path / folder
+    place.mkdir()
+    (place / "links.xacro").write_text(f'{HEAD}<link name="base"/></robot>', encoding="utf-8")
+    path = place / "arm.xacro"
+    path.write_text(f'{HEAD}<xacro:include filename="$(find arm_support)/links.xacro"/></robot>', encoding="utf-8")
+    remark = f"arm.xacro: package 'arm_support': no such package, read from the folder '{folder}'"
+
+    if is_taken:
+        assert read_document(path).remarks == (remark,)
+    else:
+        with pytest.raises(InputError, match="no package 'arm_support', looked through"):
+            read_document(path)
+    assert read_document(path, XacroSettings(package_dirs=(place,))).remarks == (remark,)
 
 
 def test_a_file_does_not_include_itself_through_another_package(tmp_path: Path) -> None:
