@@ -7,13 +7,11 @@ from pathlib import Path
 from textwrap import indent
 from typing import Final
 
-import numpy as np
-
 from cellplan.errors import InputError
-from cellplan.geometry.shapes import support
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import read_document
+from cellplan.io.robots.urdf.drawings import edges_of_box, small_bodies
 from cellplan.io.robots.urdf.flange import axis_along, choose_flange, flange_remarks, is_along, last_joint
 from cellplan.io.robots.urdf.limits import Lacking, lacking_limits, limits_to_state, with_blanks
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfStructure, urdf_model, urdf_structure
@@ -73,6 +71,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
             *flange_remarks(tree, flange, is_named=not is_usual or options.flange is not None),
             *tree.document.remarks,
             *shelf.remarks.lines,
+            *small_bodies(tree, structure.configuration, bodies, flange=flange, shelf=shelf),
             *_elsewhere(path, tree, shelf),
         ),
     )
@@ -85,14 +84,8 @@ def size_along(bodies: tuple[Body, ...], X_BL: Array) -> Array:
         bodies: At least one.
         X_BL: Pose of L in the base while all joints read zero.
     """
-    sides = np.vstack([np.eye(3), -np.eye(3)])
-    reach = []
-    for body in bodies:
-        X_LS = inverse(X_BL) @ body.X_BS
-        reach.append(support(body.shape, sides @ X_LS[:3, :3]) + sides @ X_LS[:3, 3])
-    farthest = np.max(reach, axis=0)
-    size: Array = farthest[:3] + farthest[3:]
-    return size
+    X_LB = inverse(X_BL)
+    return edges_of_box([(body.shape, X_LB @ body.X_BS) for body in bodies])
 
 
 def cell_lines(name: str, entry: Mapping[str, object]) -> str:

@@ -12,6 +12,7 @@ from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.robots.limits import StatedLimits
 from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_document
+from cellplan.io.robots.urdf.drawings import small_bodies
 from cellplan.io.robots.urdf.flange import choose_flange, flange_remarks
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
 from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
@@ -135,6 +136,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
             *flange_remarks(tree, flange, is_named=options.flange is not None),
             *document.remarks,
             *shelf.remarks.lines,
+            *small_bodies(tree, structure.configuration, bodies, flange=flange, shelf=shelf),
         ),
     )
 

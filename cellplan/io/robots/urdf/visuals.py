@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from cellplan.errors import InputError
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.urdf.bodies import MeshShelf
-from cellplan.io.robots.urdf.document import UrdfLink, UrdfMesh, read_document, read_solid
+from cellplan.io.robots.urdf.document import read_document
+from cellplan.io.robots.urdf.drawings import drawn_solids
 from cellplan.io.robots.urdf.load import UrdfOptions
 
 
@@ -36,18 +36,6 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
     found: list[Visual] = []
     for link in read_document(path, options.xacro).links.values():
         if link.element.all("collision"):
-            found += _visuals(link, shelf)
+            drawn = drawn_solids(link, shelf)
+            found += [Visual(link=link.name, shape=shape, X_LS=X_LS) for shape, X_LS in drawn]
     return tuple(found)
-
-
-def _visuals(link: UrdfLink, shelf: MeshShelf) -> list[Visual]:
-    """The visual elements of a link; none where one cannot be read."""
-    found = []
-    try:
-        for element in link.element.all("visual"):
-            solid = read_solid(element, f"link '{link.name}'")
-            shape = shelf.mesh(solid.shape, element) if isinstance(solid.shape, UrdfMesh) else solid.shape
-            found.append(Visual(link=link.name, shape=shape, X_LS=solid.X_LS))
-    except InputError:
-        return []
-    return found
