@@ -89,8 +89,7 @@ def verify_motion(
 
     The report does not say yet whether the run passed: ``with_clearance`` completes it.
     """
-    cell = scene.cell
-    q = _positions(cell, schedule, tables)
+    cell, q = scene.cell, _positions(scene.cell, schedule, tables)
     at_work = [scheduled.task.name for scheduled in schedule.tasks]
     idle = [name for name in idle_robots(cell, at_work) if name not in moving] if idle is None else idle
     progress("checking tool errors and joints", 0.0)
@@ -106,12 +105,13 @@ def verify_motion(
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
+    checks += check_payload(loads)
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),
         tasks=tuple(at_work),
         idle=tuple(idle),
-        checks=(*checks, *check_payload(loads)),
+        checks=tuple(checks),
         accuracy=accuracy,
         joints=tuple(uses),
         clearance=UNKNOWN,
