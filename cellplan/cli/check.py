@@ -77,6 +77,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
     from cellplan.report.record.common import check_record, number
     from cellplan.report.record.missing_tools import missing_tools
     from cellplan.report.record.open_surfaces import open_surfaces_record
+    from cellplan.report.record.solver import moved_start_record
     from cellplan.report.record.tasks import direction_record
     from cellplan.report.text.notes import open_surface_notes
 
@@ -88,6 +89,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start": {robot.name: _start(robot) for robot in result.cell.robots},
         "start_found": list(result.found),
         "start_choice": result.choice,
+        "moved_starts": [moved_start_record(each) for each in result.moved],
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
         "controllers": {
             name: {

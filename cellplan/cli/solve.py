@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from cellplan.cli.completion import run_folders
 from cellplan.cli.options import (
     AllowDirs,
     AsJson,
@@ -42,6 +43,15 @@ KeepRejected = Annotated[
     bool, typer.Option("--keep-rejected", help="Write the tables of a failed run below rejected/.")
 ]
 
+Near = Annotated[
+    Path | None,
+    typer.Option(
+        "--near",
+        metavar="RUN",
+        help="Keep the branches of an earlier run: starts and homes that the cell leaves open are nearest to its own.",
+        autocompletion=run_folders,
+    ),
+]
 WithView = Annotated[
     bool,
     typer.Option("--view", help="Write the 3-D page view.html too, as cellplan view does."),
@@ -58,6 +68,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
     clearance_mm: Clearance = None,
     settings: Settings = None,
     task: TaskName = None,
+    near: Near = None,
     as_json: AsJson = False,
     keep_rejected: KeepRejected = False,
     with_view: WithView = False,
@@ -84,6 +95,7 @@ def solve(  # noqa: PLR0913, PLR0917 - the options of the command
         settings=tuple(settings or ()),
         overrides=overrides,
         task=task,
+        near=near,
         keep_rejected=keep_rejected,
         with_view=with_view,
         plot_formats=tuple(plots or ()),
@@ -106,6 +118,7 @@ class _Request:
     settings: tuple[str, ...]
     overrides: Mapping[str, str | float | None]
     task: str | None
+    near: Path | None
     keep_rejected: bool
     with_view: bool
     plot_formats: tuple[str, ...]
@@ -129,7 +142,7 @@ def _solved(request: _Request, follow: "Callable[[Cell], None]", progress: Liste
     folder = request.output or Path("outputs") / changed.name
     refuse_unless_replaceable(folder)
     try:
-        solution = solve_in_parallel(changed, task=request.task, progress=progress)
+        solution = solve_in_parallel(changed, task=request.task, near=request.near, progress=progress)
     except BlockedTransferError as error:
         raise _with_page(error, folder) from error
     record = _written(solution, folder, request, progress)
@@ -159,7 +172,7 @@ def _result(request: _Request, changed: "Cell", solution: "Solution", record: "R
     if request.task is None:
         failed = [check["name"] for check in record["checks"] if not check["passed"]]
         lines += after_solve(request.cell, changed, failed, run=folder, allow_dirs=request.allow_dirs)
-    lines += [solution.remark] if solution.remark else []
+    lines += [solution.remark] if solution.remark and not solution.passed else []  # else the checks have settled it
     place = {"folder": str(folder), "report_path": str(folder / "report.html")}
     about = {"schema": SCHEMA, "status": record["status"], "exit": int(status), **place}
     return Result(status, lines, {**about, "report": record}, folder)

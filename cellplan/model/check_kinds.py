@@ -69,6 +69,7 @@ VALUE, DISTANCE = Excess.VALUE, Excess.DISTANCE
 # fmt: off
 _LISTED: Final = (  # the gravest first
     CheckKind("start_collision", "no collision at the start", "Collision at the start", group="collisions at the start"),
+    CheckKind("start_trial", "motion from the chosen start without fault on trial", "Motion from the chosen start", group="trials of the start"),
     CheckKind("begin", "tables begin where the cell has stopped", "Tables begin elsewhere"),
     CheckKind("standing", "robots without a part in a phase at rest in it", "Robot moves that stands"),
     CheckKind("collision", "no collision", "Collision", group="collisions", excess=VALUE, concern=NEAR),

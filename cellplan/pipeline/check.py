@@ -1,27 +1,27 @@
 """Check a cell without solving it: files, robots, paths, reach and collisions at the start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.joints.payload import check_payload_at_rest
 from cellplan.geometry.transforms import Array
+from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
+from cellplan.pipeline.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.pipeline.plan.path_depths import depths_on_paths
 from cellplan.pipeline.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts
 from cellplan.pipeline.plan.start import chosen_start
-from cellplan.pipeline.solve import with_start
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.sequence.approach_starts import with_approach_starts
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import first_blocks, program_stages
-from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.present_pairs import present_pairs
+from cellplan.planning.start.search import StartChoice
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
@@ -35,6 +35,7 @@ class CellCheck:
     choice: str | None  # how the start was chosen, in words; None when all of it was given
     path_lengths: Mapping[str, float]  # length of each task's path on the surface in [m]
     checks: tuple[Check, ...]  # the verified statements
+    moved: tuple[MovedStart, ...]  # how far starts were moved to their tasks
     left_out: tuple[LeftOut, ...]  # what was not judged in full, but for two links of one robot's file
 
     @property
@@ -83,6 +84,7 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
         choice="; ".join(words) or None,
         path_lengths={name: length for one in made.values() for name, length in one.path_lengths.items()},
         checks=tuple(checks),
+        moved=tuple(dict.fromkeys(each for one in made.values() for each in one.moved)),
         left_out=scenes.held.left_out,
     )
 
@@ -91,12 +93,11 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     """The checks of tasks that are worked on together, or one after the other from the same start."""
     cell = scene.cell
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
-    if cell.program is not None:
-        cell = with_approach_starts(cell, scene.chains, toolpaths)
-        scene = replace(scene, cell=cell)
+    cell, moved = with_placed_starts(cell, toolpaths, scene.chains)
+    scene = replace(scene, cell=cell)
     paths = clock_paths(cell, toolpaths.values())
-    examine_given_starts(cell, toolpaths)
     choice = chosen_start(scene, paths, progress=progress)
+    started, more = with_chosen_start(cell, choice.start, toolpaths)
     start = choice.start
     pair = _touching_at_start(scene, start)
     found = tuple(robot.name for robot in cell.robots if robot.start is None)
@@ -113,17 +114,36 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     )
     loads = check_payload_at_rest(cell, scene.chains, start)
     return CellCheck(
-        cell=with_start(cell, start),
+        cell=started,
         found=found,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
         checks=(
             at_start,
+            *_on_trial(choice),
             *check_mounting(scene, start[None]),
             *depths_on_paths(cell, toolpaths),
             *(each for each in loads if each.name == "payload" or not each.passed),
         ),
+        moved=(*moved, *more),
         left_out=scene.left_out,
+    )
+
+
+def _on_trial(choice: StartChoice) -> Iterator[Check]:
+    """Whether the motion from a start that was searched for is without fault on a coarse clock."""
+    if choice.trial is None or choice.words is None:
+        return
+    is_sound = choice.trial.is_sound
+    yield Check(
+        name="start_trial",
+        subject="cell",
+        passed=is_sound,
+        value=0.0 if is_sound else 1.0,
+        limit=0.0,
+        unit="faults",
+        at_s=None,
+        message=choice.words if is_sound else f"{choice.words}; cellplan solve decides, on the accurate clock",
     )
 
 

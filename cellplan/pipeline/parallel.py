@@ -1,5 +1,7 @@
 """Solve a cell on two processors: its clearance is checked beside everything else."""
 
+from pathlib import Path
+
 from cellplan.guard import ForkedWork
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -8,7 +10,9 @@ from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.solve import certified, solve, solve_motion
 
 
-def solve_in_parallel(cell: Cell, *, task: str | None = None, progress: Progress = silent) -> Solution:
+def solve_in_parallel(
+    cell: Cell, *, task: str | None = None, near: Path | None = None, progress: Progress = silent
+) -> Solution:
     """Solve as ``solve`` does; copies of this process check the clearance while it does all else.
 
     Meanwhile it makes the files of a run folder that do not depend on the clearance.
@@ -16,13 +20,14 @@ def solve_in_parallel(cell: Cell, *, task: str | None = None, progress: Progress
     Args:
         cell: The cell, as ``load_cell`` gives it.
         task: Name of the only task to work on.
+        near: Folder of a run of which the branches are kept.
         progress: Called with the stage and the fraction done.
     """
     with ForkedWork(progress) as work:
         if not work.is_possible:
-            return solve(cell, task=task, progress=progress)
+            return solve(cell, task=task, near=near, progress=progress)
         early = EarlyClearance(work.begin, with_curves=True)
-        scene, solution = solve_motion(cell, task=task, progress=progress, early=early)
+        scene, solution = solve_motion(cell, task=task, near=near, progress=progress, early=early)
         from cellplan.pipeline.write_run import prepared  # reads what makes pages while the copies work
 
         return certified(prepared(solution), scene, progress=progress, early=early)

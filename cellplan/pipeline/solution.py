@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program, Schedule
 from cellplan.model.phase import Phase
@@ -29,6 +30,7 @@ class Run:
         report: Result of the checks on these rows.
         rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
         scene: The scene that it is judged in, with the cell as it is in this phase; None for that of the whole program.
+        moved: How far its starts were moved.
         early: Files that were made before the clearance was known; None without any. See ``early_files``.
     """
 
@@ -39,6 +41,7 @@ class Run:
     report: Report
     rungs: Mapping[str, str] = field(default_factory=dict)
     scene: Scene | None = None
+    moved: tuple[MovedStart, ...] = ()
     early: "EarlyFiles | None" = None
 
     def __repr__(self) -> str:

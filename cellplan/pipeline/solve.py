@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import completed, run_clearance, stacked, verify_motion, with_clocks
-from cellplan.geometry.transforms import Array
 from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
+from cellplan.model.branches import Branches, MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Program
 from cellplan.model.phase import Phase
@@ -16,22 +16,29 @@ from cellplan.model.plan import Plan
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.pipeline.early_clearance import EarlyClearance
+from cellplan.pipeline.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.pipeline.plan.headers import table_headers
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
+from cellplan.pipeline.plan.near import read_branches, with_run_named
 from cellplan.pipeline.plan.program import ProgramClock, refuse_clock_name
 from cellplan.pipeline.plan.retiming import retimed
-from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
 
-def solve(cell: Cell, *, task: str | None = None, is_reported: bool = True, progress: Progress = silent) -> Solution:
+def solve(
+    cell: Cell,
+    *,
+    task: str | None = None,
+    near: Path | None = None,
+    is_reported: bool = True,
+    progress: Progress = silent,
+) -> Solution:
     """Plan the motion of all robots, render their joint tables, read these back and verify them.
 
     A program that violates a limit or collides is returned like any other: its reports state where, when and how much.
@@ -39,6 +46,7 @@ def solve(cell: Cell, *, task: str | None = None, is_reported: bool = True, prog
     Args:
         cell: The cell, as ``load_cell`` gives it.
         task: Name of the only task to work on; the other operators stay at their homes.
+        near: Folder of a run of the same robots, of which starts and homes that are to be found keep the branches.
         is_reported: Whether figures of clocks that no check judges are worked out too, which a search does not need:
             the allowed skew, and stops of a robot.
         progress: Called with the stage and the fraction done.
@@ -47,56 +55,75 @@ def solve(cell: Cell, *, task: str | None = None, is_reported: bool = True, prog
         InputError: The cell cannot be worked with: a path misses the part, a given start is off its task.
         NoSolutionError: No start posture or no home was found, or a tool lost its path.
     """
-    scene, solution = solve_motion(cell, task=task, progress=progress)
+    scene, solution = solve_motion(cell, task=task, near=near, progress=progress)
     return certified(solution, scene, is_reported=is_reported, progress=progress)
 
 
 def solve_motion(
-    cell: Cell, *, task: str | None, progress: Progress, early: EarlyClearance | None = None
+    cell: Cell,
+    *,
+    task: str | None,
+    near: Path | None = None,
+    progress: Progress,
+    early: EarlyClearance | None = None,
 ) -> tuple[Scene, Solution]:
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
     Args:
         cell: The cell.
         task: Name of the only task to work on.
+        near: Folder of a run of which the branches are kept.
         progress: Called with the stage and the fraction done.
         early: Begins with the clearance of each phase as soon as its rows are known.
     """
     refuse_clock_name(cell)
+    branches = None if near is None else read_branches(near, cell)
+    cell = with_run_named(cell, branches)
     if cell.program is not None:
-        return _solve_program(cell, task=task, early=early, progress=progress)
+        return _solve_program(cell, task=task, near=branches, early=early, progress=progress)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     paths = clock_paths(cell, toolpaths.values())
     plan = plan_phases(cell, only=task)
-    examine_given_starts(cell, toolpaths)
-    choice = chosen_start(scene, paths, progress=progress)
-    started = with_start(cell, choice.start)
+    placed, moved = with_placed_starts(cell, toolpaths, scene.chains, near=branches)
+    choice = chosen_start(replace(scene, cell=placed), paths, progress=progress)
+    started, more = with_chosen_start(placed, choice.start, toolpaths)
     planned = [plan_run(started, paths, phase, progress=progress) for phase in plan.program]
-    solved = with_homes(started, find_homes(replace(scene, cell=started), planned, progress=progress), given=cell)
+    known = {} if branches is None else branches.homes
+    homes = find_homes(replace(scene, cell=started), planned, known=known, progress=progress)
+    solved = with_homes(started, homes, given=placed)
     if depends_on_homes(started, planned):
         planned = [plan_run(solved, paths, phase, progress=progress) for phase in plan.program]
     scene = replace(scene, cell=solved)
     nominal = [replace(run.motion, q=standing(solved, run.phase, run.motion.q)) for run in planned]
     clock = ProgramClock.of(solved, plan, [run.schedule for run in planned])
     motion, runs = _runs(solved, clock, nominal, [scene] * len(planned), early=early, progress=progress)
+    runs = tuple(replace(run, moved=_of_phase((*moved, *more), run.phase)) for run in runs)
     return scene, Solution(cell=solved, motion=motion, runs=runs, remark=choice.warning)
 
 
+def _of_phase(moved: Sequence[MovedStart], phase: Phase) -> tuple[MovedStart, ...]:
+    """Starts that were moved to a task of a phase, or to a grasp."""
+    return tuple(each for each in moved if each.task in phase.tasks or "@" in each.task)
+
+
 def _solve_program(
-    cell: Cell, *, task: str | None, early: EarlyClearance | None, progress: Progress
+    cell: Cell, *, task: str | None, near: Branches | None, early: EarlyClearance | None, progress: Progress
 ) -> tuple[Scene, Solution]:
     """The stages of a program from home to home, verified but for their clearance, and the scene with the part held."""
     from cellplan.pipeline.plan.sequence import plan_program  # with all transfer moves, which few cells have
     from cellplan.planning.sequence.only_task import with_only_task
 
-    planned = plan_program(cell if task is None else with_only_task(cell, task), progress=progress)
+    planned = plan_program(cell if task is None else with_only_task(cell, task), near=near, progress=progress)
     stages, cycles = planned.stages, planned.cycles
     plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
     clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
     motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
     motion, runs = _runs(planned.cell, clock, motions, scenes, early=early, progress=progress)
-    runs = tuple(replace(run, rungs=each.rungs, scene=each.scene) for run, each in zip(runs, stages, strict=True))
+    runs = tuple(
+        replace(run, rungs=each.rungs, scene=each.scene, moved=planned.moved.get(run.phase.name, ()))
+        for run, each in zip(runs, stages, strict=True)
+    )
     remark = "; ".join(planned.remarks) or None
     return replace(planned.scenes.held, cell=planned.cell), Solution(
         cell=planned.cell, motion=motion, runs=runs, remark=remark
@@ -211,12 +238,3 @@ def _digests(cell: Cell, program: Program) -> dict[str, str]:
     file = PurePath(cell.origin.file).name  # inputs are known by their path from the folder of the cell
     of_cell = {"cell": cell.inputs[file]} if file in cell.inputs else {}
     return of_cell | {"program": program_digest(program.tables)}
-
-
-def with_start(cell: Cell, start: Array) -> Cell:
-    """The cell with every start posture filled in; found ones are rounded to what is written of them."""
-    robots = []
-    for robot in cell.robots:
-        found = start[cell.columns(robot.name)]
-        robots.append(robot if robot.start is not None else replace(robot, start=rounded(robot, found)))
-    return replace(cell, robots=tuple(robots))

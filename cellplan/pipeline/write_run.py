@@ -79,7 +79,8 @@ def write_run(
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
-            record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers)
+            moved = dict.fromkeys(each for run in solution.runs for each in run.moved)
+            record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers, moved=moved)
             target.write_text("report.json", as_json(record))
             phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
             beside = Beside(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
@@ -118,7 +119,9 @@ def _write_report(
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
     place, early = "" if run.name is None else f"{run.name}/", early_files(run)
-    record = run_record(run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers)
+    record = run_record(
+        run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers, moved=run.moved
+    )
     target.write_text(f"{place}report.json", as_json(record))
     target.write_text(f"{place}series.json", series_json(run.report, run.motion, head=early.series))
     plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)

@@ -103,9 +103,12 @@ def _install() -> None:
 def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
     """The first part of ``solve``; a known solution takes the place of the scene."""
 
-    def solve_motion(cell: Cell, *, task: str | None, progress: Progress, early: Any = None) -> tuple[Any, Solution]:
-        if early is not None:  # begins with what is asked for afterwards
-            return real(cell, task=task, progress=progress, early=early)
+    def solve_motion(
+        cell: Cell, *, task: str | None, near: Path | None = None, progress: Progress, early: Any = None
+    ) -> tuple[Any, Solution]:
+        if early is not None or near is not None:  # begins with what is asked for afterwards, or with another run
+            _state.making = None
+            return real(cell, task=task, near=near, progress=progress, early=early)
         _state.making = entry = None if _state.folder is None or _is_patched() else _entry(cell, task, _state.folder)
         if entry is None:
             return real(cell, task=task, progress=progress)

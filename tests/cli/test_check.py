@@ -38,7 +38,7 @@ def test_a_collision_at_the_start_ends_with_one(cells: Path, capsys: pytest.Capt
 def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
     path = tmp_path / "off.yaml"
-    path.write_text(text.replace("start_deg: [21.020925685,", "start_deg: [25.0,"), encoding="utf-8")
+    path.write_text(text.replace("start_deg: [21.020925685,", "start_deg: [45.0,"), encoding="utf-8")
 
     status = run(["check", str(path)])
 
@@ -46,6 +46,24 @@ def test_a_start_off_its_task_is_bad_input(cells: Path, tmp_path: Path, capsys: 
     assert (status, out) == (2, "")
     assert f"{path}:25: robots.kuka.start_deg" in err
     assert err.count("\n") == 1
+
+
+def test_a_start_a_few_degrees_off_its_task_is_moved_there_and_said_so(
+    cells: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "near.yaml"
+    path.write_text(text.replace("start_deg: [21.020925685,", "start_deg: [23.0,"), encoding="utf-8")
+
+    status = run(["check", str(path), "--json"])
+
+    record = json.loads(capsys.readouterr().out)
+    assert (status, record["status"]) == (0, "passed")
+    (moved,) = record["moved_starts"]
+    assert (moved["robot"], moved["task"], moved["run"], moved["unit"]) == ("kuka", "circle", None, "deg")
+    assert 30.0 < moved["tool_mm"] < 60.0  # 1.98 deg of an arm of about a metre
+    assert 1.0 < abs(moved["joint_moved"]) < 5.0
+    assert record["start"]["kuka"]["B1_deg"] == pytest.approx(21.02, abs=0.5)
 
 
 def test_names_that_were_read_over_are_notes_of_the_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

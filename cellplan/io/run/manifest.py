@@ -17,6 +17,7 @@ from cellplan.model.cell import Cell
 SCHEMA: Final = "cellplan.manifest/1"
 SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of sixty-four robots need less than half
 BUNDLED: Final = "bundled:"  # begins the name of an input that comes with the program
+NEAR: Final = "near:"  # begins that of a run of which the branches were kept; no file of the cell
 MADE_LATER: Final = frozenset(
     {PROGRAMS, REHEARSAL, RECOVER, "view.html"}
 )  # made from a run after it was written; no part of it
@@ -50,6 +51,11 @@ class Manifest:
         """Files beside the cell file that the cell names; robots that come with the program are not among them."""
         return own_inputs(self.inputs, self.cell_file)
 
+    @property
+    def cell_inputs(self) -> dict[str, str]:
+        """The inputs but for a run of which the branches were kept: it is not needed any more."""
+        return {name: digest for name, digest in self.inputs.items() if not name.startswith(NEAR)}
+
 
 def own_inputs(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
     """Files that a cell names, but for those that come with the program.
@@ -58,7 +64,7 @@ def own_inputs(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
         inputs: Names of all files that were read.
         cell_file: Name of the cell file among them, without folders.
     """
-    return tuple(name for name in inputs if name != cell_file and not name.startswith(BUNDLED))
+    return tuple(name for name in inputs if name != cell_file and not name.startswith((BUNDLED, NEAR)))
 
 
 def render_manifest(

@@ -24,6 +24,7 @@ PLANNER_KEYS: Final = (
     "slack",
     "resolution",
     "transfers",
+    "moved_starts",
 )  # of ``solver``: cannot be derived from the tables
 PLANNER_SERIES: Final = ("iterations", "slack")  # of the series, likewise
 KNOWN_TO_THE_PLANNER: Final = frozenset(

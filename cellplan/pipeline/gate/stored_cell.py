@@ -13,10 +13,14 @@ from cellplan.io.robots.bundled import load_bundled_table
 from cellplan.io.run.manifest import BUNDLED
 from cellplan.io.run.stored import CELL, StoredRun
 from cellplan.model.cell import Cell
+from cellplan.model.units import DEG, MM
+from cellplan.planning.start.seeds import SEED_SLIDE, SEED_TURN
 
 SEARCHED_KEYS: Final = frozenset(
     {"start", "start_deg", "home", "home_deg"}
 )  # written ``auto`` where they were to be found
+
+ROUNDED: Final = 1e-9  # [deg] or [mm] that writing a start changes it by at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +53,7 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     _refuse_stale(stored, now, where=f"'{cell}'", cell=cell)
     resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
     written, copied = written_document(original), written_document(resolved)
-    foreign = [each for each in _differences(written, copied) if not _may_differ(each[0], each[1])]
+    foreign = [each for each in _differences(written, copied) if not _may_differ(*each)]
     if foreign:
         raise InvalidFileError([_foreign(stored, cell, each) for each in foreign])
     remarks = tuple(f"{_change(address, value)} when the cell was solved" for address, value in changes.items())
@@ -69,7 +73,7 @@ def _without_file(stored: StoredRun) -> StoredCell:
             f"{stored.folder}: the run depends on files beside its cell file ({listed(manifest.own_inputs)}): name the "
             f"cell file '{manifest.cell_file}' with --cell, so that they can be compared"
         )
-    bundled = [name for name in manifest.inputs if name != manifest.cell_file]
+    bundled = [name for name in manifest.cell_inputs if name != manifest.cell_file]
     now = {manifest.cell_file: manifest.inputs[manifest.cell_file]}
     _refuse_stale(stored, now | {name: _bundled_digest(name) for name in bundled}, where="this version of cellplan")
     remark = f"the cell file '{manifest.cell_file}' was not compared with the run; name it with --cell"
@@ -95,7 +99,7 @@ def _bundled_digest(name: str) -> str:
 def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str, cell: Path | None = None) -> None:
     """Refuse inputs that are not what they were when the run was made."""
     findings = []
-    for name, digest in stored.manifest.inputs.items():
+    for name, digest in stored.manifest.cell_inputs.items():
         if not now.get(name):
             findings.append(f"the run depends on '{name}', to which {where} does not refer")
         elif now[name] != digest:
@@ -103,7 +107,7 @@ def _refuse_stale(stored: StoredRun, now: Mapping[str, str], *, where: str, cell
     findings += [
         f"{where} needs '{name}', on which the run does not depend"
         for name in now
-        if name not in stored.manifest.inputs
+        if name not in stored.manifest.cell_inputs
     ]
     if findings:
         raise InvalidFileError([InputError(f"{stored.folder}: {finding}") for finding in findings])
@@ -116,7 +120,7 @@ def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) ->
     digests = dict(cell.inputs)
     if digests.pop(CELL) != manifest.files[CELL].digest:
         raise InputError(f"{stored.folder / CELL}: changed while it was read")
-    own = {name: digest for name, digest in manifest.inputs.items() if name != manifest.cell_file}
+    own = {name: digest for name, digest in manifest.cell_inputs.items() if name != manifest.cell_file}
     if digests != own:
         raise InputError(f"{stored.folder / CELL}: refers to other files than the cell file; solve the cell again")
     if cell.name != manifest.cell:
@@ -138,10 +142,17 @@ def _differences(old: object, new: object, path: KeyPath = ()) -> Iterator[tuple
         yield path, old, new
 
 
-def _may_differ(path: KeyPath, old: object) -> bool:
-    """Whether a run may have another value there than its cell file."""
-    is_searched = len(path) == 3 and path[0] in ("robots", "tasks") and path[2] in SEARCHED_KEYS
-    return is_searched and (old == "auto" or old is None)
+def _may_differ(path: KeyPath, old: object, new: object) -> bool:
+    """Whether a run may have another value there than its cell file: a start or home that is found, or was a seed."""
+    if not (len(path) >= 3 and path[0] in ("robots", "tasks") and path[2] in SEARCHED_KEYS):
+        return False
+    if len(path) == 3:
+        return old == "auto" or old is None
+    is_slide = str(path[3]).endswith("_mm")
+    most = MM * SEED_SLIDE if is_slide else DEG * SEED_TURN
+    if path[2] not in ("start", "start_deg") or not isinstance(old, float | int) or not isinstance(new, float | int):
+        return False
+    return abs(new - old) <= most + ROUNDED
 
 
 def _foreign(stored: StoredRun, cell: Path, difference: tuple[KeyPath, object, object]) -> InputError:

@@ -36,7 +36,9 @@ EXTRA_CLEARANCES: Final = (
 MAX_CERTIFIED: Final = 24  # candidates per robot of which certification is tried; each failure adds its sample
 
 
-def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress = silent) -> Mapping[str, Array]:
+def find_homes(
+    scene: Scene, runs: Sequence[PlannedRun], *, known: Mapping[str, Array] | None = None, progress: Progress = silent
+) -> Mapping[str, Array]:
     """Homes of all robots that are idle in some run and have none yet, in [rad] or [m], shape (n,) each.
 
     A home keeps the demanded clearance from everything, by the same check that judges the run afterwards, in every run
@@ -46,6 +48,7 @@ def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress =
     Args:
         scene: The scene of the cell, every start posture filled in.
         runs: The runs as they were planned.
+        known: Homes that are tried first, by robot.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -59,7 +62,7 @@ def find_homes(scene: Scene, runs: Sequence[PlannedRun], *, progress: Progress =
         for index, name in enumerate(order):
             progress(STAGE, index / len(order))
             search = _Search(replace(scene, cell=cell), runs, cell.robot(name))
-            home = search.home()
+            home = search.home((known or {}).get(name))
             if home is None and (index == 0 or name in tried):
                 raise HomeNotFoundError(search.why_nothing())
             if home is None:
@@ -122,9 +125,11 @@ class _Search:
         self._trials = HomeTrials(robot.name, samples)
         self._failed = Counter[str]()
 
-    def home(self) -> Array | None:
-        """The candidate nearest to the start certified to be free, with extra clearance if possible; or None."""
+    def home(self, known: Array | None) -> Array | None:
+        """A known home that is certified to be free; else the nearest to the start, with extra clearance; or None."""
         robot = self._robot
+        if known is not None and _is_within(robot, known) and self._is_certified(known):
+            return known
         rng = generator(robot.name, self._cell.solver.seed)
         candidates = home_candidates(robot.model, self._chain, self._start(), rng)
         for extra in EXTRA_CLEARANCES:
@@ -185,6 +190,11 @@ class _Search:
                 self._trials.add(place, _at(idle.run.schedule.times, q, failed.at_s or 0.0))
                 return False
         return True
+
+
+def _is_within(robot: Robot, q: Array) -> bool:
+    """Whether a configuration, shape (n,), keeps the joint limits."""
+    return bool(np.all((q >= robot.model.lower) & (q <= robot.model.upper)))
 
 
 def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:

@@ -1,12 +1,13 @@
 """Configurations that were found, rounded to what is written of them."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.write import as_written
-from cellplan.model.cell import Robot
+from cellplan.model.cell import Cell, Robot
 
 DECIMALS: Final = 12  # of a degree or a metre, as in the tables: below the noise of the arithmetic
 
@@ -16,3 +17,22 @@ def rounded(robot: Robot, q: Array) -> Array:
     turns = [joint.is_revolute for joint in robot.model.joints]
     few = np.where(turns, np.deg2rad(np.round(np.rad2deg(q), DECIMALS)), np.round(q, DECIMALS))
     return as_written(robot.model, np.clip(few, robot.model.lower, robot.model.upper))
+
+
+def with_rounded_starts(cell: Cell, given: Cell) -> Cell:
+    """The cell with starts that differ from the given ones rounded to what is written of them."""
+    robots = []
+    for robot in cell.robots:
+        is_same = robot.start is given.robot(robot.name).start
+        robots.append(robot if is_same else replace(robot, start=rounded(robot, np.asarray(robot.start))))
+    return replace(cell, robots=tuple(robots))
+
+
+def with_start(cell: Cell, start: Array) -> Cell:
+    """The cell with every start posture filled in; what is not as given is rounded to what is written of it."""
+    robots = []
+    for robot in cell.robots:
+        found = start[cell.columns(robot.name)]
+        is_given = robot.start is not None and np.array_equal(robot.start, found)
+        robots.append(robot if is_given else replace(robot, start=rounded(robot, found)))
+    return replace(cell, robots=tuple(robots))

@@ -9,12 +9,14 @@ import numpy as np
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.model.branches import Branches, MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.idle import idle_robots
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task import Task
+from cellplan.pipeline.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program_faults import (
     located,
@@ -25,17 +27,14 @@ from cellplan.pipeline.plan.program_faults import (
     refuse_unnamed_support,
 )
 from cellplan.pipeline.plan.retiming import transfer_retimer
-from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import standing
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.sequence.approach_starts import with_approach_starts
 from cellplan.planning.sequence.near_starts import near_start
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
-from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.timing.schedule import TIME_DECIMALS, clock_paths
 from cellplan.planning.transfer.plan import plan_transfer
 from cellplan.scene.scene import Scene
@@ -62,6 +61,7 @@ class PlannedProgram:
     scenes: StageScenes
     stages: tuple[PlannedStage, ...]  # the stages in their order, each beginning where the one before ends
     remarks: tuple[str, ...]  # notes on starts that were found, where no trial was without fault
+    moved: Mapping[str, tuple[MovedStart, ...]]  # how far starts were moved, by the name of the phase
 
     @property
     def cycles(self) -> int:
@@ -69,11 +69,12 @@ class PlannedProgram:
         return 1 if self.cell.program is None else self.cell.program.cycles
 
 
-def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
+def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
     """Plan all stages of one cycle.
 
     Args:
         cell: The cell; it has a program.
+        near: The run of which the branches are kept.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -84,18 +85,22 @@ def plan_program(cell: Cell, *, progress: Progress = silent) -> PlannedProgram:
     scenes = StageScenes.of(cell)
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
-    search = _Worked(cell, scenes, progress)
+    search = _Worked(cell, scenes, progress, near)
     runs = search.runs()
     started = search.cell
     at_home = _everyone_at_home(started, runs[0])
     around_held = [at_home, *(run for run in runs if run.scene is None)]
     others = [run for run in runs if run.scene is not None]
-    found = find_homes(replace(scenes.held, cell=started), [*around_held, *others], progress=progress)
+    known = {} if near is None else near.homes
+    all_runs = [*around_held, *others]
+    found = find_homes(replace(scenes.held, cell=started), all_runs, known=known, progress=progress)
     solved = _with_all_homes(with_homes(started, found, given=cell))
     if depends_on_homes(started, runs):
-        runs = _Worked(solved, scenes, progress).runs()
+        runs = _Worked(solved, scenes, progress, near).runs()
     stages = _joined(solved, scenes, runs, progress=progress)
-    return PlannedProgram(cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks))
+    return PlannedProgram(
+        cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks), moved=search.moved
+    )
 
 
 def _refuse_other_paths(cell: Cell) -> None:
@@ -111,10 +116,12 @@ class _Worked:
     Attributes:
         cell: The cell with the starts that were found so far.
         remarks: Notes on starts without a faultless trial.
+        moved: How far starts were moved, by the name of the phase.
     """
 
-    def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress) -> None:
+    def __init__(self, cell: Cell, scenes: StageScenes, progress: Progress, near: Branches | None) -> None:
         """Begin with the cell as it was written."""
+        self.moved, self._near = dict[str, tuple[MovedStart, ...]](), near
         self.cell, self.remarks, self._given = cell, list[str](), cell
         self._scenes, self._progress, self._last = scenes, progress, dict[str, Array]()
         self._kept = {*cell.positioners, *idle_robots(cell, [task.name for task in cell.tasks])}
@@ -131,9 +138,8 @@ class _Worked:
         scene = replace(self._scenes.of_stage(stage), cell=own)
         toolpaths = {task.name: build_toolpath(task, own.part) for task in own.tasks}
         paths = clock_paths(own, toolpaths.values())
-        own = with_rounded_starts(with_approach_starts(own, scene.chains, toolpaths), own)
+        own, moved = with_placed_starts(own, toolpaths, scene.chains, near=self._near)
         scene = replace(scene, cell=own)
-        examine_given_starts(own, toolpaths)
         start = near_start(scene, paths, self._last) if self._last else None
         if start is None:
             with located(stage, self.cell, self._given):
@@ -141,8 +147,9 @@ class _Worked:
             start = choice.start
             if choice.warning is not None:
                 self.remarks.append(f"{stage.phase.name}: {choice.warning}")
-        started = _with_starts(own, start)
+        started, more = with_chosen_start(own, start, toolpaths)
         self._record(stage, started)
+        self.moved[stage.phase.name] = (*moved, *more)
         with located(stage, self.cell, self._given):
             planned = plan_run(started, paths, stage.phase, progress=self._progress)
         refuse_unnamed_support(stage, scene, planned.motion.q)
@@ -178,27 +185,9 @@ class _Worked:
         self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
 
 
-def with_rounded_starts(cell: Cell, given: Cell) -> Cell:
-    """The cell with starts that differ from the given ones rounded to what is written of them."""
-    robots = []
-    for robot in cell.robots:
-        is_same = robot.start is given.robot(robot.name).start
-        robots.append(robot if is_same else replace(robot, start=rounded(robot, np.asarray(robot.start))))
-    return replace(cell, robots=tuple(robots))
-
-
 def _with_posture(task: Task, started: Cell) -> Task:
     """A task with the configuration in which its robot begins it."""
     return replace(task, start_posture=started.robot(task.robot).start)
-
-
-def _with_starts(cell: Cell, start: Array) -> Cell:
-    """The cell with every start filled in; found ones are rounded to what is written of them."""
-    robots = (
-        robot if robot.start is not None else replace(robot, start=rounded(robot, start[cell.columns(robot.name)]))
-        for robot in cell.robots
-    )
-    return replace(cell, robots=tuple(robots))
 
 
 def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:

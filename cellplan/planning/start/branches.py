@@ -22,6 +22,7 @@ from cellplan.planning.start.inverse_kinematics import (
     within_limits,
 )
 from cellplan.planning.start.near_ties import best_first
+from cellplan.planning.start.seeds import seeded
 from cellplan.planning.start.trial_motion import StartTrials
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
@@ -95,8 +96,8 @@ def branches_of(search: StartSearch, robot: Robot, holder_configuration: Array |
         return [(np.inf, holder_configuration)]
     relation = next((each for each in cell.relations if each.robot == robot.name), None)
     if robot.start is not None:
-        is_off = relation is not None and _is_off(search, robot, relation, holder_configuration)
-        return [] if is_off else [(np.inf, robot.start)]
+        start = robot.start if relation is None else _placed(search, robot, relation, holder_configuration)
+        return [] if start is None else [(np.inf, start)]
     if relation is None:
         neutral = np.clip(np.zeros(len(robot.model.joints)), *finite_limits(robot.model))
         neutral = neutral if robot.home is None else robot.home
@@ -110,20 +111,23 @@ def branches_of(search: StartSearch, robot: Robot, holder_configuration: Array |
     return _tried_alone(search, relation, scored[:TRIED_ALONE], holder_configuration)[:BRANCHES]
 
 
-def _is_off(search: StartSearch, robot: Robot, relation: Relation, holder_configuration: Array | None) -> bool:
-    """Whether a given start is off its task or grasp while the positioner, which is searched, holds the part so."""
+def _placed(search: StartSearch, robot: Robot, relation: Relation, holder_configuration: Array | None) -> Array | None:
+    """A given start, moved to its task as the positioner, which is searched, holds the part; None where too far off."""
     if not search.is_holder_open or relation.relative_to is not Frame.PART or robot.start is None:
-        return False
+        return robot.start
     if isinstance(relation, Task) and relation.settle > 0.0:
-        return False
+        return robot.start
     X_WP = part_pose(search.cell, holder_configuration)
     if X_WP is None:
-        return False
-    distance = tool_distance(search.chains[robot.name], relation, robot.start, search.X_PT_start(relation), X_WR=X_WP)
+        return robot.start
+    chain, X_PT = search.chains[robot.name], search.X_PT_start(relation)
+    distance = tool_distance(chain, relation, robot.start, X_PT, X_WR=X_WP)
     if not is_off(search.cell, relation, distance):
-        return False
-    search.failures.off_path(robot.name, distance)
-    return True
+        return robot.start
+    start = seeded(chain, relation, robot, X_PT, X_WR=X_WP)
+    if start is None:
+        search.failures.off_path(robot.name, distance)
+    return start
 
 
 def _tried_alone(

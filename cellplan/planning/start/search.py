@@ -1,6 +1,6 @@
 """Starts that are to be found: several inverse-kinematics branches per robot, tried out, the best one kept."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Final
@@ -9,7 +9,7 @@ import numpy as np
 
 from cellplan.errors import StartNotFoundError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, joint_at
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
@@ -34,6 +34,7 @@ class StartChoice:
     start: Array  # stacked start configuration in the order of the file, shape (nq,)
     tried: int = 0  # how many were tried out; 0 when all were given
     trial: Trial | None = None  # what is known of the motion from it; None when all were given
+    fault: str = ""  # what is wrong with that motion; empty where nothing is
 
     @property
     def words(self) -> str | None:
@@ -45,7 +46,7 @@ class StartChoice:
             share = 100.0 * float(self.trial.shares[0])
             kept = f"its whole motion keeps limits and speeds, {share:.0f} % of the tightest one left free"
             return f"start chosen: {among}; on trial {kept}"
-        return f"start chosen: {among}, but no trial was without fault: {_fault(self.trial)}; the checks will say where"
+        return f"start chosen: {among}, but no trial was without fault: {self.fault}"
 
     @property
     def warning(self) -> str | None:
@@ -86,7 +87,8 @@ def choose_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Pr
     )
     tried = _tried(search, progress)
     best = tried[best_first(np.array([trial.figures for trial in tried]))[0]]
-    return StartChoice(start=order.as_listed(best.start), tried=len(tried), trial=best)
+    fault = "" if best.is_sound else _fault(best, [joint_at(order.cell, k) for k in range(len(best.start))])
+    return StartChoice(start=order.as_listed(best.start), tried=len(tried), trial=best, fault=fault)
 
 
 def _tried(search: StartSearch, progress: Progress) -> list[Trial]:
@@ -165,13 +167,15 @@ def _culprits(cell: Cell, pair: tuple[str, str], picks: Picks) -> tuple[tuple[in
     )
 
 
-def _fault(trial: Trial) -> str:
-    """What is wrong with the motion of a trial."""
+def _fault(trial: Trial, joints: Sequence[tuple[str, str]]) -> str:
+    """What is wrong with the motion of a trial; joints are named by robot and joint."""
     if not trial.is_followed:
         return "a tool loses its path"
-    faults = ["something collides on the way"] if trial.touches else []
+    faults = [trial.contact] if trial.contact else []
     if trial.ranges.min() < 0.0:
-        faults.append(f"a joint goes {-100.0 * trial.ranges.min():.3g} % of half its range beyond its limit")
+        name = "/".join(joints[int(trial.ranges.argmin())])
+        faults.append(f"{name} goes {-100.0 * trial.ranges.min():.3g} % of half its range beyond its limit")
     if trial.speeds.min() < 0.0:
-        faults.append(f"a joint is {-100.0 * trial.speeds.min():.3g} % above its top speed")
+        name = "/".join(joints[int(trial.speeds.argmin())])
+        faults.append(f"{name} is {-100.0 * trial.speeds.min():.3g} % above its top speed")
     return " and ".join(faults)

@@ -17,6 +17,7 @@ from cellplan.model.motion import Schedule
 from cellplan.model.name_order import NameOrder
 from cellplan.model.phase import Phase
 from cellplan.model.task import Task
+from cellplan.model.units import MM
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.planning.modes import plan_phases, standing
@@ -49,7 +50,12 @@ class Trial:
     ranges: Array  # share of half its range that each joint leaves free at least, shape (nq,); negative beyond a limit
     speeds: Array
     is_followed: bool = True  # whether every tool keeps to its path
-    touches: bool = False  # whether something collides on the way
+    contact: str = ""  # what collides first on the way, and where; empty where nothing does
+
+    @property
+    def touches(self) -> bool:
+        """Whether something collides on the way."""
+        return bool(self.contact)
 
     @property
     def shares(self) -> Array:
@@ -143,7 +149,7 @@ class StartTrials:
             start=start + turns,
             ranges=np.min([ranges for ranges, _ in found], axis=0),
             speeds=np.min([speeds for _, speeds in found], axis=0),
-            touches=any(self._touches_on_the_way(phase, q) for phase, q in zip(self._phases, motions, strict=True)),
+            contact=next(filter(None, map(self._contact_on_the_way, self._phases, motions)), ""),
         )
 
     def looked_at_closely(self, trials: Sequence[Trial]) -> list[Trial]:
@@ -197,17 +203,23 @@ class StartTrials:
         ranges, speeds = _shares_left_free(cell, motions[0] + turns, self._step)
         return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
 
-    def _touches_on_the_way(self, phase: Phase, q: Array) -> bool:
-        """Whether something collides in the motion of a run, shape (N, nq), judged at a few samples.
+    def _contact_on_the_way(self, phase: Phase, q: Array) -> str:
+        """What collides in the motion of a run, shape (N, nq), judged at a few samples; empty where nothing does.
 
         A grip that leaves components free and is too deep in the part at the start counts as well.
         """
         sample_times = np.linspace(0, len(q) - 1, TOUCH_INSTANTS).astype(int)
         placed = self._order.as_listed(standing(self._cell, phase, q[sample_times]))
         among = self.open_pairs & present_pairs(self._scene, phase)
-        if any(grip.depth > grip.pair.limit for grip in mounted_depths(self._open_grips, placed[:1])):
-            return True
-        return any(self._scene.touching(each, among=among) is not None for each in placed)
+        for grip in mounted_depths(self._open_grips, placed[:1]):
+            if grip.depth > grip.pair.limit:
+                first, second = (self.bodies[end].name for end in (grip.pair.first, grip.pair.second))
+                return f"'{first}' is {MM * grip.depth:.3g} mm deep in '{second}' at the start"
+        for sample, configuration in zip(sample_times, placed, strict=True):
+            pair = self._scene.touching(configuration, among=among)
+            if pair is not None:
+                return f"'{pair[0]}' touches '{pair[1]}' at {100 * sample / max(1, len(q) - 1):.0f} % of the way"
+        return ""
 
     def _paths_of(self, names: Sequence[str]) -> list[ClockedPath]:
         """Paths of some tasks, gone through once, in the order of the cell."""

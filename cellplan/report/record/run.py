@@ -1,8 +1,9 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Final
 
+from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, Report
@@ -120,6 +121,7 @@ def run_record(
     provenance: Provenance,
     motion: Motion | None = None,
     transfers: Mapping[str, str] | None = None,
+    moved: Iterable[MovedStart] = (),
 ) -> RunRecord:
     """The record of one run.
 
@@ -129,6 +131,7 @@ def run_record(
         provenance: Origin of the result.
         motion: The planned motion, for the effort of its steps; None if it is not available.
         transfers: How the transfer moves of its phase were found, by the name of the phase.
+        moved: How far its starts were moved.
     """
     clearance = report.clearance
     return {
@@ -165,7 +168,7 @@ def run_record(
         "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(clearance.left_out),
         "closure": closures_record(report, cell),
-        "solver": solver_record(cell.solver, motion, transfers),
+        "solver": solver_record(cell.solver, motion, transfers, moved),
         "accelerations": accelerations_record(report.accelerations),
         **skew_record(report),
         **stops_record(report),

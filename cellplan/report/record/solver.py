@@ -1,14 +1,15 @@
 """Solver in the record of a run: the method, its settings, and the effort of its steps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Final, TypedDict
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.branches import MovedStart
 from cellplan.model.motion import Motion, NearestSingular
 from cellplan.model.solver import Integrator, SolverSettings
-from cellplan.model.units import MM
+from cellplan.model.units import DEG, MM, joint_unit
 from cellplan.report.record.common import Number, number
 
 SLACK_UNIT: Final = "norm of the twist residual, mixed units: m/s and rad/s"
@@ -98,6 +99,19 @@ class SettingsRecord(TypedDict, total=False):
     sequence: Annotated[list[SequenceRecord] | None, "recursive search: order of the joints; null for the default"]
 
 
+class MovedStartRecord(TypedDict):
+    """A start that was the seed of the one that was used."""
+
+    robot: Annotated[str, "robot"]
+    task: Annotated[str, "task, or `<robot>@part` for a grasp"]
+    run: Annotated[str | None, "run that the seed is from; null for a start that the cell gives"]
+    tool_mm: Annotated[Number, "distance of the tool from the start of the task"]
+    tool_deg: Annotated[Number, "angle of the tool to it"]
+    joint: Annotated[str, "joint that was moved most"]
+    joint_moved: Annotated[Number, "by how much, in `unit`"]
+    unit: Annotated[str, "`deg` or `mm`"]
+
+
 class SolverRecord(TypedDict):
     """How the motion was computed, under the keys of the cell file."""
 
@@ -113,10 +127,16 @@ class SolverRecord(TypedDict):
     slack: Annotated[SlackRecord | None, "task slack; null if the method has none"]
     resolution: Annotated[ResolutionRecord | None, "effort of the accurate mode; null without a record of it"]
     transfers: Annotated[dict[str, str] | None, "by phase: how its transfer moves were found; null without such moves"]
+    moved_starts: Annotated[
+        list[MovedStartRecord], "starts that were moved to their tasks: given ones, or those of a run"
+    ]
 
 
 def solver_record(
-    solver: SolverSettings, motion: Motion | None = None, transfers: Mapping[str, str] | None = None
+    solver: SolverSettings,
+    motion: Motion | None = None,
+    transfers: Mapping[str, str] | None = None,
+    moved: Iterable[MovedStart] = (),
 ) -> SolverRecord:
     """The method with its settings under the keys of the cell file, and the effort of its steps.
 
@@ -124,6 +144,7 @@ def solver_record(
         solver: The settings.
         motion: The planned motion; None if it is not available, or if there are several.
         transfers: How the transfer moves of each phase were found; None or empty without such moves.
+        moved: How far starts were moved.
     """
     return {
         "method": solver.method,
@@ -146,6 +167,22 @@ def solver_record(
         "slack": None if motion is None else _slack_record(motion),
         "resolution": None if motion is None else _resolution_record(motion),
         "transfers": dict(transfers) if transfers else None,
+        "moved_starts": [moved_start_record(each) for each in moved],
+    }
+
+
+def moved_start_record(moved: MovedStart) -> MovedStartRecord:
+    """How far one start was moved."""
+    unit = joint_unit(is_revolute=moved.is_revolute)
+    return {
+        "robot": moved.robot,
+        "task": moved.task,
+        "run": moved.run or None,
+        "tool_mm": number(MM * moved.position),
+        "tool_deg": number(DEG * moved.orientation),
+        "joint": moved.joint,
+        "joint_moved": number(unit.scale * moved.moved),
+        "unit": unit.name,
     }
 
 

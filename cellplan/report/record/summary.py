@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, TypedDict
 
+from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.report import CAUTION, Report
 from cellplan.model.units import MM
@@ -65,6 +66,7 @@ def summary_record(
     cell: Cell,
     provenance: Provenance,
     transfers: Mapping[str, str] | None = None,
+    moved: Iterable[MovedStart] = (),
 ) -> SummaryRecord:
     """The record of several runs, one after another.
 
@@ -76,6 +78,7 @@ def summary_record(
         cell: The cell.
         provenance: Origin of the result.
         transfers: How the transfer moves of each phase were found, by the name of the phase.
+        moved: How far starts were moved.
     """
     runs, merged = list(reports.values()), _merged(reports, cell)
     return {
@@ -104,7 +107,7 @@ def summary_record(
         "rests_on": merged["rests_on"],
         **origin_record(cell, provenance),
         "caution": CAUTION,
-        "solver": solver_record(cell.solver, transfers=transfers),
+        "solver": solver_record(cell.solver, transfers=transfers, moved=moved),
         "accelerations": merged["accelerations"],
         "cycles": None if cell.program is None else cell.program.cycles,
     }

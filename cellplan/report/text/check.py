@@ -4,6 +4,7 @@ from cellplan.report.record.common import Record
 from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
+from cellplan.report.text.method import moved_start_lines
 from cellplan.report.text.run import left_out_lines
 
 MORE = "left_out of check --json"  # where the pairs stand that were not checked in full
@@ -28,7 +29,7 @@ def check_lines(record: Record) -> list[str]:
         f"  {count_text(record['checks'])}",
         *failure_lines(record["checks"], "check --json"),
         *aligned([*starts, *paths, *controllers]),
-        *([f"  {record['start_choice']}"] if record["start_choice"] else []),
+        *(f"  {line}" for line in moved_start_lines(record["moved_starts"])),
         *(f"  note: {remark}" for remark in record["remarks"]),
         *(f"  {each['message']}" for each in record["checks"] if each["passed"]),
         *left_out_lines(record, MORE),

@@ -1,7 +1,7 @@
 """The method of a run as sentences."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 import numpy as np
@@ -37,6 +37,17 @@ def method_lines(record: Record, step_s: float) -> Iterator[str]:
     slack = record["slack"]
     if slack and slack["max"] is not None and slack["max"] > 0.0:
         yield f"Task slack: at most {slack['max']:.3g} at {slack['max_at_s']:.3f} s ({slack['unit']})."
+    yield from (f"{line[0].upper()}{line[1:]}." for line in moved_start_lines(record.get("moved_starts") or []))
+
+
+def moved_start_lines(records: Iterable[Record]) -> Iterator[str]:
+    """How far each start was moved, from where the cell or an earlier run has it."""
+    for each in records:
+        source = f"of the run '{each['run']}'" if each["run"] else "as given"
+        yield (
+            f"start of '{each['robot']}' for '{each['task']}' moved: {source} its tool is {each['tool_mm']:.3f} mm and "
+            f"{each['tool_deg']:.3f} deg off; most by '{each['joint']}', {each['joint_moved']:.3f} {each['unit']}"
+        )
 
 
 def _integration_lines(record: Record, step: str) -> Iterator[str]:

@@ -13,7 +13,7 @@ from cellplan.report.record.phases import instant_text
 from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
-from cellplan.report.text.method import DEFAULT_METHOD, no_accurate_mode
+from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
 from cellplan.report.text.skew import skew_row
 from cellplan.report.text.stops import stop_rows
@@ -48,6 +48,7 @@ def figure_lines(record: Record, more: str) -> list[str]:
         *_program_lines(record),
         *aligned(_rows(record)),
         *_integration_lines(record["solver"]),
+        *(f"  {line}" for line in moved_start_lines(record["solver"].get("moved_starts") or [])),
         *(f"  note: {line}" for line in record.get("remarks", [])),
         *(f"  note: {line}" for _, line in open_surface_notes(record.get("open_surfaces", []))),
         *(f"  grip: {line}" for line in grip_notes(record)),

@@ -1,0 +1,161 @@
+"""Seeds: a start near the one that a task asks for is moved there, on the same branch and the same turns of all joints.
+
+The tool is led in small steps from where the seed puts it to where it is desired; a joint that would have to turn far
+within one of them is about to change its branch.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.transforms import Array, inverse, rotation_exp
+from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.model.branches import MovedStart
+from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.task import Frame, Task
+from cellplan.model.toolpath import Toolpath
+from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance
+from cellplan.planning.start.inverse_kinematics import reaching_configurations
+from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.planning.tracking.task_constraints import constraint_rows
+
+SEED_TURN: Final = np.radians(10.0)  # [rad] that a joint of a given start is moved at most: farther, it is a mistake
+SEED_SLIDE: Final = 0.05  # [m] likewise of a joint that slides
+STEP_LENGTH: Final = 0.01  # [m] by which the tool is led at once
+STEP_ANGLE: Final = np.radians(1.0)  # [rad] likewise
+JUMP: Final = np.radians(15.0)  # [rad] or [m] that a joint moves at most in such a step
+
+
+def led_to(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR: Array) -> Array | None:
+    """The configuration on the same branch that puts a tool where it is desired, shape (n,); None where there is none.
+
+    Args:
+        chain: The robot.
+        relation: The task or grasp, which says which components of the pose count.
+        q: The seed in [rad] or [m], shape (n,).
+        X_PT: Desired tool tip, shape (4, 4), in the frame that the relation refers to.
+        X_WR: That frame in the world, shape (4, 4).
+    """
+    actual, desired = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT[None]
+    rows = constraint_rows(relation, desired)[0]
+    error = rows.T @ (rows @ pose_errors(desired, actual, [relation.is_spin_free])[0])
+    lengths = np.linalg.norm(error[:3]) / STEP_LENGTH, np.linalg.norm(error[3:]) / STEP_ANGLE
+    count = max(1, int(np.ceil(max(lengths))))
+    for left in np.arange(count - 1, -1, -1) / count:
+        via = X_PT.copy()
+        via[:3, 3] -= left * error[:3]
+        via[:3, :3] = rotation_exp(-left * error[3:]) @ X_PT[:3, :3]
+        arrived = reaching_configurations(chain, relation, via, X_WP=X_WR, seeds=q[None])
+        if not len(arrived) or np.abs(arrived[0] - q).max() > JUMP:
+            return None
+        q = arrived[0]
+    return q
+
+
+def seeded(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
+    """The start that a given one of a robot is the seed of, shape (n,); None where it is too far off for that."""
+    start = robot.start
+    q = None if start is None else led_to(chain, relation, start, X_PT, X_WR=X_WR)
+    if q is None or not _is_inside(robot, q):
+        return None
+    most = np.where([joint.is_revolute for joint in robot.model.joints], SEED_TURN, SEED_SLIDE)
+    return q if np.all(np.abs(q - np.asarray(start)) <= most) else None
+
+
+def with_seeds(
+    cell: Cell, toolpaths: Mapping[str, Toolpath], *, run: str = "", of_run: Collection[str] = ()
+) -> tuple[Cell, tuple[MovedStart, ...]]:
+    """The cell with every start near its task or grasp moved there, and how far each was moved.
+
+    A given start is moved by a few degrees or millimetres only; what is farther off is left for
+    ``examine_given_starts`` to refuse. One that an earlier run began at is moved as far as its branch goes. A start on
+    the path of a task with an approach is moved onto the path.
+
+    Args:
+        cell: The cell; each of its robots has at most one task or grasp that it begins at.
+        toolpaths: Toolpath of every task, by task name.
+        run: Name of the earlier run.
+        of_run: Robots of which the start is from it.
+
+    Raises:
+        NoSolutionError: A branch of the earlier run does not lead to a task.
+    """
+    moved: list[MovedStart] = []
+    carriers = cell.positioners[:1]
+    for relation in sorted(cell.relations, key=lambda each: each.robot not in carriers):  # the part goes with a carrier
+        robot = cell.robot(relation.robot)
+        holder = cell.robot(carriers[0]).start if carriers else None
+        X_WR = part_pose(cell, holder) if relation.relative_to is Frame.PART else np.eye(4)
+        if robot.start is None or X_WR is None or robot.path is not None:
+            continue
+        if isinstance(relation, Task) and relation.settle > 0.0:
+            continue
+        chain = ScrewChain(robot)
+        X_PT, off = _nearer_goal(cell, chain, relation, robot.start, toolpaths, X_WR)
+        if not is_off(cell, relation, off):
+            continue
+        is_of_run = robot.name in of_run
+        lead = _kept_branch if is_of_run else seeded
+        q = lead(chain, relation, robot, X_PT, X_WR=X_WR)
+        if q is None and is_of_run:
+            raise NoSolutionError(_lost_words(cell, relation, robot, off, run))
+        if q is not None:
+            moved.append(_moved(relation, robot, q, off, run=run if is_of_run else ""))
+            robots = (replace(each, start=q) if each is robot else each for each in cell.robots)
+            cell = replace(cell, robots=tuple(robots))
+    return cell, tuple(moved)
+
+
+def _nearer_goal(
+    cell: Cell, chain: ScrewChain, relation: Relation, q: Array, toolpaths: Mapping[str, Toolpath], X_WR: Array
+) -> tuple[Array, tuple[float, float]]:
+    """Where a tool is desired at the start, or on the path behind an approach, and how far a start is from there."""
+    begin = relation.X_PT if isinstance(relation, Grasp) else toolpaths[relation.name].X_PT_start
+    goals = [begin]
+    if isinstance(relation, Task) and relation.approach is not None and cell.program is not None:
+        on_path = begin.copy()
+        on_path[:3, 3] += begin[:3, 2] * relation.approach.distance
+        goals.append(on_path)
+    offs = [tool_distance(chain, relation, q, goal, X_WR=X_WR) for goal in goals]
+    nearest = min(range(len(goals)), key=lambda place: offs[place][0])
+    return goals[nearest], offs[nearest]
+
+
+def _kept_branch(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
+    """The start on the branch of an earlier one, shape (n,), however far; None where that leads beyond a limit."""
+    q = led_to(chain, relation, np.asarray(robot.start), X_PT, X_WR=X_WR)
+    return q if q is not None and _is_inside(robot, q) else None
+
+
+def _is_inside(robot: Robot, q: Array) -> bool:
+    """Whether a configuration, shape (n,), keeps the joint limits."""
+    return bool(np.all((q >= robot.model.lower) & (q <= robot.model.upper)))
+
+
+def _moved(relation: Relation, robot: Robot, q: Array, off: tuple[float, float], *, run: str) -> MovedStart:
+    """How far a start was moved."""
+    moves = q - np.asarray(robot.start)
+    most = robot.model.joints[int(np.argmax(np.abs(moves)))]
+    return MovedStart(
+        robot=robot.name,
+        task=relation.name,
+        position=off[0],
+        orientation=off[1],
+        joint=most.name,
+        moved=float(moves[int(np.argmax(np.abs(moves)))]),
+        is_revolute=most.is_revolute,
+        run=run,
+    )
+
+
+def _lost_words(cell: Cell, relation: Relation, robot: Robot, off: tuple[float, float], run: str) -> str:
+    """One line on a branch of an earlier run that does not lead to a task or grasp."""
+    goal = f"its grasp '{relation.name}'" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
+    return (
+        f"{start_place(cell, robot)}: the branch of the run '{run}' leads '{robot.name}' to {goal} within the joint "
+        f"limits by no way: its tool began {1e3 * off[0]:.4g} mm and {np.degrees(off[1]):.4g} deg from there; solve "
+        "without --near, or give another start"
+    )
