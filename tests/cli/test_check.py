@@ -61,9 +61,9 @@ def test_a_start_a_few_degrees_off_its_task_is_moved_there_and_said_so(
     assert (status, record["status"]) == (0, "passed")
     (moved,) = record["moved_starts"]
     assert (moved["robot"], moved["task"], moved["run"], moved["unit"]) == ("kuka", "circle", None, "deg")
-    assert 30.0 < moved["tool_mm"] < 60.0  # 1.98 deg of an arm of about a metre
+    assert 15.0 < moved["tool_mm"] < 45.0  # 1.98 deg about the first axis, the tool some 800 mm from it
     assert 1.0 < abs(moved["joint_moved"]) < 5.0
-    assert record["start"]["kuka"]["B1_deg"] == pytest.approx(21.02, abs=0.5)
+    assert next(iter(record["start"]["kuka"].values())) == pytest.approx(21.02, abs=0.5)
 
 
 def test_names_that_were_read_over_are_notes_of_the_check(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
