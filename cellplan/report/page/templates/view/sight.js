@@ -1,6 +1,6 @@
 // What of the surroundings stands between the camera and the robots: it is drawn faded, so that they are seen through it.
 
-const SIGHT_TIMES = 8; // instants of the motion at which robots, tools and part are looked for
+const SIGHT_TIMES = 8; // times of the motion at which robots, tools and part are looked for
 const MOST_TESTS = 200000; // of a line of sight against a triangle, for one body and one place of the camera
 
 class Sight {
@@ -15,7 +15,7 @@ class Sight {
     this.points = this.obstacles.length ? this.looked() : [];
   }
 
-  /** Middles of robots, tools and part in the world, at instants of the motion. */
+  /** Middles of robots, tools and part in the world, at times of the motion. */
   looked() {
     const { scene, motion } = this.stage;
     const points = [];
