@@ -152,7 +152,7 @@ class Cluster(Executor):
                 self._give_up(f"has had no worker for {NO_WORKERS_S:g} s")
 
     def _renew(self) -> None:
-        """Begin again what waits for a connection, and what was sent through one that is gone and cannot be answered."""
+        """Begin again what waits for a connection, and what was sent through one that is gone."""
         while not self._again.empty():
             self._send(*self._again.get_nowait())
         for outer, sent in list(self._under_way.items()):
