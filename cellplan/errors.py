@@ -78,6 +78,10 @@ class StudyStoppedError(InputError):
     """A study cannot go on, whatever its next trial is: its folder cannot be written, its cluster does not answer."""
 
 
+class TooFewStepsError(InputError):
+    """A task takes fewer steps of the clock than checks of its path need."""
+
+
 class NotVerifiedError(CellplanError):
     """A run on disk is whole, but a check fails on what it holds.
 

@@ -26,7 +26,7 @@ from cellplan.scene.mounting import Mount, MountedPair
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.starts import StartGoal, starts_at
 from cellplan.search.base_map.verdicts import MapJob
-from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.job import Job, enough_nodes
 
 NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 
@@ -110,7 +110,7 @@ def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent
     placed = replace(cell, robots=robots)
     phase = plan_phases(placed).program[0]
     schedule = schedule_paths(placed, [paths[name] for name in phase.tasks])
-    job = Job.of(placed, schedule, moving=phase.moving, nodes=NODES)
+    job = Job.of(placed, schedule, moving=phase.moving, nodes=enough_nodes(schedule, NODES))
     places = grid.places(placed.robot(robot), _part_at(placed)[:3, 3])
     scene = replace(scene, cell=placed, mounted=_standing(scene, robot))
     asked = MapJob(job=job, scene=scene, robot=robot, start=start, places=places)

@@ -1,7 +1,6 @@
 """Demand: parts per hour, and the calmest program that makes them."""
 
 import re
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Final, Self
@@ -11,7 +10,7 @@ from cellplan.io.input.findings import shown
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.pipeline.fastest.scaling import scaled_values, steps_within
-from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.pipeline.fastest.timed_program import Law, SolvedAt, TimedProgram
 
 HOUR: Final = 3600.0  # [s]
 PER_HOUR: Final = {"h": 1.0, "min": 60.0}  # [1/h] of one in each unit
@@ -19,8 +18,6 @@ WRITTEN: Final = re.compile(r"(\d{1,9}(?:\.\d{1,9})?)\s*/\s*(h|min)")
 SLOWEST: Final = 10.0  # [-] of the shortest cycle, unless the written one is longer: then the robots wait instead
 MOST_TRIALS: Final = 8  # factors tried until all phases fit the cycle
 NEAR: Final = 1e-9  # [s] of a cycle: rounding
-
-SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

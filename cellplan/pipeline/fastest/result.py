@@ -14,7 +14,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
 from cellplan.pipeline.fastest.demand import MetDemand
 from cellplan.pipeline.fastest.shortest import ShortestCycles
-from cellplan.pipeline.fastest.timed_program import TimedProgram
+from cellplan.pipeline.fastest.timed_program import BINDS, TimedProgram
 from cellplan.pipeline.write_run import versions, write_run
 from cellplan.report.page.figures import figure
 from cellplan.report.page.kind import Kind
@@ -65,7 +65,6 @@ ON_PAGE: Final = (
 )
 PLOTTED: Final = (*SAVED, "min_margin_deg", "parts_per_h")
 NARROW: Final = 4.6  # [inch] of a plot: readable on a telephone too
-BINDS: Final = 90.0  # [%] of the time: a limit that asks for less does not bind
 
 
 # The record: fastest.json
@@ -198,9 +197,9 @@ def _saving_text(record: Record) -> str:
 
 
 def _binding_lines(program: Record) -> list[str]:
-    """What binds each phase of a program, or how near its joints come to their limits where nothing does."""
+    """What binds each phase of a program or comes nearest to it, or how near its joints come where nothing does."""
     binding, figures = program["binding"], program["figures"]
-    if max(each["time_percent"] for each in binding) >= BINDS:
+    if max(each["percent"] for each in binding) >= 100.0 * BINDS:
         return [each["text"] if len(binding) == 1 else f"phase {each['phase']}: {each['text']}" for each in binding]
     shares = ((figures[f"max_{it}_ratio"], figures[f"max_{it}_joint"], it) for it in ("velocity", "acceleration"))
     reached = [f"{100.0 * share:.3g} % of a limit of {kind} ({joint})" for share, joint, kind in shares if share]
@@ -215,6 +214,10 @@ def fastest_lines(record: Record) -> list[str]:
     lines = [f"{record['cell']}: {record['status']}", f"  as written: {record['written_s']:g} s"]
     for name, program in record["cycles"].items():
         lines += _program_lines(TITLES[name], program)
+        if max(each["percent"] for each in program["binding"]) < 100.0 * BINDS:
+            lines.append(
+                "    none is shorter: a step less (motion.step_s) breaks a limit, or leaves a task too few steps"
+            )
     if record["remark"]:
         lines.append(f"  {TITLES['reduced_speed']}: no program: {record['remark']}")
     if record["demand"]:

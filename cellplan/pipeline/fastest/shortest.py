@@ -1,6 +1,5 @@
 """Shortest cycle of a cell: by its time laws, and with the best common speed of all robots along the same path."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Final
@@ -13,15 +12,13 @@ from cellplan.model.report import REDUCED_SPEED
 from cellplan.model.units import MM
 from cellplan.pipeline.fastest.curve import CurvePoint, production_curve
 from cellplan.pipeline.fastest.demand import MetDemand, calmest, refuse_unless_possible
-from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
-from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
+from cellplan.pipeline.fastest.scaling import refuse_fixed_times
+from cellplan.pipeline.fastest.time_laws import shortest_by_time_laws
+from cellplan.pipeline.fastest.timed_program import Law, SolvedAt, TimedProgram
 
-MOST_TRIALS: Final = 8  # durations tried until every limit holds
 POINTS: Final = 4  # calmer cycles of each law on the production curve
 
 PAYS: Final = 12.0  # [s] of work on the curve: less is done before further processes have started
-
-SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -102,7 +99,7 @@ def fastest(
         return TimedProgram.solved(base, law, values, task=task, progress=_within(progress, title))
 
     written = solved(Law.AS_WRITTEN, {}, "as written")
-    laws = _by_time_laws(base, written, solved)
+    laws = shortest_by_time_laws(base, written, solved)
     begun = perf_counter()
     common = solved(Law.COMMON_SPEED, {"motion.timing": "fastest"}, "common speed")
     processes = workers if 2 * points * (perf_counter() - begun) > PAYS else 1
@@ -124,24 +121,6 @@ def fastest(
         remark=remark,
         curve=curve,
         demand=met,
-    )
-
-
-def _by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -> TimedProgram:
-    """The program with which all limits hold and a step less would break one.
-
-    Raises:
-        NoSolutionError: No program keeps them.
-    """
-    now, factor = written, 1.0
-    for _ in range(MOST_TRIALS):
-        if now.load <= 1.0 and factor != 1.0:
-            return now
-        factor = whole_steps(base, factor * now.load, longer_than=factor if now.load > 1.0 else 0.0)
-        now = solved(Law.TIME_LAWS, scaled_values(base, factor), "time laws")
-    raise NoSolutionError(
-        f"{base.origin.at('motion.time_law')}: expected time laws that keep all limits when slow enough, got "
-        "speeds that jump; use the time law quintic, or write acceleration: unlimited"
     )
 
 

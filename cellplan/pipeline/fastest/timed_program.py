@@ -1,6 +1,6 @@
 """A program at a cycle time of its own: how near its joints come to their limits, and what binds it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final, Self
@@ -18,6 +18,7 @@ from cellplan.pipeline.solve import certified, solve_motion
 from cellplan.report.record.figures import Figures, figures_of
 from cellplan.scene.scene import Scene
 
+BINDS: Final = 0.99  # [-] share of a limit from which on it binds
 TASK_LIMITS: Final = ("feed", "tolerance between rows")
 KINDS: Final = ("velocity", "acceleration", "jerk")
 ORDERS: Final = (1.0, 0.5, 1.0 / 3.0)  # how the time that a limit asks for grows with its share
@@ -60,7 +61,12 @@ class Binding:
         """One line of text."""
         limit = self.kind if self.kind in TASK_LIMITS else f"{self.kind} limit"
         name = self.robot if self.kind == "tool speed" else f"{self.robot} {self.joint}"
-        return f"{name} binds at {100.0 * self.share:.4g} % of its {limit}"
+        return f"{name} {'binds at' if self.binds else 'reaches'} {100.0 * self.share:.4g} % of its {limit}"
+
+    @property
+    def binds(self) -> bool:
+        """Whether the limit is reached, not only neared."""
+        return self.share >= BINDS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,6 +122,15 @@ class TimedProgram:
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
+    def load_of(self, robot: str) -> float:
+        """Share of the time of the program in which the joints of one robot would allow their motion."""
+        loads, columns = [0.0], self.solution.cell.columns(robot)
+        for run in self.solution.runs:
+            limits, q = _rows(run.scene or self.scene, run)
+            shares = zip(limits.shares(run.schedule.times, q), ORDERS, strict=True)
+            loads += [float(share[columns].max(initial=0.0)) ** order for share, order in shares if run.phase.tasks]
+        return max(loads)
+
     def certified(self, progress: Progress, early: EarlyClearance | None = None) -> Self:
         """The same program with the clearance of every phase checked; ``early`` has it without curves."""
         return replace(self, solution=certified(self.solution, self.scene, progress=progress, early=early))
@@ -137,6 +152,9 @@ class TimedProgram:
         if program is not None:
             return [self.cycle / program.cycles] * program.cycles
         return [run.report.cycle_time for run in self.solution.runs]
+
+
+SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]  # with values by address, and what is shown of it
 
 
 def _is_scaled(run: Run, cell: Cell) -> bool:

@@ -6,11 +6,11 @@ from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
+from cellplan.pipeline.fastest.time_laws import from_both_sides
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.search.programs.objective import Objective, Timing
 
-DURATIONS: Final = 4  # [-] durations tried until the limits hold
 UNUSED: Final = 0.002  # [-] share of its time that a motion may leave unused
 
 
@@ -44,23 +44,17 @@ def draft(
 
 def shortest(ready: Prepared, cell: Cell, program: TimedProgram, progress: Progress) -> TimedProgram:
     """The program in the shortest cycle that its limits allow, from that in another cycle; see ``draft``."""
-    factor = whole_steps(cell, program.cycle / ready.duration)
-    for _ in range(DURATIONS):
-        load = load_of(program)
-        if 1.0 - UNUSED < load <= 1.0:
-            break
-        following = whole_steps(cell, factor * load, longer_than=factor if load > 1.0 else 0.0)
-        if following == factor:
-            break
-        factor = following
-        program = scaled(cell, factor, progress)
-    for _ in range(DURATIONS):
-        asked = max(load_of(program), time_asked(program))
-        if asked <= 1.0:
-            break
-        factor = whole_steps(cell, factor * asked, longer_than=factor)
-        program = scaled(cell, factor, progress)
-    return program
+    step = cell.motion.step
+
+    def at(steps: int) -> TimedProgram:
+        return scaled(cell, steps * step / ready.duration, progress)
+
+    def asked(found: TimedProgram) -> float:
+        load, more = load_of(found), time_asked(found)
+        return max(load, more) if more > 1.0 else load
+
+    best = from_both_sides(round(program.cycle / step), program, at, asked, unused=UNUSED)
+    return program if best is None else best
 
 
 def scaled(cell: Cell, factor: float, progress: Progress) -> TimedProgram:

@@ -19,7 +19,7 @@ from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.cycles import load_of, time_asked
 from cellplan.pipeline.layout.finish import margin_of, rejection_of
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import run
@@ -43,7 +43,7 @@ class DisplacedLayout:
         """The cell of the file with displacements of shape (m,), and with the start posture near a given one, (nq,).
 
         Raises:
-            NoSolutionError: A tool cannot follow its path.
+            NoSolutionError: A tool loses its path at the nodes of the search.
         """
         of = BaseDisplacements(
             variables=ready.variables,
@@ -54,7 +54,7 @@ class DisplacedLayout:
         )
         motion = run(_job(ready), of.layouts(d[None], start[None]))
         if not motion.is_followed[0]:
-            raise NoSolutionError("a tool cannot follow its path")
+            raise NoSolutionError(NOT_FOLLOWED)
         return of.cell(d, motion.q[0, 0])
 
 

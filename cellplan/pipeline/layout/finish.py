@@ -22,7 +22,7 @@ from cellplan.pipeline.fastest.timed_program import TimedProgram
 from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, kept_demands, prepared, values_of
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared, values_of
 from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
@@ -244,7 +244,7 @@ class Finish:
             problem = self.ready.coarse
             point = problem.evaluate(x, start)
             if point is None:
-                raise NoSolutionError("a tool cannot follow its path")
+                raise NoSolutionError(NOT_FOLLOWED)
             return x, start, standing_of(problem, point, demands, room.effort), demands
         return found.x, found.start, standing_of(problem, found.point, demands, room.effort), demands
 

@@ -4,17 +4,29 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
+from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.kinematics.reach import arm_reach
+from cellplan.model.progress import silent
 from cellplan.pipeline.drawing import drawing
+from cellplan.pipeline.layout.cycles import draft, is_scaled, shortest
+from cellplan.pipeline.layout.finish import clearance_of, margin_of, rejection_of, too_singular
 from cellplan.pipeline.layout.limits import Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT
-from cellplan.report.record.common import number
-from cellplan.report.record.layout import GivenRecord
+from cellplan.report.record.common import Number, number
+from cellplan.report.record.layout import GivenRecord, LimitRecord
+from cellplan.search.programs.objective import Objective
 
+NOT_SOLVED: Final[GivenRecord] = {
+    "status": "violating",
+    "reason": "",
+    "cycle_s": None,
+    "margin_deg": None,
+    "clearance_mm": None,
+    "violations": [],
+}
 FINE: Final = 6  # decimals: far above rounding
 REACH: Final = 5  # [-] rounds that the reach of an arm is sought in: to some millimetres
 
@@ -31,7 +43,7 @@ def given_layout(request: LayoutRequest) -> Given:
     """What is shown of the given layout of a search, whatever comes of the search."""
     ready = prepared(request)
     return Given(
-        record=given_record(standing_of_given(ready), ready),
+        record=given_record(ready),
         drawing=drawing(ready.scene, _shown_start(ready), ready.schedule),
         reach={robot.name: float(arm_reach(robot.model, rounds=REACH)) for robot in ready.cell.robots},
     )
@@ -48,24 +60,48 @@ def standing_of_given(ready: Prepared) -> Standing | None:
     return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
 
 
-def given_record(standing: Standing | None, ready: Prepared) -> GivenRecord:
-    """The given layout."""
-    if standing is None:
-        return {"status": "violating", "cycle_s": None, "margin_deg": None, "clearance_mm": None, "violations": []}
-    at_duration = standing_of(
-        standing.problem,
-        standing.measures.point,
-        ready.demands(objective="conforming", duration=ready.duration),
-        EFFORT,
-    )
-    violations = at_duration.violations()
+def given_record(ready: Prepared) -> GivenRecord:
+    """The given layout as ``solve`` has it; where it is rejected, what it breaks at the nodes of the search too."""
+    searched = ready.unled if ready.unled is not None and not ready.path_search.is_given else ready
+    standing, cycle = standing_of_given(searched), None
+    try:
+        cell = searched.variables.given_cell.with_values(
+            values_of(searched, searched.coarse.given, searched.given_start)
+        )
+        solved = draft(searched, cell, searched.duration, silent)
+        program = solved.certified(silent)
+        if is_scaled(searched):
+            cycle = shortest(searched, cell, solved, silent).cycle
+        elif searched.request.objective is Objective.CYCLE:
+            cycle = program.cycle
+    except (InputError, NoSolutionError) as error:
+        reason = str(error).splitlines()[0]
+        return {**NOT_SOLVED, "reason": reason}
+    rejected = rejection_of(program, searched.variables)
+    if not rejected and standing is not None:
+        rejected = too_singular(searched, standing, program)
     return {
-        "status": "violating" if violations else "conforming",
-        "cycle_s": number(round(standing.measures.cycle, FINE)),
-        "margin_deg": None if standing.margin is None else number(round(standing.margin, FINE)),
-        "clearance_mm": None if standing.clearance is None else number(round(standing.clearance, FINE)),
-        "violations": violations,
+        "status": "violating" if rejected else "conforming",
+        "reason": "",
+        "cycle_s": None if cycle is None else number(round(cycle, FINE)),
+        "margin_deg": _rounded(margin_of(program)),
+        "clearance_mm": _rounded(clearance_of(program)),
+        "violations": _violations(searched, standing, rejected) if rejected else [],
     }
+
+
+def _violations(ready: Prepared, standing: Standing | None, rejected: str) -> list[LimitRecord]:
+    """What a rejected layout breaks, the worst first: at the nodes of the search, else why it is rejected."""
+    found = list[LimitRecord]()
+    if standing is not None:
+        demands = ready.demands(objective="conforming", duration=ready.duration)
+        found = standing_of(standing.problem, standing.measures.point, demands, EFFORT).violations()
+    return found or [{"kind": "check", "subject": "", "text": rejected}]
+
+
+def _rounded(value: float | None) -> Number:
+    """A figure as it is recorded."""
+    return None if value is None else number(round(value, FINE))
 
 
 def _shown_start(ready: Prepared) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.units import DEG, MM
+from cellplan.pipeline.fastest.timed_program import BINDS
 from cellplan.report.record.common import number
 from cellplan.report.record.layout import LimitRecord
 from cellplan.search.kernel.figures import Crests
@@ -16,7 +17,6 @@ from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, PointDerivatives, Problem
 
-BINDS: Final = 0.99  # [-] share of the largest load on the clock from which a joint counts as one that decides it
 NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin binds
 TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
 NEAR_SHARE: Final = 0.05  # [-] likewise of a singular value
@@ -75,7 +75,7 @@ class Standing:
 
     def binding(self) -> list[LimitRecord]:
         """What holds it back: loads on the clock, margins, distances, bounds of variables."""
-        loads = self._loads(BINDS * self._whole) if self._whole > 0.0 else iter(())
+        loads = self._loads(self._whole, least=BINDS) if self._whole > 0.0 else iter(())
         found = [
             *loads,
             *self._margins(NEAR_ANGLE, NEAR_LENGTH),
@@ -91,12 +91,12 @@ class Standing:
             return self.measures.factor
         return self.demands.duration / float(self.problem.times[-1] - self.problem.times[0])
 
-    def _loads(self, factor: float) -> Iterator[tuple[float, LimitRecord]]:
-        """Joints whose speed or acceleration asks for a time of at least ``factor`` times that of the nodes."""
+    def _loads(self, factor: float, *, least: float = 1.0) -> Iterator[tuple[float, LimitRecord]]:
+        """Joints at a share of more than ``least`` of their limits in a time of ``factor`` times that of the nodes."""
         measures, times = self.measures, self.problem.times
         for kind, crests, order in (("velocity", measures.speeds, 1.0), ("acceleration", measures.accelerations, 2.0)):
             value = crests.value.max(axis=0) ** (1.0 / order)
-            for column in np.flatnonzero(value > factor).tolist():
+            for column in np.flatnonzero((value / factor) ** order > least).tolist():
                 share = value[column] / self._whole
                 at = times[int(crests.value[:, column].argmax())] / times[-1]
                 name = " ".join(self.problem.joint_names(column))

@@ -18,7 +18,7 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
-from cellplan.pipeline.layout.cycles import DURATIONS, load_of, scaled, time_asked
+from cellplan.pipeline.layout.cycles import load_of, scaled, time_asked
 from cellplan.pipeline.layout.displaced import DisplacedLayout, verified
 from cellplan.pipeline.layout.finish import (
     KEYS,
@@ -33,6 +33,7 @@ from cellplan.pipeline.layout.finish import (
 )
 from cellplan.pipeline.layout.limits import standing_of
 from cellplan.pipeline.layout.prepared import NODES as FEW_NODES
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED
 from cellplan.pipeline.layout.proposals import BESTS, SAME
 from cellplan.report.record.common import number
 from cellplan.report.record.misplacement import CornerRecord, MisplacementRecord, ToleranceRecord
@@ -51,6 +52,7 @@ FEW_ROUNDS: Final = 2  # [-] of programs for each of them
 FEW: Final = Effort(iterations=12, keys=9, trust=0.2)
 MANY: Final = Effort(iterations=8, keys=KEYS, trust=0.1)
 ATTEMPTS: Final = 3  # [-] times that a layout is improved and verified before it is given up
+DURATIONS: Final = 4  # [-] durations tried until the limits hold
 MORE_TIME: Final = 0.003  # [-] that a cycle of the nodes is lengthened by: peaks between them
 MORE_LENGTH: Final = 0.002  # [m] asked for beyond the demands where distances were not kept
 NARROWER: Final = 4  # [-] displacements verified in each direction until a tolerance is known
@@ -102,13 +104,13 @@ class MisplacedFinish(Finish):
         """A layout of the search with all its corners; see ``Finish``.
 
         Raises:
-            NoSolutionError: A tool cannot follow its path.
+            NoSolutionError: A tool loses its path at the nodes of the search.
         """
         if trial not in self._begun:
             self._begin(trial, figures)
         search, robust = self._begun[trial]
         if robust is None:
-            raise NoSolutionError("a tool cannot follow its path")
+            raise NoSolutionError(NOT_FOLLOWED)
         self.progress(f"displacing the bases of trial {trial}", 1.0)
         before, effort = self.solves, MANY
         search = search.finer(GuardedProblem.like(self._problem(NODES)), robust, effort)

@@ -18,6 +18,7 @@ from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.pipeline.synchronous import refuse_other_jobs
+from cellplan.planning.layout_screening import Candidates, screen_layouts
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.inverse_kinematics import finite_limits
@@ -25,7 +26,7 @@ from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.kernel.singular_values import usual_values
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Objective, Timing
@@ -36,6 +37,7 @@ from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
 ALONG_SPLINE: Final = {Timing.LAWS: 4, Timing.RETIMED: 2}  # [-] times as many of a motion along a spline, no parabolas
 SINGULAR_SHARE: Final = 0.1  # [-] of usual singular values: a wrist a few degrees from straight
 NEARLY: Final = 0.99  # [-] of demanded singular values: kept
@@ -95,15 +97,28 @@ class Prepared:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
         variables, acceleration = self.variables, acceleration_limits(self.scene)
         if self.unled is None:
-            job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=nodes)
+            enough = enough_nodes(self.schedule, nodes)
+            job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=enough)
             return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
         nodes *= ALONG_SPLINE[self.request.timing]
         return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
     def coarse(self) -> LayoutProblem | PathProblem:
-        """The problem of the trials."""
-        return self.problem()
+        """The problem of the trials, at as many nodes as the given layout needs where ``solve`` follows its paths."""
+        problem, nodes = self.problem(), NODES
+        if not isinstance(problem, LayoutProblem) or isinstance(self._given_start, NoSolutionError):
+            return problem
+        while problem.evaluate(problem.given, self._given_start) is None and nodes < MOST and self._is_followed:
+            nodes = 2 * nodes - 1
+            problem = problem.finer(self.schedule, nodes=nodes)
+        return problem
+
+    @cached_property
+    def _is_followed(self) -> bool:
+        """Whether the tools follow their paths in the given layout, by the method of ``solve``."""
+        given = Candidates.of([self.variables.base], self.given_start[None])
+        return bool(screen_layouts(self.variables.base, self.schedule, given, moving=self.moving).is_followed[0])
 
     @cached_property
     def path_search(self) -> PathSearch:

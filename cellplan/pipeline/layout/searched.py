@@ -46,6 +46,8 @@ def searched_cell(request: LayoutRequest) -> Cell:
     changed = cell.with_values(values) if values else cell
     paths = () if changed.layout is None else [each.robot for each in changed.layout.paths]
     refuse_other_jobs(changed, "a layout search", paths=paths)
+    if paths:
+        _refuse_open_tasks(changed, asked="--free path" if request.free else "layout.vary: a joint path")
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
     return changed
@@ -64,6 +66,32 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
         raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
     if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
         raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
+
+
+def _refuse_open_tasks(cell: Cell, *, asked: str) -> None:
+    """Refuse tasks that leave their robot a choice where a joint path of the positioner is searched.
+
+    Args:
+        cell: The cell.
+        asked: What asks for the search.
+
+    Raises:
+        InputError: A task leaves a component open, or its robot has a joint too many or too few for six.
+    """
+    for task in cell.tasks:
+        robot = cell.robot(task.robot)
+        why = f"for {asked}: the joints of '{robot.name}' would not follow from the path of the positioner"
+        if task.is_spin_free:
+            raise InputError(f"{task.where('free')}: expected no free spin {why}, got [spin]; leave free or path out")
+        if len(task.axes) < 6:
+            raise InputError(
+                f"{task.where('axes')}: expected all six components {why}, got {len(task.axes)}; leave axes or path out"
+            )
+        if len(robot.model.joints) != 6:
+            raise InputError(
+                f"{cell.origin.at(f'robots.{robot.name}')}: expected six joints {why}, got "
+                f"{len(robot.model.joints)}; leave path out"
+            )
 
 
 def _refuse_margins(cell: Cell) -> None:

@@ -14,7 +14,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, kept_demands, prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared
 from cellplan.pipeline.layout.proposals import SIZE, proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
@@ -29,7 +29,6 @@ STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
 STAGES: Final = 4
 PROBE: Final = Effort(iterations=12)  # of the paths that a trial chooses from
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
-NOT_FOLLOWED: Final = "a tool cannot follow its path"
 
 Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (nq,)
 

@@ -12,7 +12,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_TIME
 from cellplan.model.report import Check
 from cellplan.model.units import MM
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared
 from cellplan.pipeline.repair.neat import changed_values, neat
 from cellplan.pipeline.repair.solved import Solved, demanded_margin
 from cellplan.pipeline.solve import solve
@@ -53,7 +53,7 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
     """
     problem, demands = ready.problem(NODES), ready.demands()
     effort = Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
-    done = Confirmed(values={}, cost=0.0, solved=None, reason="a tool cannot follow its path", solves=0)
+    done = Confirmed(values={}, cost=0.0, solved=None, reason=NOT_FOLLOWED, solves=0)
     for solves in range(1, SOLVES + 1):
         found, effort = _refined(problem, (x, start), demands, effort)
         if found is None or not (found.is_conforming or solves == 1):

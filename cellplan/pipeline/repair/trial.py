@@ -10,7 +10,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
 from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
 from cellplan.pipeline.layout.limits import standing_of
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.pipeline.repair.confirm import Confirmed, confirmed, solved_cell
@@ -103,7 +103,7 @@ def _of_branch(ready: Prepared, attempt: Attempt) -> Confirmed | str:
         return "the given one is the best that was found"
     point = ready.coarse.evaluate(ready.variables.given, start)
     if point is None:
-        return "a tool cannot follow its path from there"
+        return f"{NOT_FOLLOWED} from there"
     left = standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
     if left:
         return left[0]["text"]
@@ -118,7 +118,7 @@ def _of_spin(ready: Prepared, attempt: Attempt) -> Confirmed | str:
     opened = Prepared.of(ready.request, ready.cell.with_values(attempt.values))
     point = opened.coarse.evaluate(opened.variables.given, start_posture(ready)[0])
     if point is None:
-        return "a tool cannot follow its path"
+        return NOT_FOLLOWED
     left = standing_of(opened.coarse, point, opened.demands(), EFFORT).violations()
     return left[0]["text"] if left else _of_values(ready, attempt.values, 0.0)
 

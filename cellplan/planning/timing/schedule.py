@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
+from cellplan.errors import InputError, TooFewStepsError
 from cellplan.geometry.curves.arc_length import quickly
 from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.approach_retract import stand_off
@@ -136,7 +136,7 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
             key = "duration_s" if task.feed is None else task.feed_key
             own = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
-            raise InputError(
+            raise TooFewStepsError(
                 f"{task.where(own)}: expected {what} of at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s), got {duration:g} s; slow the task down or shorten the step"
             )

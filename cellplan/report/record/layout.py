@@ -88,10 +88,11 @@ class ProgressRecord(TypedDict):
 class GivenRecord(TypedDict):
     """The layout as it was given."""
 
-    status: Annotated[str, "`conforming` or `violating`, by the search"]
-    cycle_s: Annotated[Number, "shortest cycle of the same motion; null where a tool cannot follow"]
+    status: Annotated[str, "`conforming` or `violating`, as `solve` has it"]
+    reason: Annotated[str, "why it has no motion; empty where it has one"]
+    cycle_s: Annotated[Number, "shortest verified cycle of the same motion; null where another objective is sought"]
     margin_deg: Annotated[Number, "smallest distance of a turning joint from its limits; negative beyond them"]
-    clearance_mm: Annotated[Number, "smallest distance of bodies at the keys of the search"]
+    clearance_mm: Annotated[Number, "smallest certified distance of bodies"]
     violations: Annotated[list[LimitRecord], "what it breaks, worst first"]
 
 

@@ -88,10 +88,11 @@ def _misplaced(record: Record) -> Iterator[str]:
 def _given(record: Record) -> str:
     """The given layout in one line."""
     given = record["given"]
-    if given["cycle_s"] is None:
-        return "as given: a tool cannot follow its path"
+    if given["reason"]:
+        return f"as given: no motion: {given['reason']}"
     state = "conforms" if given["status"] == "conforming" else "does not conform"
-    return f"as given: {state}; shortest cycle of its motion {given['cycle_s']:.4g} s"
+    cycle = "" if given["cycle_s"] is None else f"; shortest cycle of its motion {given['cycle_s']:.4g} s"
+    return f"as given: {state}{cycle}"
 
 
 def _changes(record: Record) -> Iterator[str]:

@@ -19,6 +19,9 @@ from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 
 SAME_TWIST: Final = 1e-9  # [m/s] and [rad/s] by which a desired twist may differ on both sides of a time and not jump
+STRAIGHT: Final = 0.1  # [-] of the largest twist: up to that parabolas through nodes are good to 1 %
+PER_KNOT: Final = 16  # [-] nodes between two knots of a path at most: a cubic piece is straight enough by then
+MOST: Final = 1025  # [-] nodes; the matrices of a job have as many rows and columns
 ORDER: Final = 3  # of the multistep rule: nodes that a prediction looks back on
 
 
@@ -154,6 +157,39 @@ class Layouts:
     def placement(self, job: Job) -> Placement:
         """Where the robots and tools of the candidates are, as a batch."""
         return job.tasks.chains.placements(self.X_WB, self.X_FT)
+
+
+def enough_nodes(schedule: Schedule, fewest: int) -> int:
+    """About how many nodes follow the desired motion of all tools: the more, the more it does between the knots.
+
+    Nodes are doubled until the desired twists are nearly straight from one to the next, up to some between two knots.
+
+    Args:
+        schedule: The tasks on the common clock.
+        fewest: About how many are wanted anyway.
+    """
+    most = min(MOST, PER_KNOT * (len(schedule.breaks) - len(schedule.jumps)))
+    count, bend = fewest, _bend(schedule, fewest) if fewest < most else 0.0
+    while count < most and bend > STRAIGHT:
+        count = 2 * count - 1
+        bend = _bend(schedule, count)
+    return count
+
+
+def _bend(schedule: Schedule, count: int) -> float:
+    """Largest distance of desired twists from straight lines between nodes, as a share of the largest twist."""
+    times, begins, ends = _nodes(schedule.jumps, count, ())
+    desired = desired_motion(schedule.paths, ())
+    V = desired(times, begins, ends)[1]
+    is_step = np.diff(times) > 0.0
+    largest = np.maximum(np.linalg.norm(V.reshape(2, 3, -1), axis=1).max(axis=1), SAME_TWIST)
+    bends = [0.0]
+    for share in (0.25, 0.5, 0.75):
+        between = (times[:-1] + share * np.diff(times))[is_step]
+        straight = ((1.0 - share) * V[..., :-1] + share * V[..., 1:])[..., is_step]
+        off = desired(between, begins[:-1][is_step], ends[:-1][is_step])[1] - straight
+        bends += (np.linalg.norm(off.reshape(2, 3, -1), axis=1).max(axis=1) / largest).tolist()
+    return max(bends)
 
 
 def _nodes(jumps: Array, count: int, denser: Sequence[float]) -> tuple[Array, Array, Array]:

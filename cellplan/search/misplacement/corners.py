@@ -19,7 +19,7 @@ class Corner:
 
     d: Array  # the displacements, shape (m,)
     start: Array  # its start posture in [rad] or [m], shape (nq,); not valid where it is not followed
-    cycle: float  # its shortest cycle in [s]; inf where a tool cannot follow its path
+    cycle: float  # its shortest cycle in [s]; inf where a tool loses its path
     margins: Array  # by how much each joint keeps more than the margin that is demanded, in [rad] or [m], shape (nq,)
     rooms: Array  # by how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others
     first: str  # the limit that is the next to be missed, or that is missed most: one line of text
@@ -59,7 +59,7 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
 def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
     """A layout in which a tool cannot follow."""
     margins, rooms = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
-    return Corner(d=d, start=start, cycle=np.inf, margins=margins, rooms=rooms, first="a tool cannot follow its path")
+    return Corner(d=d, start=start, cycle=np.inf, margins=margins, rooms=rooms, first="a tool loses its path")
 
 
 def _measured(problem: GuardedProblem, measures: Measures) -> Corner:

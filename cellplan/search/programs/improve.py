@@ -155,7 +155,8 @@ class _Climb:
                 if gain > GOOD * found.expected:
                     self._trust = min(WIDEST, GROWS * self._trust)
                 return there
-            bends = np.concatenate([each.bends(here.measures, there.measures, found.z) for each in program.rows])
+            seen = (each.bends(here.measures, there.measures, found.z) for each in program.rows)
+            bends = np.concatenate([np.zeros(0), *seen])
         count = len(here.measures.point.x)
         reach = self._trust if found is None else float(np.abs(found.z[:count]).max(initial=0.0))
         self._trust = SHRINKS * min(self._trust, reach)

@@ -12,7 +12,7 @@ from cellplan.model.joint_limits import JointLimits
 from cellplan.model.motion import Schedule
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.job import Job
+from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
@@ -55,7 +55,8 @@ class LayoutProblem:
             nodes: About how many nodes there are, evenly.
             denser: Times in [s] on the clock of the nodes about which there are more.
         """
-        job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=nodes, denser=denser)
+        enough = enough_nodes(schedule, nodes)
+        job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=enough, denser=denser)
         return replace(self, job=job)
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:

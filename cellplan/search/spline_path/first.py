@@ -9,7 +9,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.joint_spline import JointSpline
 from cellplan.model.motion import Schedule
-from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.job import Job, Layouts, enough_nodes
 from cellplan.search.kernel.run import run
 
 NODES: Final = 193  # of the motion that is fitted
@@ -36,7 +36,7 @@ def first_path(
     if carrier.path is not None:
         return with_count(carrier.path, count, degree), start
     free = replace(cell, robots=tuple(replace(robot, path=None) for robot in cell.robots))
-    job = Job.of(free, schedule, moving=[robot.name for robot in cell.robots], nodes=NODES)
+    job = Job.of(free, schedule, moving=[robot.name for robot in cell.robots], nodes=enough_nodes(schedule, NODES))
     motion = run(job, layout)
     if not motion.is_followed[0]:
         return None

@@ -19,7 +19,7 @@ from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.job import Job, Layouts, enough_nodes
 from cellplan.search.starts.contacts import Contacts
 from cellplan.search.starts.freedom import FIXED, Freedom, StartVariables
 from cellplan.search.starts.reaching import BaseBounds, FreeArm, Goal
@@ -86,7 +86,7 @@ class StartProblem:
             start=start,
             margin=np.broadcast_to(np.asarray(margin, dtype=float), (cell.joint_count,)),
             acceleration=acceleration_limits(scene),
-            job=Job.of(cell, schedule, moving=moving, nodes=NODES),
+            job=Job.of(cell, schedule, moving=moving, nodes=enough_nodes(schedule, NODES)),
             at_rest=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST),
             at_rest_fine=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST_FINE),
             scene=scene,

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from cellplan import LayoutRequest
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED
 from cellplan.pipeline.layout.proposals import SIZE, Proposals, choice_text, origin_text
 from cellplan.search.programs.objective import Objective
 from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
@@ -78,7 +79,7 @@ def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> N
 
 
 def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
-    lost = Outcome(status=TrialStatus.NO_SOLUTION, reason="a tool cannot follow its path", figures={})
+    lost = Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     finished = [Trial(variant=Variant(number, {"kind": "given"}), outcome=lost) for number in range(SIZE)]
 
     following = Proposals(request=REQUEST)(finished)
