@@ -78,8 +78,6 @@ def from_both_sides(
     first: TimedProgram,
     at: Callable[[int], TimedProgram],
     asked: Callable[[TimedProgram], float],
-    *,
-    unused: float = 0.0,
 ) -> TimedProgram | None:
     """The program that keeps all limits in so many steps while it would not in a step less; None where none does.
 
@@ -88,14 +86,13 @@ def from_both_sides(
         first: The first program.
         at: The program in a number of steps; a ``TooFewStepsError`` says that a task needs more of them.
         asked: How many times as long a program must last, at most 1 where it keeps its limits.
-        unused: Share of its time that may be left unused.
     """
     best, now, bracket = None, first, Bracket()
     share = asked(first)
     for trial in range(MOST_TRIALS):
         bracket.note(number, holds=share <= 1.0)
         best = now if share <= 1.0 else best
-        if bracket.is_closed or 1.0 - unused < share <= 1.0 or (best is None and trial >= MOST_SLOWER):
+        if bracket.is_closed or (best is None and trial >= MOST_SLOWER):
             break
         guess = number + 1 if np.isinf(share) else int(np.ceil(number * share * (1.0 - NEAR)))
         number = bracket.following(guess, trial=trial)

@@ -1,7 +1,5 @@
 """The cycle of a layout's motion: as the nodes have it, then as short as the limits of the verified motion allow."""
 
-from typing import Final
-
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.pipeline.early_clearance import EarlyClearance
@@ -10,8 +8,6 @@ from cellplan.pipeline.fastest.time_laws import from_both_sides
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.search.programs.objective import Objective, Timing
-
-UNUSED: Final = 0.002  # [-] share of its time that a motion may leave unused
 
 
 def is_scaled(ready: Prepared) -> bool:
@@ -53,7 +49,7 @@ def shortest(ready: Prepared, cell: Cell, program: TimedProgram, progress: Progr
         load, more = load_of(found), time_asked(found)
         return max(load, more) if more > 1.0 else load
 
-    best = from_both_sides(round(program.cycle / step), program, at, asked, unused=UNUSED)
+    best = from_both_sides(round(program.cycle / step), program, at, asked)
     return program if best is None else best
 
 

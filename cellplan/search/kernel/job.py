@@ -166,7 +166,7 @@ def enough_nodes(schedule: Schedule, fewest: int) -> int:
 
     Args:
         schedule: The tasks on the common clock.
-        fewest: About how many are wanted anyway.
+        fewest: About how many there are at least.
     """
     most = min(MOST, PER_KNOT * (len(schedule.breaks) - len(schedule.jumps)))
     count, bend = fewest, _bend(schedule, fewest) if fewest < most else 0.0
