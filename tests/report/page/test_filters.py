@@ -32,7 +32,7 @@ def test_a_value_far_from_its_limit_has_three_digits_and_one_equal_to_it_is_equa
 def test_an_acceleration_next_to_its_limit_does_not_look_like_it(ratio: float) -> None:
     limit = {"acceleration_limit": 480.0, "acceleration_limit_source": "assumed", "unit": "deg"}
     joint = {"acceleration_ratio": ratio, "peak_acceleration": 480.0 * ratio, "peak_acceleration_at_s": 1.0, **limit}
-    (figure,) = _acceleration_figures({"joints": {"arm": {"A1": joint}}}, lambda *_: 0.0)
+    (figure,) = _acceleration_figures({"joints": {"arm": {"A1": joint}}})
 
     assert float(figure["value"]) != 100.0
     assert (float(figure["value"]) > 100.0) is figure["is_bad"] is (ratio > 1.0)
