@@ -5,6 +5,7 @@ from typing import Final, NamedTuple
 
 MM: Final = 1e3  # [mm/m]
 DEG: Final = math.degrees(1.0)  # [deg/rad]
+ROUNDING_TOL: Final = 1e-9  # [-] of a tenth: 36.99999999999 is printed as 37.0
 
 
 class DisplayUnit(NamedTuple):
@@ -21,3 +22,8 @@ MILLIMETRES: Final = DisplayUnit("mm", MM)
 def joint_unit(*, is_revolute: bool) -> DisplayUnit:
     """Unit of joint positions: degrees of a revolute joint, millimetres of a prismatic one."""
     return DEGREES if is_revolute else MILLIMETRES
+
+
+def rounded_down(value: float) -> float:
+    """The value with one decimal, rounded down, so that no clearance or margin is overstated."""
+    return math.floor(10.0 * value + ROUNDING_TOL) / 10.0

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from cellplan.model.units import MM
+from cellplan.model.units import MM, rounded_down
 
 if TYPE_CHECKING:
     from cellplan.model.report import Report
@@ -24,4 +24,4 @@ def verdict(reports: Sequence["Report"]) -> str:
     if not known:
         return f"passed: {len(checks)} checks"
     least, pair = min(known)
-    return f"passed: {len(checks)} checks; smallest clearance {MM * least:.4g} mm, {' - '.join(pair)}"
+    return f"passed: {len(checks)} checks; smallest clearance {rounded_down(MM * least):.1f} mm, {' - '.join(pair)}"

@@ -100,7 +100,7 @@ def _robot(robot: Robot, colour: str, squares: Mapping[str, Indices]) -> PlanRob
         model=robot.model.name,
         colour=colour,
         base=np.round(MM * robot.X_WB[:3, 3], 3) + 0.0,
-        turn_deg=round(float(DEG * np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0])), 3) + 0.0,
+        yaw_deg=round(float(DEG * np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0])), 3) + 0.0,
         centre=MM * centre[:2],
         reach=MM * _reach(robot.model) if is_round else None,
         reach_outline=np.zeros((0, 2)) if is_round else MM * reach_outline(robot, rounds=REACH_ROUNDS),

@@ -73,7 +73,7 @@ lift
     jaw_mm  1
   bodies and the box round them in mm:
     foot  200 x 200 x 1000  box
-to be written into a cell in this folder, with a number for each …:
+entry for a cell file in this folder, with a number for each …:
 
 robots:
   lift:

@@ -55,13 +55,18 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
-    message = f"{inner} is {_shown(depth)} mm deep in {outer}{instant}, allowed {limit:g} mm{share}{_gap(scene, found)}"
+    gap = MM * _gap(scene, found)
+    if gap > 0.0:
+        message = f"{inner} is {gap:.4g} mm away from {outer}: is the gripper open too far?"
+    else:
+        held = f"is {_shown(depth)} mm deep in {outer}{instant}" if depth > 0.0 else f"does not reach into {outer}"
+        message = f"{inner} {held}, allowed {limit:g} mm{share}"
     passed, cure = _passed(found), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),
         subject=f"{inner} - {outer}",
         passed=passed,
-        value=depth,
+        value=-gap if gap > 0.0 else depth,
         limit=limit,
         unit="mm",
         at_s=at_s,
@@ -69,15 +74,15 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     )
 
 
-def _gap(scene: Scene, found: FoundDepth) -> str:
-    """How far a body that the cell names as gripping is from the part, where it does not reach it."""
+def _gap(scene: Scene, found: FoundDepth) -> float:
+    """How far in [m] a body that the cell names as gripping is from the part, where that is too far to grip it."""
     if found.pair.mount is not Mount.GRIP or found.depth > 0.0:
-        return ""
+        return 0.0
     name, _ = _named(scene, found)
     body = next(each for each in scene.bodies if each.name == name)
     grasp = next((each for each in scene.cell.part.held_by if name in (each.bodies or ())), None)
     gap = 0.0 if grasp is None else closed_gap(scene.cell, body, grasp)
-    return f", but {MM * gap:.4g} mm away from it: is the gripper open too far?" if gap > FARTHEST_GRIP else ""
+    return gap if gap > FARTHEST_GRIP else 0.0
 
 
 def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | None) -> list[Check]:

@@ -45,8 +45,8 @@ def skew_lines(prepared: Prepared) -> Iterator[str]:
     """What the start skew may be."""
     if prepared.skew is not None:
         least = prepared.skew.least
-        across = "" if prepared.job.frame.cell.program is None else "; across the ends of phases too"
-        yield f"allowed skew {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}{across}"
+        over = "" if prepared.job.frame.cell.program is None else " over all phases and their ends"
+        yield f"allowed skew{over} {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}"
 
 
 def deviation_line(judgement: Judgement) -> str:

@@ -21,7 +21,7 @@ from cellplan.planning.layout_screening import Screening
 from cellplan.report.page.figures import figure, key_figures
 from cellplan.report.page.notebook import Card, Grid
 from cellplan.report.record.common import Record
-from cellplan.report.record.numbers import fixed, small
+from cellplan.report.record.numbers import seconds, small
 from cellplan.report.record.rows import format_of, run_tables
 from cellplan.report.record.summary import summary_record
 
@@ -100,7 +100,7 @@ def _(result: Report) -> Card:
     failed = [check.message for check in result.checks if not check.passed]
     checks = f"{len(result.checks)} checks" if not failed else f"{len(failed)} of {len(result.checks)} checks"
     clearance = tables_of(result)["clearance"]()
-    figures = [figure("Cycle time", fixed(result.cycle_time, 2), "s", note=result.mode)]
+    figures = [figure("Cycle time", seconds(result.cycle_time), "s", note=result.mode)]
     return Card(
         kind="Report" if result.phase is None else f"Report of {result.phase}",
         name=result.cell,

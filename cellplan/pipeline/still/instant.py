@@ -12,6 +12,7 @@ from cellplan.model.report import Check, ClearanceMinimum, JointUse, Report
 from cellplan.model.units import MM
 from cellplan.report.record.clearance import smallest_minimum
 from cellplan.report.record.common import number
+from cellplan.report.record.numbers import floored, plain
 
 NOTE_WIDTH: Final = 74  # [characters] of a line below the title, in a wide type
 MOST_NOTES: Final = 2
@@ -105,14 +106,13 @@ def heading(instant: Instant, report: Report) -> tuple[str, tuple[str, ...]]:
         title = f"{instant.check.kind.fails} {at}"
         return title, _wrapped(instant.check.message.removeprefix(f"{instant.check.name}: "))
     if instant.minimum is not None and instant.minimum.pair is not None:
-        distance = np.floor(10.0 * MM * (instant.minimum.minimum or 0.0)) / 10.0
         least = "" if is_exact(instant.minimum) else "at least "
-        title = f"Smallest clearance {least}{distance:.1f} mm {at}"
+        title = f"Smallest clearance {least}{floored(MM * (instant.minimum.minimum or 0.0))} mm {at}"
         failed = () if instant.check is None else (instant.check.message,)
         return title, _wrapped(" to ".join(instant.minimum.pair), *failed)
     if instant.use is not None:
         unit, scale = instant.use.display_unit
-        return f"Smallest joint margin {scale * instant.use.margin:.4g} {unit} {at}", (
+        return f"Smallest joint margin {plain(floored(scale * instant.use.margin))} {unit} {at}", (
             f"{instant.use.robot}/{instant.use.joint}",
         )
     return f"{report.cell} {at}", ()

@@ -17,6 +17,7 @@ from cellplan.model.task import Frame
 from cellplan.model.units import MM
 from cellplan.pipeline.still.instant import Instant, heading, is_exact, worst_instant
 from cellplan.report.plots.palette import robot_colours
+from cellplan.report.record.numbers import floored
 from cellplan.report.still.facets import facets
 from cellplan.report.still.picture import Colour, ShownLine, ShownName, ShownSolid, StillPicture
 from cellplan.report.still.shading import mixed
@@ -139,9 +140,8 @@ def _mark(
 ) -> tuple[Array, str]:
     """The points that matter in the world, and what is written beside them."""
     if instant.minimum is not None and instant.minimum.points is not None:
-        distance = MM * (instant.minimum.minimum or 0.0)
         least = "" if is_exact(instant.minimum) else "≥ "
-        return np.array(instant.minimum.points), f"{least}{np.floor(10.0 * distance) / 10.0:.1f} mm"
+        return np.array(instant.minimum.points), f"{least}{floored(MM * (instant.minimum.minimum or 0.0))} mm"
     if len(instant.bodies) == 2:
         return _between([solid for solid in solids if solid.name in instant.bodies]), ""
     if instant.robot is None:

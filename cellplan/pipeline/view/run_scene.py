@@ -23,8 +23,9 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
-from cellplan.report.record.common import Record, rounded_down
+from cellplan.report.record.common import Record
 from cellplan.report.record.common import number as plain
+from cellplan.report.record.numbers import floored, seconds
 from cellplan.report.record.phases import instant_text
 from cellplan.report.record.view import (
     ClearanceCurveRecord,
@@ -296,10 +297,10 @@ def _worst_times(record: Record, begin: float) -> Iterator[float]:
 def _facts(record: Record) -> list[list[str]]:
     """What the head of the page says of a run."""
     whole = record["clearance"]["whole"]
-    facts = [["mode", str(record["mode"])], ["cycle", f"{record['cycle_time_s']:.4g} s"]]
+    facts = [["mode", str(record["mode"])], ["cycle", f"{seconds(record['cycle_time_s'])} s"]]
     if whole["minimum_mm"] is not None:
         word = "certified" if whole["certified"] else "not certified"
-        distance = f"{rounded_down(whole['minimum_mm']):.1f} mm"
+        distance = f"{'' if whole['exact'] else 'at least '}{floored(whole['minimum_mm'])} mm"
         where = " – ".join(whole["pair"] or [])
         facts.append(["smallest clearance", f"{distance}, {word}: {where} {instant_text(whole)}"])
     return facts

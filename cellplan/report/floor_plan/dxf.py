@@ -138,11 +138,11 @@ def _draw_bases(space: "Modelspace", plan: FloorPlan, height: float) -> None:
     for robot in plan.robots:
         attributes = {"layer": str(Layer.ROBOTS), "true_color": int(robot.colour[1:], 16)}
         space.add_point([_number(each) for each in robot.base], dxfattribs=attributes)
-        turn = np.radians(robot.turn_deg)
-        toward = robot.base[:2] + 3.0 * height * np.array([np.cos(turn), np.sin(turn)])
+        yaw = np.radians(robot.yaw_deg)
+        toward = robot.base[:2] + 3.0 * height * np.array([np.cos(yaw), np.sin(yaw)])
         space.add_line(_point(robot.base[:2]), _point(toward), dxfattribs=attributes)
         x, y, z = (_number(each) for each in robot.base)
-        lines = (robot.name, f"x {x:g} y {y:g} z {z:g} turn {robot.turn_deg:g} deg")
+        lines = (robot.name, f"x {x:g} y {y:g} z {z:g} yaw {robot.yaw_deg:g} deg")
         for number, words in enumerate(lines):
             at = robot.base[:2] + height * np.array([0.6, -1.6 - 1.3 * number])
             _text(space, NAMES, words, at=at, height=(0.7 if number else 1.0) * height)

@@ -67,7 +67,7 @@ class PlanRobot:
     model: str
     colour: str
     base: Array  # coordinates of the base, shape (3,)
-    turn_deg: float  # direction of the x axis of the base, from that of the world
+    yaw_deg: float  # direction of the x axis of the base, from that of the world
     centre: Array  # where its first axis stands, shape (2,)
     reach: float | None
     reach_outline: Array

@@ -117,7 +117,7 @@ def _bases(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     """Places and names of the bases, and the direction of their x axes."""
     for robot in plan.robots:
         x, y = sheet.place(robot.base[:2])
-        turn = np.radians(robot.turn_deg)
+        turn = np.radians(robot.yaw_deg)
         u, v = x + 75 * np.cos(turn), y - 75 * np.sin(turn)
         cross = f"M{x - 22:.1f} {y:.1f}H{x + 22:.1f}M{x:.1f} {y - 22:.1f}V{y + 22:.1f}M{x:.1f} {y:.1f}L{u:.1f} {v:.1f}"
         yield f'<path class="cross" d="{cross}"/>'
@@ -171,7 +171,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
     yield _text("key", x, y + 40, f"{bar:g} mm")
     y = top + 230
-    columns = (("robot", 0), ("x", 258), ("y", 390), ("z", 493), ("turn", 604), ("reach", COLUMN))
+    columns = (("robot", 0), ("x", 258), ("y", 390), ("z", 493), ("yaw", 604), ("reach", COLUMN))
     for word, offset in columns:
         yield _text("head" if not offset else "head right", left + offset, y, word)
     yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'
@@ -182,7 +182,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
         yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE))
         y += TEXT * (_lines(robot) - 1)
-        cells = (*(_length(float(each)) for each in robot.base), f"{robot.turn_deg:.1f}°".replace(".0°", "°"))
+        cells = (*(_length(float(each)) for each in robot.base), f"{robot.yaw_deg:.1f}°".replace(".0°", "°"))
         reach = "–" if robot.reach is None else f"{robot.reach:.0f}"
         for text, (_, offset) in zip((*cells, reach), columns[1:], strict=True):
             yield _text("key right", left + offset, y, text)

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Entries, Record
-from cellplan.report.record.numbers import against, fixed, floored, percent, small, stated
+from cellplan.report.record.numbers import against, fixed, floored, percent, seconds, small, stated
 from cellplan.report.record.phases import phase_key
 from cellplan.report.text.notes import accuracy_note, clock_note
 
@@ -53,7 +53,7 @@ def _cycle_figure(record: Record) -> dict[str, Any]:
     if "samples" in record:
         note = f"{record['samples']} samples, {small(1e3 * record['step_s'])} ms apart"
     clock = clock_note(record)
-    return figure("Cycle time", fixed(record["cycle_time_s"], 2), "s", note=f"{note}; {clock}" if clock else note)
+    return figure("Cycle time", seconds(record["cycle_time_s"]), "s", note=f"{note}; {clock}" if clock else note)
 
 
 def _error_figures(record: Record) -> Entries:
@@ -144,7 +144,7 @@ def _speed_figure(use: Use) -> dict[str, Any]:
     robot, name, joint = use
     return figure(
         "Highest joint speed",
-        percent(joint["velocity_ratio"]).removesuffix(" %"),
+        percent(joint["velocity_ratio"], 1).removesuffix(" %"),
         "% of limit",
         where=f"{robot} {name}",
         **_when(joint, "peak_velocity_at_s"),
@@ -163,11 +163,11 @@ def _acceleration_figures(record: Record) -> Entries:
     ratio, is_assumed = joint["acceleration_ratio"], joint["acceleration_limit_source"] == "assumed"
     found = figure(
         "Highest joint acceleration",
-        percent(ratio).removesuffix(" %"),
+        percent(ratio, 1).removesuffix(" %"),
         f"% of {'assumed' if is_assumed else 'stated'} limit",
         where=f"{robot} {name}",
         **_when(joint, "peak_acceleration_at_s"),
-        note=f"{joint['peak_acceleration']:.1f} of {joint['acceleration_limit']:.1f} {joint['unit']}/s²",
+        note=f"{fixed(joint['peak_acceleration'])} of {fixed(joint['acceleration_limit'])} {joint['unit']}/s²",
         is_bad=ratio > 1.0,
         used=ratio,
     )

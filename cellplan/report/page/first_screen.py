@@ -95,4 +95,4 @@ def _reduced_checks(record: Record) -> Iterator[tuple[str, str]]:
     kinds = [kind for kind, _, _ in entries if kind not in BY_NAME]
     if kinds:
         named = ", ".join(f"{kinds.count(kind)} {TITLES[kind]}" for kind in TITLES if kind in kinds)
-        yield f"{len(kinds)} pairs with reduced checks ({named})", "#left-out"
+        yield f"{len(kinds)} {'pair' if len(kinds) == 1 else 'pairs'} with reduced checks ({named})", "#left-out"

@@ -29,6 +29,7 @@ MODES: Final = {
     "simultaneous": "all robots move",
     "pairwise": "the positioner and one operator move at a time",
     "part_at_rest": "the positioner is at rest",
+    "semi_coordinated": "the positioner moves between tasks and is at rest during them",
 }
 EXECUTION_TITLES: Final = {
     "before": "as solved",
@@ -72,7 +73,7 @@ def report_page(
     parts = {
         "check_groups": check_groups(checks),
         "shares": _shares(record),
-        "excluded": _by_reason(record["exclusions"]),
+        "of_links": _by_reason(_of_links(record)),
         "method": list(method_lines(record["solver"], record["step_s"])),
         "plots": _inline_plots(plots),
         "task_times": task_times(record, cell),
@@ -184,6 +185,12 @@ def _shares(record: Record) -> Entries:
         "idle": "robots without a task",
     }
     return [{"name": names[role], "share": share} for role, share in totals.items() if share > 0.0]
+
+
+def _of_links(record: Record) -> Entries:
+    """Pairs with reduced requirements that are not among those that were not judged in full: links of one robot."""
+    named = {frozenset(each["bodies"]) for each in record["left_out"]}
+    return [each for each in record["exclusions"] if frozenset(each["pair"]) not in named]
 
 
 def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:

@@ -10,6 +10,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.report.plots.figure import Axis, Curve, Item, Key, Limit, Mark, Panel, value_axis
 from cellplan.report.plots.palette import AXES, INK, LIMIT
+from cellplan.report.record.numbers import small
 
 MIN_IN_UNIT: Final = 0.5  # [-] of an error in its unit: a larger unit is not chosen below
 DECADES: Final = 9  # [-] most below the upper end of a logarithmic scale
@@ -69,7 +70,7 @@ def _largest_text(largest: float, allowed: float, scale: float, at_s: float) -> 
     """The largest error and its time, unless it is small enough to be rounding, which no two processors share."""
     if largest < NOISE * allowed:
         return "below a thousandth of the tolerance"
-    return f"largest {scale * largest:.2g} at {at_s:.2f} s"
+    return f"largest {small(scale * largest)} at {at_s:.3f} s"
 
 
 def _by_axis(times: Array, error: Array, kind: ErrorKind) -> Panel:

@@ -7,10 +7,11 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import JointUse, Report
+from cellplan.model.units import rounded_down
 from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Key, Limit, Mark, Panel, time_axis, value_axis
 from cellplan.report.plots.palette import INK, LIMIT, ROBOTS
 from cellplan.report.plots.placing import number_sign
-from cellplan.report.record.common import rounded_down, shortened
+from cellplan.report.record.common import shortened
 
 MAX_ROBOTS: Final = 8  # with a panel each; more share one, with a curve for the worst joint of each robot
 MAX_LETTERS: Final = 22  # [-] of joint names beside a title; longer ones are counted from the base
@@ -97,7 +98,7 @@ def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *,
     return Panel(
         title=shortened(robot, LONGEST_NAME),
         keys=[Key(name, pen) for name, pen in zip(names, pens, strict=True)],
-        note=f"{uses[int(joint)].joint}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.2f} s",
+        note=f"{uses[int(joint)].joint}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.3f} s",
         y=_axis(shares, is_margin=is_margin),
         items=items,
     )
@@ -114,7 +115,7 @@ def _crowd(shares: Shares, times: Array, colours: Mapping[str, str], *, is_margi
     items.append(Mark(float(times[row]), value))
     return Panel(
         title="worst joint of each robot",
-        note=f"{list(worst)[int(robot)]}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.2f} s",
+        note=f"{list(worst)[int(robot)]}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.3f} s",
         y=_axis(stacked, is_margin=is_margin),
         items=items,
     )

@@ -10,12 +10,13 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import ClearanceClass, ClosureAccuracy, Conditioning, JointUse, Report, TaskAccuracy
 from cellplan.model.task import Frame
+from cellplan.model.units import rounded_down
 from cellplan.report.plots.errors import ORIENTATION, POSITION, error_panels
 from cellplan.report.plots.figure import Curve, Figure, Item, Limit, Mark, Panel, time_axis, value_axis
 from cellplan.report.plots.joint_shares import margins_figure, speeds_figure
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, robot_colours
 from cellplan.report.plots.placing import SUPERSCRIPTS, number_sign
-from cellplan.report.record.common import rounded_down, shortened
+from cellplan.report.record.common import shortened
 
 CLEARANCE: Final = "clearance"  # the one figure that shows more than the motion
 JOINT_COLUMNS: Final = 3
@@ -102,7 +103,7 @@ def _margin_note(use: JointUse, scale: float) -> str:
         return "no position limits"
     margin = scale * use.margin
     near = f"margin {rounded_down(margin):.1f}" if margin >= 0.0 else f"outside by {-margin:.3g}"
-    return f"{near} at {use.margin_at_s:.2f} s"
+    return f"{near} at {use.margin_at_s:.3f} s"
 
 
 def _velocities_figure(robot: str, uses: Sequence[JointUse], report: Report, colour: str) -> Figure:
@@ -112,7 +113,7 @@ def _velocities_figure(robot: str, uses: Sequence[JointUse], report: Report, col
         unit, scale = use.display_unit
         curve = Curve(use.joint, middle, scale * report.qd[robot][:, i], colour)
         limits = (-scale * use.velocity_limit, scale * use.velocity_limit)
-        note = f"peak {scale * use.peak_velocity:.1f} at {use.peak_velocity_at_s:.2f} s"
+        note = f"peak {scale * use.peak_velocity:.1f} at {use.peak_velocity_at_s:.3f} s"
         panels.append(_joint_panel(curve, limits, f"{unit}/s", note=note, worst_at_s=use.peak_velocity_at_s))
     return _joint_figure(f"{robot}: joint velocities", panels, report.times)
 
@@ -154,7 +155,7 @@ def _clearance_panel(report: Report, required: float, index: int) -> Panel:
     smallest, word = 1e3 * minimum.minimum, "smallest" if minimum.exact else "at least"
     return Panel(
         title=f"{title}, in mm",
-        note=f"{word} {rounded_down(smallest):.1f} at {minimum.at_s:.2f} s, required {required:g}",
+        note=f"{word} {rounded_down(smallest):.1f} at {minimum.at_s:.3f} s, required {required:g}",
         y=value_axis(0.0, max(float(known.max()), required) or 1.0, unit="mm", is_floored=True),
         items=[
             Limit(required, is_upper=False),
@@ -185,7 +186,7 @@ def _smallest(name: str, values: Array, times: Array, colour: str) -> Panel:
     is_long = len(name + unit) > MAX_TITLE_LETTERS
     return Panel(
         title=shortened(name, MAX_TITLE_LETTERS) + unit,
-        note=f"{'' if is_long else 'smallest '}{smallest:.2g} at {at_s:.2f} s",
+        note=f"{'' if is_long else 'smallest '}{smallest:.2g} at {at_s:.3f} s",
         y=value_axis(0.0, scale * float(values.max()) or 1.0, is_floored=True),
         items=[Curve(name, times, scale * values, colour), Mark(at_s, smallest)],
     )

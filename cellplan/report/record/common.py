@@ -17,7 +17,6 @@ Record = Mapping[str, Any]  # a record as consumers read it, from memory or from
 Entries = list[dict[str, Any]]  # what pages and screens list
 
 SIGNIFICANT: Final = 12  # digits: hides the noise of unit conversion (-185.00000000000003) and nothing else
-ROUNDING_TOL: Final = 1e-9  # [-] of a tenth: 36.99999999999 is printed as 37.0
 AXES: Final = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -71,11 +70,6 @@ def number(value: float | None) -> Number:
     if value is None or not math.isfinite(value):
         return None
     return float(f"{value:.{SIGNIFICANT}g}") + 0.0
-
-
-def rounded_down(value: float) -> float:
-    """The value with one decimal, rounded down, so that no clearance or margin is overstated."""
-    return math.floor(10.0 * value + ROUNDING_TOL) / 10.0
 
 
 def smallest(values: Array, times: Array) -> ExtremeRecord:

@@ -14,7 +14,7 @@ from cellplan.model.report import Report
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, Record, number
 from cellplan.report.record.joints import velocity_ratio
-from cellplan.report.record.numbers import fixed, floored, percent, small
+from cellplan.report.record.numbers import fixed, floored, percent, plain, seconds, small
 
 SECONDS_PER_HOUR: Final = 3600.0
 REDUCED: Final = 250.0  # [mm/s]
@@ -41,15 +41,14 @@ class Shown:
     heading: str  # of a column of a page, its unit in a line of its own
     page: Callable[[Number], str]  # its text there
     column: str  # heading of a column on the terminal
-    form: str  # format of its text there, after the scale of ``percent``
     percent: float  # 100 for a share, else 1: also the scale of its plot
     plot: str  # title of its plot
     limit: float | None = None  # A limit there, and its name
     limit_name: str = ""  # empty for a limit without a name
 
     def text(self, value: Number) -> str:
-        """Its text on the terminal."""
-        return "-" if value is None else format(self.percent * value, self.form)
+        """Its text on the terminal: that of the page, its unit in the heading."""
+        return plain(self.page(value)).removesuffix(" %")
 
 
 # fmt: off
@@ -71,14 +70,14 @@ _LISTED: Final = (
     Quantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
 )
 SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
-    "cycle_time_s": Shown("cycle time<br>s", partial(fixed, digits=3), "cycle s", "g", 1.0, "cycle time, in s"),
-    "parts_per_h": Shown("parts<br>per hour", fixed, "parts/h", ".1f", 1.0, "parts per hour"),
-    "max_velocity_ratio": Shown("velocity<br>of limit", partial(percent, digits=1), "velocity %", ".1f", 100.0, "highest joint velocity, in % of its limit", 100.0),
-    "max_acceleration_ratio": Shown("acceleration<br>of limit", partial(percent, digits=1), "acceleration %", ".1f", 100.0, "highest joint acceleration, in % of its limit", 100.0),
-    "max_tool_speed_mm_s": Shown("tool speed<br>mm/s", partial(fixed, digits=0), "tool mm/s", ".0f", 1.0, "fastest tool tip in the world, in mm/s", REDUCED, "reduced speed"),
-    "energy_proxy_s": Shown("energy proxy<br>s", small, "energy proxy s", ".3g", 1.0, "energy proxy, in s"),
-    "min_margin_deg": Shown("margin<br>deg", floored, "margin deg", ".2f", 1.0, "smallest joint margin, in deg"),
-    "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", ".2f", 1.0, "smallest certified clearance, in mm"),
+    "cycle_time_s": Shown("cycle time<br>s", seconds, "cycle s", 1.0, "cycle time, in s"),
+    "parts_per_h": Shown("parts<br>per hour", fixed, "parts/h", 1.0, "parts per hour"),
+    "max_velocity_ratio": Shown("velocity<br>of limit", partial(percent, digits=1), "velocity %", 100.0, "highest joint velocity, in % of its limit", 100.0),
+    "max_acceleration_ratio": Shown("acceleration<br>of limit", partial(percent, digits=1), "acceleration %", 100.0, "highest joint acceleration, in % of its limit", 100.0),
+    "max_tool_speed_mm_s": Shown("tool speed<br>mm/s", partial(fixed, digits=0), "tool mm/s", 1.0, "fastest tool tip in the world, in mm/s", REDUCED, "reduced speed"),
+    "energy_proxy_s": Shown("energy proxy<br>s", small, "energy proxy s", 1.0, "energy proxy, in s"),
+    "min_margin_deg": Shown("margin<br>deg", floored, "margin deg", 1.0, "smallest joint margin, in deg"),
+    "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", 1.0, "smallest certified clearance, in mm"),
 })
 # fmt: on
 QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.key: each for each in _LISTED})

@@ -4,7 +4,8 @@ import math
 from decimal import Decimal
 from typing import Any, Final
 
-from cellplan.report.record.common import Record, rounded_down
+from cellplan.model.units import rounded_down
+from cellplan.report.record.common import Record
 
 MIN_SHOWN: Final = 1e-6  # [mm] or [deg]
 MIN_PLAIN: Final = 1e-4  # [-] of a manipulability: smaller ones are shown with a power of ten
@@ -60,6 +61,17 @@ def power(value: float | None) -> str:
         return small(value)
     digits, _, exponent = f"{value:.2e}".partition("e")
     return f"{digits} · 10^{int(exponent)}".replace("-", "−")
+
+
+def seconds(value: float | None) -> str:
+    """A duration to the millisecond, without zeros at its end."""
+    text = fixed(value, 3)
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def plain(text: str) -> str:
+    """A number as a terminal shows it: signs in ASCII."""
+    return text.replace("−", "-").replace("–", "-")
 
 
 def floored(value: float | None) -> str:

@@ -69,7 +69,7 @@ class HeadRecord(OriginRecord):
     schema: Annotated[str, "`cellplan.report/1`, always the first key"]
     cell: Annotated[str, "name of the cell"]
     status: Annotated[str, "`passed` or `failed`"]
-    mode: Annotated[str, "`simultaneous`, `pairwise` or `part_at_rest`"]
+    mode: Annotated[str, "`simultaneous`, `pairwise`, `part_at_rest` or `semi_coordinated`"]
     cycle_time_s: Annotated[Number, "duration of the motion"]
     clock_from: Annotated[
         str,

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final
 
-from cellplan.report.record.common import Record, rounded_down
+from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import floored, seconds
 
 EQUAL: Final = 0.01  # [-] of a figure: a smaller difference is no cost
 COMPARED: Final = "each load, peak, margin and clearance"
@@ -55,10 +56,11 @@ def _payment(passed: Sequence[Record]) -> Iterator[str]:
         lead = _lead(best, other)
         if lead is None:
             both = f"{best['name']} and {other['name']} take the same time ({_time(best)})"
-            found = [f"{each['name']} costs {'; '.join(its)}" for each, its in ((best, costs), (other, gains)) if its]
+            worse = ((best["name"], costs), (other["name"], gains))
+            found = [f"Worse in {name}: {'; '.join(its)}" for name, its in worse if its]
             yield f"{both}. {'. '.join(found)}." if found else f"{both}, and {COMPARED} is the same."
         elif costs:
-            yield f"{lead}; it costs {'; '.join(costs)}."
+            yield f"{lead}. The price: {'; '.join(costs)}."
         else:
             yield f"{lead}, and {COMPARED} is no worse."
 
@@ -86,7 +88,7 @@ def _worse(one: Record, other: Record) -> list[str]:
             continue
         room = EQUAL * max(abs(own), abs(its))
         if (own - its if more_is_worse else its - own) > room:
-            show = _three_digits if more_is_worse else _floored
+            show = _three_digits if more_is_worse else floored
             found.append(f"{title} {show(scale * own)} instead of {show(scale * its)}{unit}")
     return found
 
@@ -123,12 +125,7 @@ def _reservations(solved: Sequence[Record]) -> Iterator[str]:
 
 
 def _time(variant: Record) -> str:
-    return f"{variant['figures']['cycle_time_s']:g} s"
+    return f"{seconds(variant['figures']['cycle_time_s'])} s"
 
 
 _three_digits: Callable[[float], str] = "{:.3g}".format
-
-
-def _floored(value: float) -> str:
-    """A margin or clearance, not overstated."""
-    return f"{rounded_down(value):.1f}"

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import fixed, percent, small
 from cellplan.report.record.phases import instant_text
 from cellplan.report.text.columns import Row
 
@@ -33,15 +34,15 @@ def _joint_rows(joints: Record) -> Iterator[Row]:
     if limited:
         joint, use = max(limited, key=lambda each: float(each[1]["acceleration_ratio"]))
         source = "assumed" if use["acceleration_limit_source"] == "assumed" else "stated"
-        figure = f"{100.0 * use['acceleration_ratio']:.4g} % of its {source} limit"
+        figure = f"{percent(use['acceleration_ratio'], 1)} of its {source} limit"
         yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
     elif known:
         joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_acceleration"]))
-        figure = f"{use['peak_acceleration']:.4g} {use['unit']}/s2, not limited"
+        figure = f"{fixed(use['peak_acceleration'])} {use['unit']}/s2, not limited"
         yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
     if known:
         joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_jerk"]))
-        figure = f"{use['peak_jerk']:.4g} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
+        figure = f"{fixed(use['peak_jerk'], 0)} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
         yield "largest joint jerk", figure, f"{joint} {instant_text(use, 'peak_jerk_at_s')}"
 
 
@@ -56,4 +57,4 @@ def _world_rows(accelerations: Record) -> Iterator[Row]:
 
 def _figure(point: Record, what: str) -> tuple[str, str]:
     """Figure of a point, and when it is reached."""
-    return f"{point['peak_acceleration_m_s2']:.3g} m/s2", f"{what} {instant_text(point, 'peak_acceleration_at_s')}"
+    return f"{small(point['peak_acceleration_m_s2'])} m/s2", f"{what} {instant_text(point, 'peak_acceleration_at_s')}"

@@ -6,7 +6,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Final
 
-from cellplan.report.record.common import Record, rounded_down
+from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import floored, plain, seconds
 from cellplan.report.text.layout import solve_best_line
 
 MOST_FAILED: Final = 4  # [-] failed checks that are shown
@@ -52,17 +53,17 @@ def verdict_line(record: Record) -> str:
 def demands_text(record: Record) -> str:
     """What is demanded, in words."""
     margin = record["required_margin_deg"]
-    demanded = f"at {record['duration_s']:g} s, clearance {record['required_clearance_mm']:g} mm"
+    demanded = f"at {seconds(record['duration_s'])} s, clearance {record['required_clearance_mm']:g} mm"
     return f"{demanded}, margins {margin:g} deg" if margin else demanded
 
 
 def figures_text(remedy: Record) -> str:
     """Figures of a verified remedy, in words."""
-    figures = [f"cycle {remedy['cycle_s']:g} s"]
+    figures = [f"cycle {seconds(remedy['cycle_s'])} s"]
     if remedy["smallest_margin_deg"] is not None:
-        figures.append(f"smallest margin {rounded_down(remedy['smallest_margin_deg']):g} deg")
+        figures.append(f"smallest margin {plain(floored(remedy['smallest_margin_deg']))} deg")
     if remedy["smallest_clearance_mm"] is not None:
-        figures.append(f"smallest clearance {rounded_down(remedy['smallest_clearance_mm']):g} mm")
+        figures.append(f"smallest clearance {floored(remedy['smallest_clearance_mm'])} mm")
     return ", ".join(figures)
 
 

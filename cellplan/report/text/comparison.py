@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from cellplan.report.record.common import Record, rounded_down
+from cellplan.report.record.common import Record
 from cellplan.report.record.comparison import robot_names
+from cellplan.report.record.numbers import floored, seconds, small
 
 MAX_SHOWN: Final = 30  # differing inputs, and letters of their values
 MAX_FAILED: Final = 3  # failed checks of a variant
@@ -93,30 +94,25 @@ def _plain(key: str, form: Callable[[float], str]) -> Callable[[Record], str]:
     return lambda figures: DASH if figures[key] is None else form(figures[key])
 
 
-def _floored(value: float) -> str:
-    """A margin or clearance, not overstated."""
-    return f"{rounded_down(value):.1f}"
-
-
 def _clearance(figures: Record) -> str:
     """The smallest clearance, and whether it is proved."""
     value = figures["min_clearance_mm"]
     return (
-        DASH if value is None else f"{_floored(value)}{'' if figures['min_clearance_certified'] else ' not certified'}"
+        DASH if value is None else f"{floored(value)}{'' if figures['min_clearance_certified'] else ' not certified'}"
     )
 
 
 ROWS: Final[Sequence[Row]] = (
-    ("cycle time, s", _plain("cycle_time_s", "{:g}".format)),
+    ("cycle time, s", _plain("cycle_time_s", seconds)),
     ("moves not in the program", lambda figures: "left out" if figures["not_in_program"] else "none"),
-    ("smallest margin, deg", _of_joint("min_margin_deg", 1.0, form=_floored)),
+    ("smallest margin, deg", _of_joint("min_margin_deg", 1.0, form=floored)),
     ("highest velocity, % of limit", _of_joint("max_velocity_ratio", 100.0)),
     ("highest acceleration, % of limit", _of_joint("max_acceleration_ratio", 100.0)),
     ("the same at work, velocity", _of_joint("work_velocity_ratio", 100.0)),
     ("the same at work, acceleration", _of_joint("work_acceleration_ratio", 100.0)),
     ("smallest clearance, mm", _clearance),
-    ("largest position error, mm", _plain("max_position_error_mm", "{:.2g}".format)),
-    ("largest orientation error, deg", _plain("max_orientation_error_deg", "{:.2g}".format)),
+    ("largest position error, mm", _plain("max_position_error_mm", small)),
+    ("largest orientation error, deg", _plain("max_orientation_error_deg", small)),
     ("highest tool speed, mm/s", _plain("max_tool_speed_mm_s", "{:.0f}".format)),
     ("mean velocity, % of limit", _plain("mean_velocity_ratio", lambda ratio: f"{100.0 * ratio:.2g}")),
     ("load of all robots, s", _plain("load_s", "{:.3g}".format)),

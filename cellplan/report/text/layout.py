@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from cellplan.report.record.common import Entries, Record, rounded_down
+from cellplan.report.record.common import Entries, Record
+from cellplan.report.record.numbers import floored, plain, seconds
 
 MOST: Final = 6  # [-] lines of what binds, of what the given layout breaks, and of reasons
 SAME: Final = 1e-3  # [mm] or [deg] by which a variable may differ and count as unchanged
@@ -54,11 +55,11 @@ def verdict_line(record: Record) -> str:
         return "NO START: no layout was found in which all tools reach the starts of their paths"
     if best is None:
         return "NO LAYOUT CERTIFIED"
-    figures = [f"cycle {best['cycle_s']:.4g} s"]
+    figures = [f"cycle {seconds(best['cycle_s'])} s"]
     if best["margin_deg"] is not None:
-        figures.append(f"smallest margin {rounded_down(best['margin_deg']):g} deg")
+        figures.append(f"smallest margin {plain(floored(best['margin_deg']))} deg")
     if best["clearance_mm"] is not None:
-        figures.append(f"smallest clearance {rounded_down(best['clearance_mm']):g} mm")
+        figures.append(f"smallest clearance {floored(best['clearance_mm'])} mm")
     return f"CERTIFIED: {', '.join(figures)}"
 
 
@@ -91,7 +92,7 @@ def _given(record: Record) -> str:
     if given["reason"]:
         return f"as given: no motion: {given['reason']}"
     state = "conforms" if given["status"] == "conforming" else "does not conform"
-    cycle = "" if given["cycle_s"] is None else f"; shortest cycle of its motion {given['cycle_s']:.4g} s"
+    cycle = "" if given["cycle_s"] is None else f"; shortest cycle of its motion {seconds(given['cycle_s'])} s"
     return f"as given: {state}{cycle}"
 
 
@@ -122,7 +123,7 @@ def path_text(path: Record) -> str:
 
 def _choice(each: Record) -> str:
     """A combination of discrete choices in one line."""
-    cycle = "" if each["cycle_s"] is None else f", cycle {each['cycle_s']:.4g} s"
+    cycle = "" if each["cycle_s"] is None else f", cycle {seconds(each['cycle_s'])} s"
     reason = f": {each['reason']}" if each["reason"] else ""
     return f"{each['choice']}: {each['status'].replace('_', ' ')} ({_trials(each['trials'])}{cycle}){reason}"
 

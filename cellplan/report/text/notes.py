@@ -46,8 +46,9 @@ def left_out_notes(record: Record) -> list[str]:
 
 
 def grip_notes(record: Record) -> list[str]:
-    """Depth of each holder in the part: the messages of these checks, each once."""
-    return list(dict.fromkeys(check["message"] for check in record["checks"] if check.get("name") == "grip_depth"))
+    """Depth of each holder that is in the part: the messages of these checks, each once."""
+    deep = (check for check in record["checks"] if check.get("name") == "grip_depth" and check["value"])
+    return list(dict.fromkeys(check["message"] for check in deep))
 
 
 def open_surface_notes(entries: Iterable[Record]) -> Iterator[tuple[str, str]]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import seconds, small
 
 TITLES: Final = {"before": "as solved", "after": "corrected", "in_pass": "corrected within the pass"}
 OUTCOMES: Final = {
@@ -20,7 +21,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
     cells = "one real cell" if record["trials"] == 1 else f"{record['trials']} real cells"
     return [
         f"{record['cell']}: {record['status']}",
-        f"  mode {record['mode']}, {record['cycle_time_s']:g} s, rehearsed on {cells}, seed {record['seed']}",
+        f"  mode {record['mode']}, {seconds(record['cycle_time_s'])} s, rehearsed on {cells}, seed {record['seed']}",
         *_task_lines(record),
         *_repeatability_lines(record["tasks"]),
         *_round_lines(record["runs"]),
@@ -38,7 +39,7 @@ def _task_lines(record: Record) -> Iterator[str]:
             if found is not None:
                 position, orientation = found["max_position_error_mm"], found["max_orientation_error_deg"]
                 lost = record["trials"] - found["trials"]
-                yield f"{place}: true error {position:.2g} mm, {orientation:.2g} deg" + (
+                yield f"{place}: true error {small(position)} mm, {small(orientation)} deg" + (
                     f", path lost in {lost} trials" if lost else ""
                 )
             elif key == "in_pass" and record["in_pass"]:
@@ -51,7 +52,7 @@ def _repeatability_lines(tasks: Record) -> Iterator[str]:
         for key, figures in task["iso_9283"].items():
             if figures is not None and figures["RT_p_mm"] is not None:
                 accuracy, spread = figures["AT_p_mm"], figures["RT_p_mm"]
-                yield f"  task {name}, {TITLES[key]}: AT_p {accuracy:.2g} mm, RT_p {spread:.2g} mm"
+                yield f"  task {name}, {TITLES[key]}: AT_p {small(accuracy)} mm, RT_p {small(spread)} mm"
 
 
 def _round_lines(runs: Iterable[Record]) -> Iterator[str]:
@@ -66,4 +67,5 @@ def _round_lines(runs: Iterable[Record]) -> Iterator[str]:
                 yield f"  {where}feedback {text}{share}"
         if len(corrections) == 1:
             for made in corrections[0]["rounds"]:
-                yield f"    round {made['round']}: largest true error {made['share_of_tolerance']:.3g} of its tolerance"
+                share = small(made["share_of_tolerance"])
+                yield f"    round {made['round']}: largest true error {share} of its tolerance"

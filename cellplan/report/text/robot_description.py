@@ -20,7 +20,7 @@ def description_lines(record: dict[str, Any]) -> list[str]:
         *_block("off the chain, to be locked:", [(key, f"{value:g}") for key, value in record["locked"].items()]),
         *_block("bodies and the box round them in mm:", [_link_row(link) for link in record["links"]]),
         *(f"  note: {remark}" for remark in record["remarks"]),
-        f"to be written into a cell in this folder{_blanks(record)}:",
+        f"entry for a cell file in this folder{_blanks(record)}:",
         "",
         record["cell_lines"].rstrip("\n"),
     ]

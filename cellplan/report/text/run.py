@@ -9,6 +9,7 @@ from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
 from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import floored, percent, plain, seconds, small
 from cellplan.report.record.phases import instant_text
 from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
 from cellplan.report.text.columns import Row, aligned
@@ -77,7 +78,8 @@ def left_out_lines(record: Record, more: str) -> list[str]:
 
 def motion_text(record: Record) -> str:
     """Mode, duration and method."""
-    return f"mode {record['mode']}, {record['cycle_time_s']:g} s{_clock_text(record)}{_method_text(record['solver'])}"
+    cycle = seconds(record["cycle_time_s"])
+    return f"mode {record['mode']}, {cycle} s{_clock_text(record)}{_method_text(record['solver'])}"
 
 
 def _rows(record: Record) -> Iterator[Row]:
@@ -147,7 +149,7 @@ def _margin_rows(joints: Record) -> Iterator[Row]:
         ]
         if bounded:
             margin, where = min(bounded)
-            yield "smallest joint margin", f"{margin:.4g} {unit}", where
+            yield "smallest joint margin", f"{plain(floored(margin))} {unit}", where
 
 
 def _speed_rows(joints: Record) -> Iterator[Row]:
@@ -159,7 +161,7 @@ def _speed_rows(joints: Record) -> Iterator[Row]:
     ]
     if driven:
         ratio, where = max(driven)
-        yield "largest joint speed", f"{100.0 * ratio:.4g} % of its limit", where
+        yield "largest joint speed", f"{percent(ratio, 1)} of its limit", where
 
 
 def _program_lines(record: Record) -> Iterator[str]:
@@ -167,7 +169,7 @@ def _program_lines(record: Record) -> Iterator[str]:
     if not record.get("cycles"):
         return
     runs, found = record["runs"], record["solver"]["transfers"] or {}
-    phases = ", ".join(f"{name} {run['cycle_time_s']:.3f} s" for name, run in runs.items())
+    phases = ", ".join(f"{name} {seconds(run['cycle_time_s'])} s" for name, run in runs.items())
     yield f"  from home to home, {record['cycles']} x: {phases}"
     for name, words in found.items():
         yield f"  {name}: {words}"
@@ -198,7 +200,7 @@ def _clearance_rows(clearance: Record) -> Iterator[Row]:
         rests_on = accuracy_note(found["pair"], found.get("accuracies_mm"))
         where = f"{first} - {second} {instant_text(found)}{f', {rests_on}' if rests_on else ''}"
         label = words if found is clearance["whole"] else f"  {words}"
-        yield label, f"{least}{found['minimum_mm']:.4g} mm, {proof}", where
+        yield label, f"{least}{floored(found['minimum_mm'])} mm, {proof}", where
 
 
 def _slack_rows(slack: Record | None) -> Iterator[Row]:
@@ -227,4 +229,4 @@ def _place_lines(folder: Path) -> Iterator[str]:
 
 
 def _short(value: float | None) -> str:
-    return "unknown" if value is None else f"{value:.2g}"
+    return "unknown" if value is None else small(value)

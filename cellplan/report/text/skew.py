@@ -20,7 +20,8 @@ def skew_row(record: Record) -> Iterator[Row]:
     where = f"{pair['robots'][0]} - {pair['robots'][1]}"
     if least["subject"]:
         where = f"{where}, {least['limit']} of {least['subject']} {instant_text(least)}"
-    yield "allowed skew", skew_text(float(pair["allowed_ms"]), or_more=pair["or_more"]), where
+    name = "allowed skew in a phase" if record.get("cycles") else "allowed skew"  # ends of phases: see export
+    yield name, skew_text(float(pair["allowed_ms"]), or_more=pair["or_more"]), where
 
 
 def skew_notes(skew: SkewReport) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from cellplan.report.record.common import Record
+from cellplan.report.record.numbers import small
 from cellplan.report.text.columns import Row
 
 
@@ -17,14 +18,14 @@ def stop_rows(record: Record) -> Iterator[Row]:
     depths = record["stops"]["depths"]
     if depths:
         task = max(depths, key=lambda name: float(depths[name]["depth_mm"]))
-        yield "depth at a stop", f"{depths[task]['depth_mm']:.3g} mm", f"task {task}{_when(depths[task]['worst'])}"
+        yield "depth at a stop", f"{small(depths[task]['depth_mm'])} mm", f"task {task}{_when(depths[task]['worst'])}"
     apart = [each for each in record["stops"]["distances"] if each["distance_mm"] is not None]
     if apart:
         nearest = min(apart, key=lambda each: float(each["distance_mm"]))
         bodies = "" if nearest["bodies"] is None else " - ".join(nearest["bodies"])
-        yield "clearance at a stop", f"{nearest['distance_mm']:.4g} mm", f"{bodies}{_when(nearest['worst'])}"
+        yield "clearance at a stop", f"{small(nearest['distance_mm'])} mm", f"{bodies}{_when(nearest['worst'])}"
     for robot, grip in record["stops"]["grips"].items():
-        yield "grip at a stop", f"{grip['distance_mm']:.3g} mm", f"{robot} from its grasp{_when(grip['worst'])}"
+        yield "grip at a stop", f"{small(grip['distance_mm'])} mm", f"{robot} from its grasp{_when(grip['worst'])}"
 
 
 def _when(worst: Record | None) -> str:

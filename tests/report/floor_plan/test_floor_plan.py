@@ -132,7 +132,7 @@ def test_names_and_numbers_of_the_table_leave_each_other_room(plan: FloorPlan) -
     """Widths of letters are those of a wide type, by their height."""
     width = {"-": 0.37, ".": 0.33, "°": 0.5}
     base = np.array([-2598.1, -12598.1, 1500.5])
-    robots = tuple(replace(robot, base=base, turn_deg=-150.5, reach=10303.0) for robot in plan.robots)
+    robots = tuple(replace(robot, base=base, yaw_deg=-150.5, reach=10303.0) for robot in plan.robots)
     named = replace(robots[0], name="N" * 40)
     outlines = tuple(replace(each, robot=None) for each in plan.outlines)
     whole = replace(plan, robots=(named, *robots[1:]), outlines=outlines, paths=())

@@ -35,8 +35,8 @@ def test_the_fastest_pays_and_every_figure_that_is_worse_is_its_cost() -> None:
     )
     slow = variant("slow", cycle_time_s=9.6)
     assert sentences([slow, fast])[0] == (
-        "fast is 2.4 times as fast as slow (4 s and 9.6 s); it costs load of the positioner 2 instead of 1 s; load of "
-        "the positioner in its hardest phase 2 instead of 1 s; smallest joint margin 10.0 instead of 20.0 deg."
+        "fast is 2.4 times as fast as slow (4 s and 9.6 s). The price: load of the positioner 2 instead of 1 s; "
+        "load of the positioner in its hardest phase 2 instead of 1 s; smallest joint margin 10.0 instead of 20.0 deg."
     )
 
 
@@ -49,14 +49,14 @@ def test_a_variant_that_is_faster_and_nowhere_worse_costs_nothing_that_is_compar
 
 def test_differences_below_one_percent_are_no_costs() -> None:
     first, *_ = sentences([variant("fast", work_velocity_ratio=0.504), variant("slow", cycle_time_s=8.0)])
-    assert "costs" not in first
+    assert "price" not in first
 
 
 def test_a_tie_names_what_each_one_costs() -> None:
     one, other = variant("one", operator_load_s=4.0), variant("other", min_clearance_mm=8.0)
     assert sentences([one, other])[0] == (
-        "one and other take the same time (4 s). one costs load of the operators 4 instead of 3 s. "
-        "other costs smallest clearance 8.0 instead of 12.0 mm."
+        "one and other take the same time (4 s). Worse in one: load of the operators 4 instead of 3 s. "
+        "Worse in other: smallest clearance 8.0 instead of 12.0 mm."
     )
 
 

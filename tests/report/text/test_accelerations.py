@@ -55,7 +55,7 @@ def test_joints_without_limits_are_shown_by_their_own_figure() -> None:
 
     first = next(iter(acceleration_rows(record() | {"joints": joints})))
 
-    assert first == ("largest joint acceleration", "321 deg/s2, not limited", "pen B1 at 1.250 s")
+    assert first == ("largest joint acceleration", "321.0 deg/s2, not limited", "pen B1 at 1.250 s")
 
 
 def test_a_record_of_an_older_version_has_no_such_lines() -> None:

@@ -73,7 +73,7 @@ def test_a_repaired_cell() -> None:
         "  remedies, each solved and verified; a cost of 1 stands for 100 mm, 10 deg or a tenth more time",
         "    1. move right 120 mm +y (cost 1.20)",
         "       right A velocity 120 % -> 96 % of its limit",
-        "       cycle 1 s, smallest margin 12.3 deg, smallest clearance 7 mm",
+        "       cycle 1 s, smallest margin 12.3 deg, smallest clearance 7.0 mm",
         "       cellplan solve 'my pair.yaml' --set robots.right.base.y_mm=420.0 --set environment.column=null",
         "  no remedy",
         "    spin of the tool of right; b: too fast",

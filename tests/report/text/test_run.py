@@ -46,10 +46,10 @@ def test_a_passed_run_is_reported_in_a_few_lines(record: dict[str, Any], tmp_pat
     assert summary_lines(record, tmp_path) == [
         "pair: passed",
         "  1 check passed; mode simultaneous, 4 s",
-        "  smallest clearance     12.35 mm, certified   pen/tool - holder/A2 at 0.250 s",
-        "  smallest joint margin  37.25 deg             holder A2 at 1.500 s",
-        "  largest joint speed    35.1 % of its limit   pen B1 at 2.500 s",
-        "  largest tool error     0.0016 mm, 2e-05 deg  task ring (pen)",
+        "  smallest clearance     12.3 mm, certified       pen/tool - holder/A2 at 0.250 s",
+        "  smallest joint margin  37.2 deg                 holder A2 at 1.500 s",
+        "  largest joint speed    35.1 % of its limit      pen B1 at 2.500 s",
+        "  largest tool error     0.00163 mm, 0.00002 deg  task ring (pen)",
         f"report: {tmp_path / 'report.html'}",
         f"tables: {tmp_path / 'tables'}",
     ]
@@ -135,8 +135,8 @@ def test_sliding_and_turning_joints_are_not_compared(record: dict[str, Any], tmp
 
     lines = summary_lines(record, tmp_path)
 
-    assert "smallest joint margin 37.25 deg holder A2 at 1.500 s" in words(lines)
-    assert "smallest joint margin 500 mm rail X at 1.500 s" in words(lines)
+    assert "smallest joint margin 37.2 deg holder A2 at 1.500 s" in words(lines)
+    assert "smallest joint margin 500.0 mm rail X at 1.500 s" in words(lines)
 
 
 def test_the_tables_of_all_phases_lie_in_one_folder(record: dict[str, Any], tmp_path: Path) -> None:
