@@ -14,7 +14,7 @@ from cellplan.model.report import Report
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, Record, number
 from cellplan.report.record.joints import velocity_ratio
-from cellplan.report.record.numbers import fixed, floored, percent, plain, seconds, small
+from cellplan.report.record.numbers import fixed, floored, percent, plain, small
 
 SECONDS_PER_HOUR: Final = 3600.0
 REDUCED: Final = 250.0  # [mm/s]
@@ -70,7 +70,7 @@ _LISTED: Final = (
     Quantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
 )
 SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
-    "cycle_time_s": Shown("cycle time<br>s", seconds, "cycle s", 1.0, "cycle time, in s"),
+    "cycle_time_s": Shown("cycle time<br>s", partial(fixed, digits=3), "cycle s", 1.0, "cycle time, in s"),
     "parts_per_h": Shown("parts<br>per hour", fixed, "parts/h", 1.0, "parts per hour"),
     "max_velocity_ratio": Shown("velocity<br>of limit", partial(percent, digits=1), "velocity %", 100.0, "highest joint velocity, in % of its limit", 100.0),
     "max_acceleration_ratio": Shown("acceleration<br>of limit", partial(percent, digits=1), "acceleration %", 100.0, "highest joint acceleration, in % of its limit", 100.0),
