@@ -1,12 +1,16 @@
 """The same cell gives the same bytes: whatever the hash seed, the working folder and the number of times."""
 
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from builders import kernels
+from builders.stored_cells import write_cell
 
 from cellplan import export_program, open_gate
 
@@ -56,6 +60,72 @@ def test_no_hash_seed_changes_a_byte(first, sound: Path, tmp_path: Path, seed: s
 @pytest.mark.parametrize("threads", ["1", "2", "4"])
 def test_the_number_of_threads_on_offer_changes_no_byte(first, sound: Path, tmp_path: Path, threads: str) -> None:
     assert differing(first, sound, tmp_path / "run", OPENBLAS_NUM_THREADS=threads, OMP_NUM_THREADS=threads) == []
+
+
+SOLVE = """
+import sys
+from cellplan.cli.main import run
+sys.exit(run(["solve", sys.argv[1], "-o", sys.argv[2]]))
+"""
+JOINTS_DEG = 1e-8  # by which joints may differ between kernels; measured 6e-10
+
+
+def solved_under(kernel: str, cell: Path, run: Path) -> tuple[str, dict[str, bytes]]:
+    """What is printed and every file of the run, by a process that runs a kernel."""
+    env = {**kernels.environment(kernel), "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    code = f"from builders.kernels import require_expected; require_expected()\n{SOLVE}"
+    command = [sys.executable, "-c", code, str(cell), run.name]
+    done = subprocess.run(command, check=True, cwd=run.parent, env=env, capture_output=True, text=True, timeout=600)
+    return done.stdout, tree(run)
+
+
+def verdicts(value: object) -> object:
+    """What a report says without the figures that it has to their last digit."""
+    if isinstance(value, dict):
+        return {name: verdicts(entry) for name, entry in value.items() if name != "sha256"}
+    if isinstance(value, list):
+        return [verdicts(entry) for entry in value]
+    return None if isinstance(value, float) else value
+
+
+def table(data: bytes) -> tuple[list[str], np.ndarray]:
+    """Words and figures above a table of joints, and its numbers: lengths in [mm] or angles in [deg]."""
+    head, numbers = [], []
+    for line in data.decode().splitlines():
+        is_row = line[0].isdigit()
+        (numbers if is_row else head).append([float(word) for word in line.split(",")] if is_row else line)
+    return head, np.array(numbers)
+
+
+def require_the_same_motion(cell: Path, folder: Path, names: list[str]) -> None:
+    """Same bytes for the same kernel; for another one the same words, and joints that nobody can tell apart."""
+    first, *others = (name for name in names if kernels.hindrance(name) is None)
+    for place in (first, "again", *others):
+        (folder / place).mkdir()
+    text, files = solved_under(first, cell, folder / first / "run")
+    assert solved_under(first, cell, folder / "again" / "run") == (text, files)
+    report = verdicts(json.loads(files["report.json"]))
+    for name in others:
+        other_text, other = solved_under(name, cell, folder / name / "run")
+        assert other_text == text
+        assert verdicts(json.loads(other["report.json"])) == report
+        assert other.keys() == files.keys()
+        tables = [name for name in files if name.startswith("tables/") and b"# cellplan joint table" in files[name]]
+        assert tables
+        for file in tables:
+            (head, joints), (other_head, other_joints) = table(files[file]), table(other[file])
+            assert other_head == head
+            np.testing.assert_allclose(other_joints, joints, rtol=0.0, atol=JOINTS_DEG, err_msg=file)
+
+
+def test_kernels_of_the_linear_algebra_change_no_verdict_and_no_printed_figure(tmp_path: Path) -> None:
+    require_the_same_motion(write_cell(tmp_path / "cell"), tmp_path, ["Haswell", "Sandybridge"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["four_robots", "three_tasks_each", "gripper", "papers/nicolato_ellipse"])
+def test_no_kernel_and_no_feature_changes_a_verdict_or_a_printed_figure(cells: Path, name: str, tmp_path: Path) -> None:
+    require_the_same_motion(cells / f"{name}.yaml", tmp_path, [*kernels.KERNELS, kernels.BASELINE])
 
 
 def test_no_file_knows_where_or_by_whom_it_was_made(first, sound: Path) -> None:
