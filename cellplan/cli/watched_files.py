@@ -53,7 +53,7 @@ class WatchedFiles:
 
     def begin(self) -> None:
         """Take the files as they are now, before they are read; not in the middle of a save."""
-        if any(self._is_emptied(path, _stamp(path)) for path in self._stamps):
+        if self._is_one_emptied():
             self.settle()
         for path in self._stamps:
             self._note(path)
@@ -112,20 +112,16 @@ class WatchedFiles:
 
     def settle(self) -> None:
         """Wait until no file has changed for a moment, and for the content of those that a save has just emptied."""
-        before: dict[Path, Stamp] = {}
-        quiet_since = time.monotonic()
-        while True:
-            now = {path: _stamp(path) for path in self._stamps}
-            if now != before:
+        before, quiet_since = dict[Path, Stamp](), time.monotonic()
+        while time.monotonic() - quiet_since < (EMPTIED_S if self._is_one_emptied() else SETTLED_S):
+            if (now := {path: _stamp(path) for path in self._stamps}) != before:
                 before, quiet_since = now, time.monotonic()
-            is_emptied = any(self._is_emptied(path, stamp) for path, stamp in now.items())
-            if time.monotonic() - quiet_since >= (EMPTIED_S if is_emptied else SETTLED_S):
-                return
-            time.sleep(SETTLED_S)
+            time.sleep(SETTLED_S / 2.0)
 
-    def _is_emptied(self, path: Path, stamp: Stamp) -> bool:
+    def _is_one_emptied(self) -> bool:
         """Whether a file that had content is empty or away, as it is for a moment while it is saved."""
-        return (stamp is None or stamp[1] == 0) and self._digests[path] not in (None, NOTHING)
+        full = (path for path, content in self._digests.items() if content not in (None, NOTHING))
+        return any((stamp := _stamp(path)) is None or stamp[1] == 0 for path in full)
 
     def _note(self, path: Path) -> None:
         """Keep time and content of a file."""

@@ -5,11 +5,11 @@ import queue
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, InvalidStateError
 from contextlib import suppress
 from functools import partial
 from types import TracebackType
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
@@ -23,13 +23,7 @@ NO_WORKERS_S: Final = 60.0  # [s] after which a cluster without a worker is give
 CHECK_EVERY_S: Final = 0.2  # [s] between two checks of the connection
 PER_THREAD: Final = 2  # trials begun for each thread of the cluster, so that none waits for the next one
 
-
-class Sent(NamedTuple):
-    """A job under way."""
-
-    job: Future[Any]  # as Dask answers it
-    call: Callable[[], Any]  # what sends it
-    connection: object  # what it was sent through; an answer comes through no other one
+_Sent = tuple[Future[Any], Callable[[], Any], object]  # a job of Dask, what sends it, and through which connection
 
 
 class Cluster(Executor):
@@ -59,8 +53,7 @@ class Cluster(Executor):
         self._dask = self._client.get_executor(pure=False)
         threads = sum(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S).values())
         self.count = max(2, PER_THREAD * threads)
-        self._under_way: dict[Future[Any], Sent] = {}
-        self._answering = threading.Lock()
+        self._under_way: dict[Future[Any], _Sent] = {}
         self._again: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
         self._is_over = threading.Event()
         self._watch = threading.Thread(target=self._watched, name="cellplan-cluster", daemon=True)
@@ -97,43 +90,31 @@ class Cluster(Executor):
             inner: Future[Any] = call()
         except Exception as error:  # noqa: BLE001 - the client is closed, or the job is none that can be sent
             if self._is_connected():
-                self._answer(outer, _stopped(self._address, f"cannot be sent a trial: {error}"))
+                self._stop(outer, f"cannot be sent a trial: {error}")
             else:
                 self._again.put((outer, call))
             return
-        self._under_way[outer] = Sent(inner, call, connection)
+        self._under_way[outer] = inner, call, connection
         inner.add_done_callback(partial(self._arrived, outer, call))
 
     def _arrived(self, outer: Future[Any], call: Callable[[], Any], inner: Future[Any]) -> None:
         """Pass on an answer; a job whose connection was lost is begun again, and its first answer counts."""
         sent = self._under_way.get(outer)
         if inner.cancelled():
-            if sent is not None and sent.job is inner:
+            if sent is not None and sent[0] is inner:
                 self._again.put((outer, call))
             return
         self._under_way.pop(outer, None)
         error = inner.exception(timeout=0)
         if error is None:
-            self._answer(outer, inner.result(timeout=0))
+            _answer(outer, inner.result(timeout=0))
         elif type(error).__name__ == "KilledWorker":
-            self._answer(outer, Lost("the workers of the cluster that worked it out ended"))
+            _answer(outer, Lost("the workers of the cluster that worked it out ended"))
         elif isinstance(error, StudyStoppedError | NotFiniteError):
-            self._answer(outer, error)
+            _answer(outer, error)
         else:
             said = (str(error).splitlines() or [""])[0]
-            self._answer(
-                outer, _stopped(self._address, f"a worker cannot work out trials: {type(error).__name__}: {said}")
-            )
-
-    def _answer(self, outer: Future[Any], answer: Any) -> None:
-        """Pass on a result or an error of our own, unless the caller has one already or wants none any more."""
-        with self._answering:
-            if outer.done():
-                return
-            if isinstance(answer, BaseException):
-                outer.set_exception(answer)
-            else:
-                outer.set_result(answer)
+            self._stop(outer, f"a worker cannot work out trials: {type(error).__name__}: {said}")
 
     def _watched(self) -> None:
         """Begin jobs again once there is a connection, and give up when there is none or no worker for too long."""
@@ -155,9 +136,9 @@ class Cluster(Executor):
         """Begin again what waits for a connection, and what was sent through one that is gone."""
         while not self._again.empty():
             self._send(*self._again.get_nowait())
-        for outer, sent in list(self._under_way.items()):
-            if sent.connection is not self._client.scheduler_comm:
-                self._send(outer, sent.call)
+        for outer, (_, call, connection) in list(self._under_way.items()):
+            if connection is not self._client.scheduler_comm:
+                self._send(outer, call)
 
     def _is_connected(self) -> bool:
         comm = self._client.scheduler_comm
@@ -171,10 +152,20 @@ class Cluster(Executor):
     def _give_up(self, reason: str) -> None:
         """Stop the study."""
         while not self._again.empty():
-            self._answer(self._again.get_nowait()[0], _stopped(self._address, reason))
+            self._stop(self._again.get_nowait()[0], reason)
         for outer in list(self._under_way):
             self._under_way.pop(outer, None)
-            self._answer(outer, _stopped(self._address, reason))
+            self._stop(outer, reason)
+
+    def _stop(self, outer: Future[Any], reason: str) -> None:
+        text = f"--scheduler {self._address}: {reason}; --resume goes on from what is recorded"
+        _answer(outer, StudyStoppedError(text))
+
+
+def _answer(outer: Future[Any], answer: Any) -> None:
+    """Pass on a result or an error of our own, unless there is an answer already or nobody waits for one."""
+    with suppress(InvalidStateError):
+        outer.set_exception(answer) if isinstance(answer, BaseException) else outer.set_result(answer)
 
 
 def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: object) -> Any:
@@ -186,10 +177,6 @@ def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: 
     if versions != _versions():
         raise StudyStoppedError(f"--scheduler: expected workers with {versions}, got one with {_versions()}")
     return function(*arguments)
-
-
-def _stopped(address: str, reason: str) -> StudyStoppedError:
-    return StudyStoppedError(f"--scheduler {address}: {reason}; --resume goes on from what is recorded")
 
 
 def _versions() -> dict[str, str]:

@@ -9,17 +9,7 @@ from typing import Final
 
 from cellplan.errors import StudyStoppedError
 from cellplan.study.trial import Outcome, Variant
-from cellplan.study.workers import (
-    PATIENCE,
-    START,
-    Evaluate,
-    Limits,
-    Lost,
-    Workers,
-    crashed,
-    outcome_in_child,
-    packed,
-)
+from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
 
 BEGUN: Final = 256  # trials that are begun at once on an executor of the caller
 SURE: Final = 2  # ends of its process, the last one alone, after which a trial is the culprit
@@ -55,7 +45,7 @@ class Flight:
             StudyStoppedError: The executor answers for none of them within the time after which each is ended.
         """
         self._waiting.extend(variants)
-        longest = PATIENCE * (self._limits.seconds + START.seconds)
+        longest = self._limits.longest
         while self._waiting or self._lost or self._flying:
             self._fill()
             if not wait(self._flying, timeout=longest, return_when=FIRST_COMPLETED).done:

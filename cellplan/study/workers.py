@@ -36,6 +36,11 @@ class Limits:
     seconds: float = 3600.0  # longest time of the processor; of the clock, four times as long
     megabytes: int = 16_000  # largest address space of its process, Python and its libraries included
 
+    @property
+    def longest(self) -> float:
+        """Time of the clock in [s] within which a trial ends or is ended, the start of its process included."""
+        return PATIENCE * (self.seconds + START.seconds)
+
 
 class Lost(NamedTuple):
     """Why the process of a trial ended without an outcome."""

@@ -51,7 +51,7 @@ class Deaf(InThisProcess):
 def test_an_executor_that_does_not_answer_ends_the_study_and_what_is_recorded_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cellplan.study.run.PATIENCE", 0.001)
+    monkeypatch.setattr("cellplan.study.workers.PATIENCE", 0.001)
     with pytest.raises(
         StudyStoppedError, match=r"^no trial has ended for 0\.3005 s, longer than one may take: .* --resume"
     ):

@@ -73,11 +73,9 @@ class ArrowInverse:
         return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
 
     def refined_speeds(self, b: Array) -> tuple[Array, Array]:
-        r"""`speeds` to the last digits, also where operators cannot do their tasks alone.
+        r"""`speeds` to the last digits, even where blocks are singular: what is lost there differs by processor.
 
-        The multipliers ``y`` of :math:`\dot q = W^{-1} J^T y` are refined by the twists that these very speeds leave,
-        so that nothing of the null space gets into them. The digits that singular blocks cost otherwise are others on
-        each processor.
+        The multipliers ``y`` of :math:`\dot q = W^{-1} J^T y` are refined by the twists that these very speeds leave.
         """
         y, _ = self._multipliers(b)
         for _ in range(REFINEMENTS):
