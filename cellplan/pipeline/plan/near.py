@@ -54,7 +54,10 @@ def read_branches(folder: Path, cell: Cell) -> Branches:
 
 def with_run_named(cell: Cell, near: Branches | None) -> Cell:
     """The cell with the run whose branches it keeps among its inputs."""
-    return cell if near is None else replace(cell, inputs={**cell.inputs, f"{NEAR}{near.run}": near.digest})
+    if near is None:
+        return cell
+    inputs = {**cell.inputs, f"{NEAR}{near.run}": near.digest}
+    return replace(cell, inputs=dict(sorted(inputs.items())))  # as in the manifest
 
 
 def _require_fit(stored: StoredRun, cell: Cell) -> None:

@@ -111,7 +111,7 @@ def test_the_same_cell_near_its_run_is_the_same_program(earlier: Path, tmp_path:
 def test_a_moved_base_keeps_the_branch_and_the_report_says_by_how_much(
     earlier: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    cell = write(tmp_path, "moved.yaml", MOVED)
+    cell = write(tmp_path, "placed.yaml", MOVED)
 
     assert run(["solve", str(cell), "--near", str(earlier), "-o", str(tmp_path / "r"), "-q"]) == 0
 
