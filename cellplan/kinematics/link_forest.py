@@ -6,7 +6,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell import Robot
-from cellplan.model.robot import BASE
+from cellplan.model.robot import BASE, RobotModel
 
 WORLD = 0  # place of what does not move
 
@@ -26,11 +26,15 @@ class LinkForest:
             robots: The robots in the order of the stacked joints.
         """
         self._first: dict[str, int] = {}
-        parents, own, columns, count = [], [], 0, 1
+        parents, order = list[int](), list[int]()
+        own: list[tuple[int, int, RobotModel, int]] = []
+        columns, count = 0, 1
         for robot in robots:
             self._first[robot.name] = count
             parents += [count + 1 + axis.parent for axis in robot.model.axes]
+            first = len(own)
             own += [(count + 1 + link, columns, robot.model, link) for link in range(len(robot.model.axes))]
+            order += [first + link for link in robot.model.carried_order]
             columns += len(robot.model.joints)
             count += 1 + len(robot.model.axes)
         axes = [model.axes[link] for _, _, model, link in own]
@@ -45,8 +49,9 @@ class LinkForest:
         self.shares, self.carries = np.zeros((len(axes), columns)), np.zeros((count, len(axes)))
         for axis, (_, first, model, link) in enumerate(own):
             self.shares[axis, first + model.drive(link).joint] = model.drive(link).ratio
-        for axis, (place, parent) in enumerate(zip(self._places.tolist(), parents, strict=True)):
-            self.carries[place] = self.carries[parent]
+        for axis in order:
+            place = self._places[axis]
+            self.carries[place] = self.carries[parents[axis]]
             self.carries[place, axis] = 1.0
         depths = self.carries[self._places].sum(axis=1)
         self._levels: list[Indices] = [np.flatnonzero(depths == depth) for depth in np.unique(depths)]

@@ -92,7 +92,8 @@ def _with_link_lengths(model: RobotModel, lengths: Array) -> RobotModel:
     """Each joint, with all that it carries, moved along the link before it at the reference configuration."""
     axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
     shifts = np.zeros((len(axes) + 1, 3))  # of each link; the base comes first
-    for index, axis in enumerate(axes):
+    for index in model.carried_order:
+        axis = axes[index]
         shifts[index + 1] = shifts[axis.parent + 1]
         if index < len(lengths) and lengths[index] != 0.0:
             along = link_vector(model, index)
@@ -112,7 +113,8 @@ def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
     """
     D = np.empty((len(model.axes) + 1, 4, 4))
     D[0] = np.eye(4)
-    for index, axis in enumerate(model.axes):
+    for index in model.carried_order:
+        axis = model.axes[index]
         drive = model.drive(index)
         offset = drive.ratio * offsets[drive.joint]
         D[index + 1] = D[axis.parent + 1] @ screw_displacement(axis, np.array([offset]))[0]

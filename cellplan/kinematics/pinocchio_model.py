@@ -87,11 +87,13 @@ class CombinedModel:
         self._X_JT: list[Array] = []
         self.first_link: list[int] = []
         self._points: list[Array] = []
+        self._links: list[int] = []  # of each axis of the engine, the place among all links
         for index, robot in enumerate(cell.robots):
             self._add_robot(robot, cell.columns(robot.name), self.carries_flange[index])
         for group in self._groups:
             group.close()
         count = len(self._leaders)
+        self._engine_axes = np.argsort(self._links)  # of each link, the place among the engine's axes
         self._spread = np.zeros((count, cell.joint_count))
         self._spread[np.arange(count), self._leaders] = self._ratios
         self._spread_to_flange = self._spread * np.array(self._is_on_the_way)[:, None]
@@ -100,7 +102,8 @@ class CombinedModel:
         self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
         self.carries_link = np.zeros((count, count), dtype=bool)
         for group in self._groups:
-            self.carries_link[group.axes, group.axes] = _carriers(group.model)
+            links = self._links[group.axes]
+            self.carries_link[np.ix_(links, links)] = _carriers(group.model)
         self._X_JB = np.array([_at(-point) for point in self._points]).reshape(-1, 4, 4)
         self._carrier, self._X_CP = cell.carrier, cell.part.X_CP
 
@@ -119,7 +122,7 @@ class CombinedModel:
         """All links at the stacked joint vector ``q``, shape (nq,); the result owns its arrays."""
         self._compute(self._spread @ q + self._offset)
         X_WJ = np.array([pose for group in self._groups for pose in group.poses()])
-        return LinkState(self._screws(), X_WJ.reshape(-1, 4, 4) @ self._X_JB)
+        return LinkState(self._screws(), X_WJ.reshape(-1, 4, 4)[self._engine_axes] @ self._X_JB)
 
     def along_joints(self, per_axis: Array) -> Array:
         """Sum what belongs to the axes over those that each driven joint turns, shape (..., links) to (..., nq)."""
@@ -135,14 +138,15 @@ class CombinedModel:
 
     def _compute(self, full: Array) -> None:
         """Let the engine place all axes at their positions, shape (links,)."""
+        positions = full if self._is_plain else full[self._links]
         for group in self._groups:
-            pin.computeJointJacobians(group.model, group.data, full[group.axes])
+            pin.computeJointJacobians(group.model, group.data, positions[group.axes])
 
     def _screws(self) -> Array:
         """Columns of all axes as the engine last computed them, shape (6, links)."""
-        if len(self._groups) == 1:
-            return self._groups[0].screws
-        return np.concatenate([group.screws for group in self._groups], axis=1)
+        screws = [group.screws for group in self._groups]
+        every = screws[0] if len(screws) == 1 else np.concatenate(screws, axis=1)
+        return every if self._is_plain else every[:, self._engine_axes]
 
     def _group_for(self, axes: int) -> _Group:
         """The last group, or a new one when the last has no room for so many axes."""
@@ -154,24 +158,26 @@ class CombinedModel:
         """Add one robot's joints; every joint frame is parallel to B at the reference configuration."""
         model = robot.model
         axes = model.axes
-        ids: list[int] = []
-        group = self._group_for(len(axes))
-        self.first_link.append(len(self._leaders))
-        for axis in axes:
-            self._points.append(axis.point_B)
-            if axis.parent == BASE:
-                parent_id, X_parent = 0, robot.X_WB @ _at(axis.point_B)
-            else:
-                parent_id, X_parent = ids[axis.parent], _at(axis.point_B - axes[axis.parent].point_B)
+        ids: dict[int, int] = {BASE: 0}
+        group, first = self._group_for(len(axes)), len(self._leaders)
+        self.first_link.append(first)
+        for link in model.carried_order:
+            axis = axes[link]
+            X_parent = robot.X_WB @ _at(axis.point_B)
+            if axis.parent != BASE:
+                X_parent = _at(axis.point_B - axes[axis.parent].point_B)
             kind = pin.JointModelRevoluteUnaligned if axis.is_revolute else pin.JointModelPrismaticUnaligned
-            placement = pin.SE3(X_parent[:3, :3], X_parent[:3, 3])
-            ids.append(group.model.addJoint(parent_id, kind(axis.axis_B), placement, f"{robot.name}/{axis.name}"))
-            drive = model.drive(len(ids) - 1)
+            placement, name = pin.SE3(X_parent[:3, :3], X_parent[:3, 3]), f"{robot.name}/{axis.name}"
+            ids[link] = group.model.addJoint(ids[axis.parent], kind(axis.axis_B), placement, name)
+            self._links.append(first + link)
+        for link, axis in enumerate(axes):
+            drive = model.drive(link)
+            self._points.append(axis.point_B)
             self._leaders.append(columns.start + drive.joint)
             self._ratios.append(drive.ratio)
             self._offsets.append(drive.offset)
         link = model.flange_link
-        self._flanges.append((group, 0 if link == BASE else ids[link]))
+        self._flanges.append((group, ids[link]))
         X_joint = inverse(robot.X_WB) if link == BASE else _at(axes[link].point_B)
         self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
         for moved in model.links_to_flange:

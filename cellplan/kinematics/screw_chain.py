@@ -22,6 +22,7 @@ class ScrewChain:
         """Take the joint axes at the reference configuration, followers after driven joints."""
         model = robot.model
         self._axes = model.axes
+        self._order = model.carried_order
         self._drives = [model.drive(link) for link in range(len(self._axes))]
         self._flange_link, self._links_to_flange = model.flange_link, model.links_to_flange
         self._X_WB = robot.X_WB
@@ -50,8 +51,10 @@ class ScrewChain:
             return self._last[1]
         D = np.empty((len(self._axes) + 1, len(q), 4, 4))
         D[0] = self._X_WB
-        for link, (axis, position) in enumerate(zip(self._axes, self._positions(q), strict=True)):
-            D[link + 1] = _carried_on(axis, position, D[axis.parent + 1])[0]
+        positions = self._positions(q)
+        for link in self._order:
+            axis = self._axes[link]
+            D[link + 1] = _carried_on(axis, positions[link], D[axis.parent + 1])[0]
         D.setflags(write=False)
         displacements = np.moveaxis(D, 0, 1)
         if len(q) <= KEPT_ROWS:

@@ -29,7 +29,8 @@ class Joint:
     Attributes:
         name: Name in tables and reports.
         kind: Revolute ([rad]) or prismatic ([m]).
-        parent: Index of the joint that carries this one; ``BASE`` for the first of a chain.
+        parent: Index of the link that carries it, counted over joints first and followers after them; ``BASE`` for the
+            first of a chain.
         axis_B: Unit direction, shape (3,).
         point_B: A point on the axis in [m], shape (3,).
         lower: Lowest allowed position in [rad] or [m]; -inf for a joint that may turn without end.
@@ -177,7 +178,7 @@ class RobotModel:
     Attributes:
         name: Model name.
         source: Where the figures come from.
-        joints: The driven joints, each after the one that carries it.
+        joints: The driven joints, each after the driven one that carries it.
         followers: Joints driven through linkages; they come after all joints in link numbering.
         links: Links on which something can be mounted, by the names of the robot's file.
         body_accuracy: How good the link bodies are that do not say it themselves; None when it is not stated.
@@ -207,7 +208,8 @@ class RobotModel:
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
         for index, axis in enumerate(self.axes):
-            if not BASE <= axis.parent < index:
+            is_after_joint = BASE <= axis.parent < index or len(self.joints) <= axis.parent < len(self.axes)
+            if not is_after_joint or index not in self.carried_order:
                 raise ValueError(f"robot '{self.name}': joint '{axis.name}' must come after the joint that carries it")
             if abs(np.linalg.norm(axis.axis_B) - 1.0) > 1e-9:  # rounding only: readers normalise
                 raise ValueError(f"robot '{self.name}': joint '{axis.name}' needs a unit axis")
@@ -236,6 +238,15 @@ class RobotModel:
             return Drive(link)
         follower = self.followers[link - len(self.joints)]
         return Drive(follower.leader, follower.ratio, follower.offset)
+
+    @property
+    def carried_order(self) -> tuple[int, ...]:
+        """All links, each after the one that carries it: as numbered, unless a follower carries a driven joint."""
+        waiting, order = list(range(len(self.axes))), [BASE]
+        while ready := next((link for link in waiting if self.axes[link].parent in order), BASE) + 1:
+            order.append(ready - 1)
+            waiting.remove(ready - 1)
+        return tuple(order[1:])
 
     @property
     def links_to_flange(self) -> tuple[int, ...]:

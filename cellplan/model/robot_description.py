@@ -42,7 +42,6 @@ class FlangeChoice:
     link: str  # its name
     joints: tuple[str, ...]  # the driven joints that lead to it, from the base on
     note: str = ""  # how it is oriented, where its z is not along the last axis
-    obstacle: str = ""  # why it cannot be the flange; empty where it can
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

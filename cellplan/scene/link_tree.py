@@ -15,7 +15,7 @@ class LinkTree:
         axes: tuple[Joint | FollowerJoint, ...] = (*model.joints, *model.followers)
         self._parents = [axis.parent for axis in axes]
         self._names = [axis.name for axis in axes]
-        self._driven = len(model.joints)
+        self._bars = set(range(len(model.joints), len(axes))) - set(model.links_to_flange)
         self._with_body = {body.link for body in model.bodies}
 
     def carrier(self, link: int) -> int:
@@ -29,8 +29,8 @@ class LinkTree:
         return NO_BODY if link in (BASE, NO_BODY) else self.carrier(self._parents[link])
 
     def is_bar(self, link: int) -> bool:
-        """Whether a link is moved through a linkage rather than by a joint of its own."""
-        return link >= self._driven
+        """Whether a link is moved through a linkage and does not carry the flange: a bar that closes a loop."""
+        return link in self._bars
 
     def joint_name(self, link: int) -> str:
         """Name of the joint that moves a link."""

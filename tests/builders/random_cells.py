@@ -19,11 +19,14 @@ def random_pose(rng: np.random.Generator) -> Array:
 
 
 def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool = False) -> RobotModel:
+    """An arm; with followers one of them carries the flange, or with an odd number of joints the last joint."""
+    lever = joints + 1
+    carries_joint = with_follower and joints % 2 == 1
     axes = [
         Joint(
             name=f"j{i}",
             kind=JointKind.PRISMATIC if i % 3 == 2 else JointKind.REVOLUTE,
-            parent=i - 1 if i else BASE,
+            parent=lever if carries_joint and i == joints - 1 else i - 1 if i else BASE,
             axis_B=_unit(rng),
             point_B=rng.normal(size=3),
             lower=-3.0,
@@ -33,7 +36,7 @@ def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool =
         for i in range(joints)
     ]
     followers = ()
-    if with_follower:  # one lever beside the way to the flange, one that carries it; the second joint drives both
+    if with_follower:  # one lever beside the way to the flange, one on it; the second joint drives both
         followers = (
             FollowerJoint(
                 name="side_lever",
@@ -48,7 +51,7 @@ def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool =
             FollowerJoint(
                 name="lever",
                 kind=JointKind.REVOLUTE,
-                parent=joints - 1,
+                parent=joints - 2 if carries_joint else joints - 1,
                 axis_B=_unit(rng),
                 point_B=rng.normal(size=3),
                 leader=1,
@@ -61,7 +64,7 @@ def random_model(rng: np.random.Generator, joints: int, *, with_follower: bool =
         source="drawn",
         joints=tuple(axes),
         followers=followers,
-        flange_link=joints + 1 if with_follower else joints - 1,
+        flange_link=lever if with_follower and not carries_joint else joints - 1,
         X_BF=random_pose(rng),
         bodies=(),
     )

@@ -33,10 +33,7 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
             "xyz_mm": [_rounded(MM * value) for value in X[:3, 3]],
             "rpy_deg": [_rounded(DEG * value) for value in rpy_from_rotation(X[:3, :3])],
         },
-        "flanges": [
-            {"link": it.link, "joints": list(it.joints), "note": it.note, "obstacle": it.obstacle}
-            for it in described.flanges
-        ],
+        "flanges": [{"link": it.link, "joints": list(it.joints), "note": it.note} for it in described.flanges],
         "mimics": [_mimic(mimic) for mimic in described.mimics],
         "locked": described.locked,
         "links": [

@@ -44,7 +44,7 @@ def _flange_lines(record: dict[str, Any]) -> Iterator[str]:
     rows = [
         (
             each["link"],
-            each["obstacle"] or _joint_count(each["joints"]),
+            _joint_count(each["joints"]),
             each["note"],
             "*" if each["link"] == record["flange"] else "",
         )

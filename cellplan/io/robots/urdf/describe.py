@@ -16,7 +16,7 @@ from cellplan.io.robots.urdf.flange import axis_along, choose_flange, flange_rem
 from cellplan.io.robots.urdf.limits import Lacking, lacking_limits, limits_to_state, with_blanks
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfStructure, urdf_model, urdf_structure
 from cellplan.io.robots.urdf.locks import lock_positions
-from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, links_in_order, moving_leaves
+from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, joints_to, links_in_order, moving_leaves
 from cellplan.io.schema.robot import OTHERS
 from cellplan.io.yaml.writer import flow_text, yaml_text
 from cellplan.model.robot import Body, RobotModel
@@ -109,12 +109,10 @@ def _choices(tree: UrdfTree) -> Iterator[FlangeChoice]:
         chain = [joint for joint in tree.path_to(link.name) if not joint.is_fixed]
         if not chain or (link.name not in leaves and not TOOL_SIDE.search(link.name)):
             continue
-        mimic = next((joint.name for joint in chain if joint.mimic), None)
         yield FlangeChoice(
             link=link.name,
-            joints=tuple(joint.name for joint in chain if joint.mimic is None),
+            joints=tuple(joint.name for joint in joints_to(tree, link.name)),
             note=_axis_note(tree, link.name),
-            obstacle="" if mimic is None else f"carried by the mimic joint {mimic}",
         )
 
 
@@ -131,11 +129,10 @@ def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | No
     try:
         return choose_flange(tree, desired), desired is None
     except InputError:
-        fit = [choice for choice in choices if not choice.obstacle]
-        if desired is not None or not fit:
+        if desired is not None or not choices:
             raise
         return max(
-            fit,
+            choices,
             key=lambda it: (
                 bool(TOOL_SIDE.search(it.link)) and is_along(tree, it.link),
                 is_along(tree, it.link),

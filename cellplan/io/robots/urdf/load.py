@@ -240,7 +240,7 @@ def _follower(joint: UrdfJoint, roles: Roles, configuration: ZeroConfiguration) 
         point_B=point_B,
         leader=leader,
         ratio=joint.mimic.multiplier if joint.mimic else 0.0,
-        offset=joint.mimic.offset if joint.mimic else 0.0,
+        offset=0.0,  # the zero configuration has it
     )
 
 

@@ -7,14 +7,14 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.io.robots.limits import LIMIT_TOL
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint
-from cellplan.io.robots.urdf.tree import UrdfTree, in_user_unit, known_joint, unit_of
+from cellplan.io.robots.urdf.tree import UrdfTree, in_user_unit, joints_to, known_joint, unit_of
 from cellplan.io.schema.units import file_number
 from cellplan.io.yaml.writer import flow_text
 
 
 def unlocked_joints(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]:
     """Joints that move by themselves, do not lead to the flange and are not locked by name."""
-    on_chain = {joint.name for joint in tree.path_to(flange)}
+    on_chain = {joint.name for joint in joints_to(tree, flange)}
     return tuple(
         joint
         for joint in tree.joints

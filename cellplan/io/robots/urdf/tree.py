@@ -46,7 +46,7 @@ class Roles:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ZeroConfiguration:
-    """Where everything is when all joints read zero."""
+    """Where everything is when all driven joints read zero."""
 
     X_BL: Mapping[str, Array]  # pose of each link in the root link's frame, by link name
     X_BJ: Mapping[str, Array]  # pose of each joint frame, by joint name
@@ -86,6 +86,16 @@ def build_tree(document: UrdfDocument) -> UrdfTree:
     return UrdfTree(document=document, root=roots[0], joints=tuple(ordered), above=above)
 
 
+def joints_to(tree: UrdfTree, link: str) -> list[UrdfJoint]:
+    """Joints that move a link, in the order of the tree: those on its way, and for a mimic joint the one it follows."""
+    way = [joint for joint in tree.path_to(link) if not joint.is_fixed]
+    leaders = [
+        tree.document.joints[it.mimic.leader] for it in way if it.mimic and it.mimic.leader in tree.document.joints
+    ]
+    moving = [joint for joint in (*way, *leaders) if joint.mimic is None]
+    return [joint for joint in tree.joints if joint in moving]
+
+
 def moving_leaves(tree: UrdfTree) -> list[str]:
     """Links that carry no other link and are moved by a joint other than a mimic, in the order of the file."""
     parents = {joint.parent for joint in tree.joints}
@@ -97,13 +107,12 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
 
     Args:
         tree: The links and joints.
-        flange: Name of the flange link.
+        flange: Name of the flange link, in messages.
         locked: Position in [rad] or [m] of every joint that is held still, those off the chain included.
 
     Raises:
         InputError: A mimic is unsound, or there is no driven joint, or there are too many.
     """
-    on_chain = {joint.name for joint in tree.path_to(flange)}
     driven: list[UrdfJoint] = []
     followers: list[UrdfJoint] = []
     still: dict[str, float] = {}
@@ -114,8 +123,6 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
             leader = _leader(joint, tree.document)
             if leader.name in locked:
                 still[joint.name] = joint.mimic.multiplier * locked[leader.name] + joint.mimic.offset
-            elif joint.name in on_chain:
-                raise joint.error(f"follows '{leader.name}' and carries the flange '{flange}', which is not supported")
             else:
                 followers.append(joint)
         elif joint.name in locked:
@@ -130,14 +137,15 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
 
 
 def zero_configuration(tree: UrdfTree, roles: Roles) -> ZeroConfiguration:
-    """Poses of all links with every moving joint at zero and every other one where it is held."""
+    """Poses of all links with every driven joint at zero, its followers where that puts them, all others held."""
     moving = [joint.name for joint in (*roles.driven, *roles.followers)]
     X_BL: dict[str, Array] = {tree.root: np.eye(4)}
     X_BJ: dict[str, Array] = {}
     carrier = {tree.root: BASE}
     for joint in tree.joints:
         X_BJ[joint.name] = X_BL[joint.parent] @ joint.X_PJ
-        X_BL[joint.child] = X_BJ[joint.name] @ _travel(joint, roles.still.get(joint.name, 0.0))
+        at_zero = joint.mimic.offset if joint.mimic is not None else 0.0
+        X_BL[joint.child] = X_BJ[joint.name] @ _travel(joint, roles.still.get(joint.name, at_zero))
         is_moving = joint.name in moving
         carrier[joint.child] = moving.index(joint.name) if is_moving else carrier[joint.parent]
     return ZeroConfiguration(X_BL=X_BL, X_BJ=X_BJ, carrier=carrier)

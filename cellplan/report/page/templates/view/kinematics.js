@@ -53,11 +53,14 @@ class Motion {
 /** Displacements of the base and of all links of a robot from the configuration where all joints read zero. */
 function linkPoses(robot, base, q) {
   const poses = [base];
-  for (const axis of robot.axes) {
+  const place = (link) => {
+    if (poses[link + 1]) return poses[link + 1];
+    const axis = robot.axes[link];
     const position = axis.ratio * q[robot.column + axis.joint] + axis.offset;
     const step = axis.turns ? turn(axis.axis, position, axis.point) : translation(times(axis.axis, position));
-    poses.push(multiply(poses[axis.parent + 1], step));
-  }
+    return (poses[link + 1] = multiply(place(axis.parent), step));
+  };
+  robot.axes.forEach((_, link) => place(link));
   return poses;
 }
 
