@@ -5,6 +5,7 @@ from cellplan.report.record.tasks import direction_text
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import moved_start_lines
+from cellplan.report.text.notes import reaches_nowhere
 from cellplan.report.text.run import left_out_lines
 
 MORE = "left_out of check --json"  # where the pairs stand that were not checked in full
@@ -31,7 +32,7 @@ def check_lines(record: Record) -> list[str]:
         *aligned([*starts, *paths, *controllers]),
         *(f"  {line}" for line in moved_start_lines(record["moved_starts"])),
         *(f"  note: {remark}" for remark in record["remarks"]),
-        *(f"  {each['message']}" for each in record["checks"] if each["passed"]),
+        *(f"  {each['message']}" for each in record["checks"] if each["passed"] and not reaches_nowhere(each)),
         *left_out_lines(record, MORE),
     ]
 

@@ -7,6 +7,7 @@ from cellplan.model.left_out import left_out_lines
 from cellplan.report.record.clock import NEXT_STEP, TASKS, TIMING
 from cellplan.report.record.common import Number, Record
 
+JOINED: Final = frozenset({"grip_depth", "mount_depth"})  # checks of two bodies that are joined
 MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted
 CLOCK_NOTES: Final = {
     TASKS: "no motion.duration_s: the clock ends with the last task",
@@ -47,8 +48,13 @@ def left_out_notes(record: Record) -> list[str]:
 
 def grip_notes(record: Record) -> list[str]:
     """Depth of each holder that is in the part: the messages of these checks, each once."""
-    deep = (check for check in record["checks"] if check.get("name") == "grip_depth" and check["value"])
-    return list(dict.fromkeys(check["message"] for check in deep))
+    grips = (check for check in record["checks"] if check.get("name") == "grip_depth")
+    return list(dict.fromkeys(check["message"] for check in grips if not reaches_nowhere(check)))
+
+
+def reaches_nowhere(check: Record) -> bool:
+    """Whether a check is about two bodies that are joined, of which none is in the other: nothing is to be said."""
+    return check.get("name") in JOINED and check["value"] == 0.0
 
 
 def open_surface_notes(entries: Iterable[Record]) -> Iterator[tuple[str, str]]:
