@@ -214,7 +214,7 @@ def fastest_lines(record: Record) -> list[str]:
     lines = [f"{record['cell']}: {record['status']}", f"  as written: {record['written_s']:g} s"]
     for name, program in record["cycles"].items():
         lines += _program_lines(TITLES[name], program)
-        if max(each["percent"] for each in program["binding"]) < 100.0 * BINDS:
+        if name == "time_laws" and max(each["percent"] for each in program["binding"]) < 100.0 * BINDS:
             lines.append(
                 "    none is shorter: a step less (motion.step_s) breaks a limit, or leaves a task too few steps"
             )
