@@ -163,7 +163,7 @@ class Cluster(Executor):
 
 
 def _answer(outer: Future[Any], answer: Any) -> None:
-    """Pass on a result or an error of our own, unless there is an answer already or nobody waits for one."""
+    """Pass on a result or an error of our own, unless there is an answer already or none is waited for."""
     with suppress(InvalidStateError):
         outer.set_exception(answer) if isinstance(answer, BaseException) else outer.set_result(answer)
 

@@ -1,5 +1,6 @@
 """Results print as one line without arrays; ``help(cellplan)`` lists the functions."""
 
+import math
 import dataclasses
 import inspect
 import pydoc
@@ -24,7 +25,7 @@ def test_results_are_one_line(solution: Solution) -> None:
 
     clearance = min(each.minimum for each in report.clearance.minima.values() if each.minimum is not None)
     pair = next(" - ".join(each.pair) for each in report.clearance.minima.values() if each.minimum == clearance)
-    found = f"passed: {len(report.checks)} checks; smallest clearance {1e3 * clearance:.4g} mm, {pair}"
+    found = f"passed: {len(report.checks)} checks; smallest clearance {math.floor(1e4 * clearance) / 10:.4g} mm, {pair}"
     assert repr(solution) == f"<Solution of 'small-pair', simultaneous, 1 s, {found}>"
     assert repr(report) == f"<Report of 'small-pair', simultaneous, 1 s, {found}>"
     assert repr(solution.runs[0]) == f"<Run of 'small-pair', all tasks, 1 s, {found}>"

@@ -43,7 +43,7 @@ def checks_of(text: str, folder: Path, move: str) -> list[Check]:
     file = folder / "cell.yaml"
     file.write_text(text, encoding="utf-8")
     cell = load_cell(file)
-    search = _Worked(cell, StageScenes.of(cell), silent)
+    search = _Worked(cell, StageScenes.of(cell), silent, None)
     for stage in program_stages(cell):
         if (run := search.run(stage) if stage.move is not None else None) is not None and stage.phase.name == move:
             assert run.scene is not None

@@ -67,7 +67,7 @@ def test_the_usual_flange_is_described_and_all_possible_ones_are_named(
     made = described()
 
     assert (made.name, made.source, made.base, made.flange, made.is_usual) == (
-        *("two-arm", "arm.urdf", "base", "tool0", True),
+        *("two-arm", "arm.urdf", "base", "tool0", False),
     )
     assert [(each.link, each.joints, each.obstacle) for each in made.flanges] == [
         ("tool0", ("j1", "j2"), ""),
@@ -106,7 +106,7 @@ def test_links_have_the_box_round_all_their_bodies_along_their_own_axes(
 ) -> None:
     """A cylinder with a box that stands on it, and a mesh that is turned: the extent of its corners."""
     made = described("revolute")
-    model = read_urdf(Path("arm.urdf"), UrdfOptions(locks_others=True))
+    model = read_urdf(Path("arm.urdf"), UrdfOptions(locks_others=True, flange="tool0"))
     rod = next(body for body in model.bodies if body.name == "upper")
     frame = next(link for link in model.links if link.name == "upper")
     assert isinstance(rod.shape, Mesh)
