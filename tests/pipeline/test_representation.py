@@ -1,8 +1,8 @@
 """Results print as one line without arrays; ``help(cellplan)`` lists the functions."""
 
-import math
 import dataclasses
 import inspect
+import math
 import pydoc
 import re
 from pathlib import Path

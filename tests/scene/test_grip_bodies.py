@@ -132,7 +132,7 @@ def test_fingers_that_do_not_reach_the_part_say_how_far_it_is(apart: float, endi
 
     assert [check.passed for check in checks] == [True, True]
     assert all(check.message.endswith(ending) for check in checks)
-    assert all(("8.5 mm away from it" in check.message) is (apart == 0.0085) for check in checks)
+    assert all(("8.5 mm away from part" in check.message) is (apart == 0.0085) for check in checks)
 
 
 def test_what_a_further_holder_does_not_grip_with_keeps_the_clearance_too() -> None:

@@ -69,11 +69,12 @@ def test_the_usual_flange_is_described_and_all_possible_ones_are_named(
     assert (made.name, made.source, made.base, made.flange, made.is_usual) == (
         *("two-arm", "arm.urdf", "base", "tool0", False),
     )
-    assert [(each.link, each.joints, each.obstacle) for each in made.flanges] == [
-        ("tool0", ("j1", "j2"), ""),
-        ("left", ("j1", "j2", "g"), ""),
-        ("right", ("j1", "j2"), "carried by the mimic joint h"),
+    assert [(each.link, each.joints) for each in made.flanges] == [
+        ("tool0", ("j1", "j2")),
+        ("left", ("j1", "j2", "g")),
+        ("right", ("j1", "j2", "g")),  # carried by a joint that follows g
     ]
+    assert all("along that axis" in each.note or "deg" in each.note for each in made.flanges if each.link == "tool0")
 
 
 def test_a_named_flange_takes_the_joints_that_lead_to_it(described: Callable[..., RobotDescription]) -> None:
