@@ -135,42 +135,59 @@ def test_a_save_without_a_change_is_none(pair: Path) -> None:
     assert files.changed() is None
 
 
-def saved_in_pieces(path: Path, *saves: list[str], pause_s: float) -> threading.Thread:
-    """An editor that saves a file so many times: each time it empties it first and then writes it piece by piece."""
+class Editor:
+    """An editor on a simulated clock: each save empties the file first and then writes it piece by piece."""
 
-    def save() -> None:
-        for pieces in saves:
-            with path.open("w", encoding="utf-8") as file:
-                for piece in pieces:
-                    threading.Event().wait(pause_s)
-                    file.write(piece)
-                    file.flush()
+    def __init__(self, path: Path) -> None:
+        self._path, self._now = path, 0.0
+        self._steps: list[tuple[float, str, str]] = []  # time in [s], mode in which the file is opened, text
 
-    editor = threading.Thread(target=save)
-    editor.start()
+    def save(self, *pieces: str, pause_s: float) -> None:
+        """Save once more after what is still to be saved, with a pause before each piece."""
+        at = self._steps[-1][0] if self._steps else self._now
+        self._steps.append((at, "w", ""))
+        self._steps += [(at + pause_s * count, "a", piece) for count, piece in enumerate(pieces, start=1)]
+        self.sleep(0.0)
+
+    def monotonic(self) -> float:
+        """Simulated time in [s]."""
+        return self._now
+
+    def sleep(self, duration_s: float) -> None:
+        """Let time pass, and with it what is saved meanwhile."""
+        self._now += duration_s
+        while self._steps and self._steps[0][0] <= self._now:
+            _, mode, text = self._steps.pop(0)
+            with self._path.open(mode, encoding="utf-8") as file:
+                file.write(text)
+
+
+@pytest.fixture
+def editor(pair: Path, monkeypatch: pytest.MonkeyPatch) -> Editor:
+    editor = Editor(pair)
+    monkeypatch.setattr("cellplan.cli.watched_files.time", editor)
     return editor
 
 
 @pytest.mark.parametrize(("count", "pause_s"), [(1, 1.0), (5, 0.15)])  # empty for long; half of it for a moment
-def test_half_a_save_is_none(pair: Path, count: int, pause_s: float) -> None:
+def test_half_a_save_is_none(pair: Path, editor: Editor, count: int, pause_s: float) -> None:
     files, text = WatchedFiles(pair), pair.read_text(encoding="utf-8") + "# saved\n"
     size = -(-len(text) // count)
 
-    editor = saved_in_pieces(pair, [text[at : at + size] for at in range(0, len(text), size)], pause_s=pause_s)
+    editor.save(*(text[at : at + size] for at in range(0, len(text), size)), pause_s=pause_s)
 
     assert files.next_saved() == pair
     assert pair.read_text(encoding="utf-8") == text
-    editor.join(LIMIT_S)
 
 
-def test_a_file_that_was_emptied_and_got_its_old_content_was_not_saved(pair: Path) -> None:
+def test_a_file_that_was_emptied_and_got_its_old_content_was_not_saved(pair: Path, editor: Editor) -> None:
     files, text = WatchedFiles(pair), pair.read_text(encoding="utf-8")
 
-    editor = saved_in_pieces(pair, [text], ["", text + "#"], pause_s=0.7)
+    editor.save(text, pause_s=0.7)
+    editor.save("", text + "#", pause_s=0.7)
 
     assert files.next_saved() == pair
     assert pair.read_text(encoding="utf-8") == text + "#"
-    editor.join(LIMIT_S)
 
 
 def test_a_file_that_stays_empty_is_taken_as_it_is(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -184,14 +201,15 @@ def test_a_file_that_stays_empty_is_taken_as_it_is(pair: Path, monkeypatch: pyte
     assert files.changed() is None
 
 
-def test_what_half_a_save_made_wrong_is_not_said(pair: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_half_a_save_made_wrong_is_not_said(
+    pair: Path, editor: Editor, capsys: pytest.CaptureFixture[str]
+) -> None:
     texts: list[str] = []
 
     def work(follow: Any, _: Any) -> Result:
         texts.append(pair.read_text(encoding="utf-8")[-1:])
         if len(texts) == 1:
-            pair.write_text("", encoding="utf-8")
-            saved_in_pieces(pair, ["name: whole"], pause_s=0.5)
+            editor.save("name: whole", pause_s=0.5)
             load_cell(pair)
         raise KeyboardInterrupt
 
