@@ -14,6 +14,7 @@ from cellplan.model.task import Frame, Task
 from cellplan.planning.start.failures import Failures, Goal
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
+    constrained_rank,
     finite_limits,
     joint_margin_shares,
     random_configurations,
@@ -86,6 +87,11 @@ def _configurations_of_holder(search: StartSearch, holder: Robot) -> Array:
         operator = cell.robot(relation.robot)
         if operator.start is not None and relation.relative_to is Frame.PART:
             return _configurations_meeting(search, relation, operator.start)
+    for relation in cell.relations:
+        if relation.relative_to is Frame.PART and _lacks_axes(search, relation):
+            found = _configurations_of_pairs(search, holder, relation)
+            if len(found):
+                return found
     return _promising_configurations(search, holder)
 
 
@@ -221,6 +227,23 @@ def _configurations_meeting(search: StartSearch, relation: Relation, operator_st
     X_WT = chains[relation.robot].tool_poses(operator_start[None])[0]
     X_W_holder = X_WT @ inverse(search.X_PT_start(relation)) @ cell.part.held_by[0].X_PT
     return _configurations_at(search, holder, cell.part.held_by[0], X_W_holder)
+
+
+def _lacks_axes(search: StartSearch, relation: Relation) -> bool:
+    """Whether a robot alone has too few axes for its task, so that hardly any place of the part suits it."""
+    robot, X_PT = search.cell.robot(relation.robot), search.X_PT_start(relation)
+    q = random_configurations(robot.model, SEEDS_PER_HOLDER, np.random.default_rng(search.cell.solver.seed))
+    return constrained_rank(search.chains[robot.name], relation, X_PT, q) < len(relation.axes)
+
+
+def _configurations_of_pairs(search: StartSearch, holder: Robot, relation: Relation) -> Array:
+    """Configurations of the positioner that bring the part to where the tool of an operator happens to be."""
+    operator = search.cell.robot(relation.robot)
+    lower, upper = finite_limits(operator.model)
+    middle = 0.5 * (lower + upper)
+    drawn = middle + HOLDER_RANGE * (search.random_configurations(operator, HOLDER_POSTURES) - middle)
+    met = [_configurations_meeting(search, relation, q)[:1] for q in drawn]
+    return np.concatenate([*met, np.empty((0, len(holder.model.joints)))])
 
 
 def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:

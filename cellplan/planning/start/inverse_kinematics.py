@@ -17,6 +17,7 @@ SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one br
 LONGEST_MOVE: Final = 0.4  # [rad, m] largest change of a joint in one iteration: farther, the linear model is wrong
 DAMPING: Final = 1e-3  # keeps iterations finite at singular configurations; small enough to converge to CLOSED
 ITERATIONS: Final = 50  # most starts that arrive at all do so in 15 to 25
+RANK_TOL: Final = 1e-6  # [m/rad] a singular value below it is the rounding of axes in files
 TRIAL: Final = 25  # iterations after which starts that are still far away are given up
 FAR: Final = 1e-2  # [m, rad] far away: convergence is quadratic well inside this
 
@@ -118,11 +119,22 @@ def joint_margin_shares(model: RobotModel, q: Array) -> Array:
 
 def smallest_singular_values(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
     """Smallest singular value of the operator's constrained Jacobian at each configuration, shape (K,)."""
+    values = np.linalg.svd(_constrained_jacobians(chain, task, X_PT, q), compute_uv=False)
+    return np.asarray(values[:, -1], dtype=float)
+
+
+def constrained_rank(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> int:
+    """Largest rank of the operator's constrained Jacobian over some configurations, shape (K, n)."""
+    return int(np.linalg.matrix_rank(_constrained_jacobians(chain, task, X_PT, q), tol=RANK_TOL).max())
+
+
+def _constrained_jacobians(chain: ScrewChain, task: Relation, X_PT: Array, q: Array) -> Array:
+    """Constrained Jacobians of the tool on the part, shape (K, rows, n)."""
     X_WT = chain.tool_poses(q)
     R_PW = X_PT[:3, :3] @ np.swapaxes(X_WT[:, :3, :3], 1, 2)
     rows = constraint_rows(task, X_PT[None])[0]
-    J = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
-    return np.linalg.svd(J, compute_uv=False)[:, -1]
+    J: Array = rows @ tip_jacobian(chain.flange_screws(q), X_WT[:, :3, 3], R_PW)
+    return J
 
 
 def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
