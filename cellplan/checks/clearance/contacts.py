@@ -9,7 +9,7 @@ from cellplan.certify.bound import Bound, PairBound
 from cellplan.collision.distance import TIGHT_TOL
 from cellplan.geometry.arrays import Array
 from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, Contact
-from cellplan.model.units import MM
+from cellplan.model.units import MM, rounded_down
 from cellplan.scene.pairs import Rule
 
 MAX_BREAK: Final = 0.010  # [s] touches with shorter breaks between them are one contact
@@ -76,12 +76,13 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
         is_exact = worst.distance - distance <= EXACT_TOL
         added = demand - checks.clearance
         reason = f" ({MM * checks.clearance:.1f} mm, and {MM * added:.1f} mm for the accuracy of both bodies)"
-    shown = np.floor(10.0 * MM * distance) / 10.0  # rounded down: never more than there is
+    passed = bool(distance >= demand)
+    shown = rounded_down(MM * distance) if passed else np.floor(10.0 * MM * distance) / 10.0  # never as enough
     least = "" if is_exact else "at least "
     return Check(
         name="clearance",
         subject=str(kind),
-        passed=bool(distance >= demand),
+        passed=passed,
         value=MM * distance,
         limit=MM * demand,
         unit="mm",

@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
 from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import process_speeds
-from cellplan.geometry.arrays import Array, Flags
+from cellplan.geometry.arrays import Array, Flags, first_peak
 from cellplan.geometry.shapes import bounding_box
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.acceleration import (
@@ -112,17 +112,17 @@ def _joints(robot: Robot, times: Array, q: Array, *, judged: Flags, jumps_at: Ar
     sizes = np.where(judged[:, None], rows.values, 0.0)
     jerk = jerks(times, signed[..., None], window=robot.controller_cycle)
     for index, joint in enumerate(robot.model.joints):
-        k, m = int(np.argmax(sizes[:, index])), int(np.argmax(jerk[:, index]))
+        k, m = first_peak(sizes[:, index]), first_peak(jerk[:, index])
         limit, source = acceleration_limit(robot, index)
         yield JointAcceleration(
             robot=robot.name,
             joint=joint.name,
             is_revolute=joint.is_revolute,
-            peak=float(sizes[k, index]),
+            peak=float(sizes[:, index].max()),
             peak_at_s=float(times[k]),
             limit=limit,
             source=source,
-            peak_jerk=float(jerk[m, index]),
+            peak_jerk=float(jerk[:, index].max()),
             peak_jerk_at_s=float(times[m]),
             jerk_limit=None if robot.acceleration.is_unlimited else joint.jerk,
             window=robot.controller_cycle,
@@ -167,12 +167,12 @@ def _point(times: Array, points: Array, *, window: float) -> tuple[PointAccelera
     sizes, jerk = np.linalg.norm(accelerations, axis=-1), jerks(times, accelerations, window=window)
     found = []
     for index in range(points.shape[1]):
-        k, m = int(np.argmax(sizes[:, index])), int(np.argmax(jerk[:, index]))
+        k, m = first_peak(sizes[:, index]), first_peak(jerk[:, index])
         found.append(
             PointAcceleration(
-                peak=float(sizes[k, index]),
+                peak=float(sizes[:, index].max()),
                 peak_at_s=float(times[k]),
-                peak_jerk=float(jerk[m, index]),
+                peak_jerk=float(jerk[:, index].max()),
                 peak_jerk_at_s=float(times[m]),
                 window=window,
             )

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, first_peak
 from cellplan.model.cell import Robot
 from cellplan.model.doubts import doubt_about_velocity
 from cellplan.model.report import Check, JointUse
@@ -80,7 +80,7 @@ def _use(robot: Robot, index: int, times: Array, q: Array, *, speeds: Array) -> 
     """Extremes of one joint and when they happen."""
     joint = robot.model.joints[index]
     margins = np.minimum(q - joint.lower, joint.upper - q)
-    nearest, fastest = int(np.argmin(margins)), int(np.argmax(speeds))
+    nearest, fastest = int(np.argmin(margins)), first_peak(speeds)
     return JointUse(
         robot=robot.name,
         joint=joint.name,
@@ -91,7 +91,7 @@ def _use(robot: Robot, index: int, times: Array, q: Array, *, speeds: Array) -> 
         upper=joint.upper,
         margin=float(margins[nearest]),
         margin_at_s=float(times[nearest]),
-        peak_velocity=float(speeds[fastest]),
+        peak_velocity=float(speeds.max()),
         velocity_limit=joint.velocity,
         peak_velocity_at_s=float(times[fastest + 1]),
         travel=float(np.abs(np.diff(q)).sum()),
