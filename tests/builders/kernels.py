@@ -75,11 +75,17 @@ def probed(variables: Mapping[str, str]) -> tuple[list[str], list[str]]:
 
 
 def hindrance(kernel: str) -> str | None:
-    """Why this machine cannot run a kernel, or ``BASELINE``; None where it can."""
+    """Why this machine cannot run a kernel, or ``BASELINE``; None where it can.
+
+    Raises:
+        RuntimeError: The process that was to tell has failed for another reason.
+    """
     try:
         found, taken = probed(environment(kernel))
     except subprocess.CalledProcessError as error:
-        return f"the processor cannot: exit status {error.returncode}"
+        if error.returncode > 0:  # no signal of the processor: the environment lacks something
+            raise RuntimeError(f"cannot ask for the kernel {kernel}: {error.stderr.strip().splitlines()[-1]}") from None
+        return f"the processor cannot: signal {-error.returncode}"
     if kernel == BASELINE:
         return f"NumPy still takes {', '.join(taken)}" if taken else None
     return None if found == [kernel] else f"OpenBLAS reports {', '.join(found) or 'nothing: NumPy has another library'}"

@@ -117,7 +117,10 @@ def table(data: bytes) -> tuple[list[str], np.ndarray]:
 
 def require_the_same_motion(cell: Path, folder: Path, names: list[str]) -> None:
     """Same bytes for the same kernel; for another one the same words, and joints that nobody can tell apart."""
-    first, *others = (name for name in names if kernels.hindrance(name) is None)
+    usable = [name for name in names if kernels.hindrance(name) is None]
+    if len(usable) < 2:
+        pytest.skip("this machine runs one kernel of the linear algebra only")
+    first, *others = usable
     for place in (first, "again", *others):
         (folder / place).mkdir()
     text, files = solved_under(first, cell, folder / first / "run")
