@@ -89,7 +89,7 @@ def test_the_record_the_page_and_the_screen_tell_the_closure(planar, tmp_path):
     assert '<h2 id="closure">Load sharing</h2>' in page
     assert "Largest closure error" in page
     assert any(
-        line.startswith("  largest closure error ") and " grasp of right" in line
+        line.startswith("  largest closure error ") and line.endswith(f" grasp of right at {closure['at_s']:.3f} s")
         for line in summary_lines(record, tmp_path / "run")
     )
 

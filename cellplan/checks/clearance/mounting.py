@@ -51,7 +51,7 @@ def _passed(found: FoundDepth) -> bool:
 def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     """The verdict on one pair."""
     pair, (inner, outer) = found.pair, _named(scene, found)
-    depth, limit = MM * found.depth, MM * pair.limit
+    depth, limit = MM * found.depth if found.depth > DEPTH_TOL else 0.0, MM * pair.limit
     at_s = None if times is None or not pair.moves else float(times[found.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""

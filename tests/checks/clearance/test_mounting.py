@@ -35,7 +35,8 @@ def test_a_grip_is_as_deep_as_it_is_said_to_be_and_no_more_than_allowed(depth: f
 
     assert (check.name, check.subject, check.passed) == ("grip_depth", "a/hand - part", passed)
     assert check.value == pytest.approx(1e3 * depth, abs=0.011)
-    assert check.message.startswith(f"a/hand is {1e3 * depth:.4g} mm deep in part, allowed 2 mm")
+    held = f"is {1e3 * depth:.4g} mm deep in part" if depth else "does not reach into part"
+    assert check.message.startswith(f"a/hand {held}, allowed 2 mm")
     assert ("is the grasp the right way round?" in check.message) is not passed
 
 
