@@ -9,7 +9,7 @@ from cellplan.model.cell import Mode
 from cellplan.model.verdict import verdict
 from cellplan.pipeline.still.instant import heading, worst_instant
 from cellplan.pipeline.view.run_scene import _facts
-from cellplan.report.page.figures import key_figures
+from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.render import MODES, report_page
 from cellplan.report.record.columns import page_cells, terminal_table
 from cellplan.report.record.figures import SHOWN
@@ -93,3 +93,24 @@ def test_the_pairs_that_are_not_checked_in_full_have_one_number(odd: Any) -> Non
 def test_every_mode_has_words_of_its_own_on_the_page() -> None:
     assert set(MODES) == {str(mode) for mode in Mode}
     assert all(words not in MODES for words in MODES.values())
+
+
+def test_the_table_of_phases_has_the_errors_of_all_operators_between_the_rows_too() -> None:
+    def task(robot: str, at_rows: float, between: float) -> dict[str, Any]:
+        errors = {
+            f"max_{name}_error{where}_{unit}": value
+            for name, unit in (("position", "mm"), ("orientation", "deg"))
+            for where, value in (("", at_rows), ("_between_rows", between))
+        }
+        keys = [f"max_{name}_error{where}" for name in ("position", "orientation") for where in ("", "_between_rows")]
+        times = {f"{key}_at_s": 1.5 for key in keys} | {f"{key}_phase": "work-1" for key in keys}
+        limits = {"position_mm": 0.1, "orientation_deg": 0.1, "between_rows_mm": 0.1, "between_rows_deg": 0.1}
+        return {"robot": robot, "tolerance": limits, **errors, **times}
+
+    record = {"tasks": {"seam": task("left", 2e-8, 0.004), "edge": task("right", 3e-8, 0.002)}}
+
+    ((phase, (position, orientation)),) = phase_errors(record).items()
+
+    assert phase == "work-1"
+    assert [(each["value"], each["where"]) for each in (position, orientation)] == [("0.004", "seam (left)")] * 2
+    assert not position["is_bad"]

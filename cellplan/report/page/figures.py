@@ -28,7 +28,7 @@ def key_figures(record: Record) -> Entries:
         _clearance_figure(record),
         *joints,
         *_closure_figures(record),
-        *_error_figures(record),
+        *_error_figures(record["tasks"]),
     ]
 
 
@@ -56,22 +56,29 @@ def _cycle_figure(record: Record) -> dict[str, Any]:
     return figure("Cycle time", seconds(record["cycle_time_s"]), "s", note=f"{note}; {clock}" if clock else note)
 
 
-def _error_figures(record: Record) -> Entries:
-    """Largest position and orientation error of all tasks."""
-    if not record["tasks"]:
+def phase_errors(record: Record) -> dict[str, Entries]:
+    """Largest position and orientation error of the tasks of each phase that has some, by the name of the phase."""
+    by_phase: dict[str, dict[str, Record]] = {}
+    for name, task in record["tasks"].items():
+        by_phase.setdefault(task[phase_key("max_position_error_at_s")], {})[name] = task
+    return {phase: _error_figures(tasks) for phase, tasks in by_phase.items()}
+
+
+def _error_figures(tasks: Record) -> Entries:
+    """Largest position and orientation error of some tasks."""
+    if not tasks:
         return []
-    return [_error_figure(record, name, unit) for name, unit in (("position", "mm"), ("orientation", "deg"))]
+    return [_error_figure(tasks, name, unit) for name, unit in (("position", "mm"), ("orientation", "deg"))]
 
 
-def _error_figure(record: Record, name: str, unit: str) -> dict[str, Any]:
-    tasks = record["tasks"]
-    found = [
+def _error_figure(tasks: Record, name: str, unit: str) -> dict[str, Any]:
+    errors = [
         (entry[f"max_{name}_error{where}_{unit}"], where, task)
         for task, entry in tasks.items()
         for where in ("", BETWEEN)
         if f"max_{name}_error{where}_{unit}" in entry
     ]
-    value, where, task = max(found, key=lambda one: one[0])
+    value, where, task = max(errors, key=lambda one: one[0])
     worst, allowed = tasks[task], tasks[task]["tolerance"][f"between_rows_{unit}" if where else f"{name}_{unit}"]
     return figure(
         f"Largest {name} error",

@@ -10,7 +10,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
-from cellplan.report.page.figures import key_figures
+from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.first_screen import MAX_SPEEDS, not_judged, process_speeds, worst_instant
 from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.scripts import SCRIPTS, page_scripts
@@ -90,7 +90,7 @@ def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> st
         cell: The cell.
         **beside: What lies beside it, and its pictures.
     """
-    parts = {"links": _links(record, (), beside)}
+    parts = {"links": _links(record, (), beside), "errors": phase_errors(record)}
     return _render("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
 
 
