@@ -32,7 +32,6 @@ def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tu
     every configuration, two solids at up to ``MAX_ROWS`` of them, the first and the last among them.
 
     Args:
-        scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         first: Poses of the bodies of the engine at the first configuration, where they are known.
     """

@@ -86,7 +86,6 @@ def certify_regions(
         scene: The scene; the rules of its pairs may depend on the run, see ``scene_of_run``.
         q: Stacked joint positions in [rad] or [m], shape (N, nq); or rows by robot, shape (N, n), not necessarily as
             many for each. Two rows at least.
-        regions: The regions.
         with_minimum: Whether the smallest distance of each region is searched for too, to half a millimetre. Otherwise
             the search of a region ends with the first pair that does not keep its demand.
         progress: Called with the fraction done.

@@ -37,7 +37,6 @@ class FreeMotion:
         """Work out the ways of all bodies.
 
         Args:
-            scene: The scene.
             q: Positions in [rad] or [m] of each robot, shape (N, n), at least two rows, not necessarily as many for
                 each; or of all robots, stacked, shape (N, nq).
 

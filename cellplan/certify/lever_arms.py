@@ -70,7 +70,6 @@ class LeverArms:
         """Place the axes in the world.
 
         Args:
-            scene: The scene.
             q: Stacked joint positions of the program in [rad] or [m], shape (N, nq); between its rows joints move
                 evenly.
         """

@@ -44,7 +44,6 @@ def with_straight_move(scene: Scene, times: Array, q: Array) -> tuple[Scene, Arr
     Where a pair begins or ends to be watched between two rows, a row is added there: joints move linearly.
 
     Args:
-        scene: The scene.
         times: Times of the rows in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
 

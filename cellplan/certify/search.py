@@ -140,7 +140,6 @@ class StretchSearch:
         """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.
 
         Args:
-            kind: The class.
             lowest: The lowest bound of each pair in the stretch in [m], shape (pairs,).
         """
         survey = self._survey

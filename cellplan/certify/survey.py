@@ -50,7 +50,6 @@ class Survey:
         """Divide the motion into blocks.
 
         Args:
-            scene: The scene.
             q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
         """
         count = len(scene.pairs)

@@ -174,7 +174,6 @@ def run_clearance(
     """Clearance of all bodies of a run, with the checks of it and of the depth of mounted ones.
 
     Args:
-        scene: The scene.
         schedule: The tasks and the clock.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         with_curves: Whether the distances over time are worked out sharply enough to be drawn.

@@ -57,7 +57,6 @@ def point_above(engine: Engine, solid: int, poses: BodyPoses, *, X_WS: Array, sa
         solid: Index of the solid.
         poses: Where the bodies are.
         X_WS: Pose of the half-space; everything below its xy plane is solid.
-        sample: At which sample.
     """
     up = X_WS[:3, 2]
     R, p = poses.R[solid, sample], poses.p[solid, sample]

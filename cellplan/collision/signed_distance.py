@@ -33,7 +33,6 @@ class SignedDistances:
         """Pairs of bodies nearer than a distance in [m].
 
         Args:
-            bodies: All bodies.
             ends: Two of them for each query, shape (M, 2).
             poses: Where they are.
             samples: The sample of each query, shape (M,).

@@ -97,7 +97,6 @@ def joint_fields(robot: Robot, q: Array) -> dict[str, list[str]]:
     """Positions of the joints of a robot as fields of rows, by the name of their column, none beyond a limit.
 
     Args:
-        robot: The robot.
         q: Its joint positions in [rad] or [m], shape (N, n).
 
     Raises:
@@ -127,11 +126,6 @@ def _names(robot: Robot) -> str:
 
 def read_table(robot: Robot, text: str, file: str) -> JointTable:
     """Read the file of one robot, strictly.
-
-    Args:
-        robot: The robot.
-        text: Content of the file.
-        file: Its name in messages.
 
     Raises:
         InputError: With file and line, when the text is not such a file.

@@ -12,10 +12,6 @@ HOME_DECIMALS: Final = 3
 def head_notes(job: ExportJob, robot: str) -> list[str]:
     """Notes for the comments at the head of a robot's files, of any characters; ``text.comment`` makes lines of them.
 
-    Args:
-        job: What is written.
-        robot: Name of the robot.
-
     Raises:
         InputError: The home cannot be written.
     """

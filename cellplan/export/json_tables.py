@@ -30,9 +30,6 @@ _FLAG: Final = re.compile("[01]")
 def render_json(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``program.json``, or ``<task>/program.json``.
 
-    Args:
-        job: What is written.
-
     Raises:
         InputError: A number cannot be written with nine decimals, or robots have different clocks.
     """

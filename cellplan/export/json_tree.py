@@ -138,10 +138,6 @@ class Value:
 def parsed(text: str, file: str) -> Value:
     """The value that a file holds.
 
-    Args:
-        text: Content of the file.
-        file: Its name in messages.
-
     Raises:
         InputError: With file and line, when it is no JSON, or a key stands twice in one object.
     """

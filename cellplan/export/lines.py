@@ -6,10 +6,6 @@ from cellplan.errors import InputError
 def split_lines(text: str, file: str) -> list[str]:
     """Lines without their ends, which are all like the first one; what follows the last one comes last.
 
-    Args:
-        text: The text.
-        file: Its name in messages.
-
     Raises:
         InputError: With file and line, where a line ends otherwise.
     """

@@ -54,11 +54,6 @@ def _kind(frame: ExportFrame, robot: str, dialect: Dialect) -> str:
 def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:
     """The axes of an arm of six, with so many others before it as a language has external axes.
 
-    Args:
-        robot: The robot.
-        external: Most external axes.
-        what: The language in messages.
-
     Raises:
         InputError: It has no arm, or too many axes before it.
     """
@@ -165,7 +160,6 @@ def is_rounded(
     Args:
         job: What is written, with the share of the segments.
         program: Rows of the robots in the program.
-        robot: One of them.
         numbers: Its positions as they are written, shape (N, n).
         pages: Rows of each page.
     """
@@ -182,10 +176,6 @@ def percentages(robot: Robot, rows: RobotRows) -> list[int]:
 
     It is that of the plan: the largest share that an axis needs from one row to the next in the time between them. A
     stretch in which nothing moves keeps the share before it.
-
-    Args:
-        robot: The robot.
-        rows: Its rows.
     """
     if rows.times is None or len(rows) < 2:
         return [SLOW] * len(rows)

@@ -113,13 +113,7 @@ def found_error(file: str, line: int, expected: str, found: str) -> InputError:
 
 
 def truncated_error(file: str, line: int, expected: str) -> InputError:
-    """The error that a file ends too early.
-
-    Args:
-        file: Its name in messages.
-        line: Its last line.
-        expected: What should follow.
-    """
+    """The error that a file ends too early."""
     return found_error(file, line, expected, "the end of the file; it is truncated")
 
 

@@ -23,7 +23,6 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
     It is the smaller one of both; zero at both ends.
 
     Args:
-        robot: The robot.
         q: Its rows in [rad] or [m], shape (N, n).
         shares: Of the segments, 0 to 0.5, shape (N,).
     """
@@ -38,7 +37,6 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
     """Largest share of the segments of a row within which the tool is nearer to it than a zone, 0 to 0.5, shape (N,).
 
     Args:
-        robot: The robot.
         q: Its rows in [rad] or [m], shape (N, n).
         zones: Sizes in [m], 0 for a stop, shape (N,).
     """
@@ -60,7 +58,6 @@ def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
     """Share of the way of the axis that moves most in the shorter segment of a row, in [deg] or [mm], shape (N,).
 
     Args:
-        robot: The robot.
         q: Its rows in [rad] or [m], shape (N, n).
         share: Of the segments, 0 to 0.5, of all rows or of each, shape (N,).
     """
@@ -73,7 +70,6 @@ def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
     """Largest share of its segments in which an axis is nearer to a row than a zone, 0 to 0.5, shape (N,).
 
     Args:
-        robot: The robot.
         q: Its rows in [rad] or [m], shape (N, n).
         turns: Zones of turning axes in [deg], shape (N,).
         slides: Zones of sliding axes in [mm], shape (N,).

@@ -27,7 +27,6 @@ def line_spans(shape: Solid, points: Array, directions: Array) -> Spans:
     """Where endless lines run inside a solid; solids that overlap within one mesh count as one.
 
     Args:
-        shape: The solid.
         points: A point of each line in [m], shape (N, 3), in the frame of the solid.
         directions: Unit directions, shape (N, 3).
     """

@@ -23,7 +23,6 @@ def outlines(shape: Solid, R: Array, p: Array) -> Array:
     The outline is that of the convex hull, its corners points of the solid: one for each of 24 directions.
 
     Args:
-        shape: The solid.
         R: Its rotations in the world, shape (N, 3, 3).
         p: Its positions in [m], shape (N, 3).
 

@@ -60,7 +60,6 @@ class ForkedWork:
 
         Args:
             function: A function without side effects; its value can be pickled.
-            *arguments: Its arguments.
 
         Returns:
             What gives the result, once it is there; exceptions are those of the function.

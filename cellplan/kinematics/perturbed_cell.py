@@ -32,7 +32,6 @@ def draw_errors(cell: Cell, errors: CellErrors, trial: int) -> Draw:
     the grasps), whatever the order of the file, and each trial has a stream of its own.
 
     Args:
-        cell: The cell.
         errors: What is stated.
         trial: Number of the trial, from 0.
     """
@@ -125,7 +124,6 @@ def _displaced(model: RobotModel, D: Array, *, by_own: bool) -> RobotModel:
     """The model after displacements of its links, shape (links + 1, 4, 4), the base first.
 
     Args:
-        model: The model.
         D: Displacements at the reference configuration, expressed in B.
         by_own: Whether a joint's axis goes with the link that it moves, rather than with the one that carries it.
     """

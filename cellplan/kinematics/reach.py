@@ -26,7 +26,6 @@ def arm_reach(model: RobotModel, *, rounds: int = SWEEP_COUNT) -> float:
     configurations. A first joint that slides has no axis to turn about: then the distance from its point is taken.
 
     Args:
-        model: The robot.
         rounds: Number of rounds; five are enough for a drawing.
     """
     placed = Robot(
@@ -61,7 +60,6 @@ def reach_outline(robot: Robot, *, rounds: int = SWEEP_COUNT) -> Array:
     0.2 % of its radius of curvature at most.
 
     Args:
-        robot: The robot.
         rounds: Number of rounds of the search in each direction.
     """
     chain = ScrewChain(robot)

@@ -17,7 +17,6 @@ def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: floa
 
     Args:
         times: Times in [s], shape (N,).
-        task: The task.
         X_PT: Reference poses, held still before the start and after the end of the path, shape (N, 4, 4).
         V_PT_P: Reference twists, zero there, shape (N, 6).
         end: Time in [s] at which the tool leaves the end of its path.

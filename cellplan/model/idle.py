@@ -9,7 +9,6 @@ def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
     """Names of the robots that neither hold the part nor have one of some tasks, in the order of the cell.
 
     Args:
-        cell: The cell.
         tasks: Names of the tasks that are worked on in a run.
     """
     busy = {*cell.positioners, *(task.robot for task in cell.tasks if task.name in tasks)}

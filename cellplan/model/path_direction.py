@@ -32,7 +32,6 @@ def outside_of(task: Task, normal: Array) -> Array:
     """Direction that a path is seen from: the side of its projection, else against the tool axis, else ``normal``.
 
     Args:
-        task: The task.
         normal: Normal of the plane that the path lies in, shape (3,).
     """
     if task.project is not None:

@@ -14,7 +14,6 @@ def leaves_at(task: Task, corners: Array) -> float:
     """Time in [s] at which a tool leaves the end of its path: after the delay of its process, and a dwell.
 
     Args:
-        task: The task.
         corners: Times in [s] at which the stretches of its path begin, and the one at which the last ends; so below.
     """
     return float(corners[-1]) + task.off_delay + task.dwell

@@ -28,7 +28,6 @@ def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None) -> Adva
     Steady: likewise, with accelerations that start and end at zero.
 
     Args:
-        law: The law.
         tau: Shares of the time, shape (N,).
         ramp: Share of the time that a ramp takes, one for all or shape (N,); that of the law when left out.
     """

@@ -10,11 +10,7 @@ if TYPE_CHECKING:
 
 
 def verdict(reports: Sequence["Report"]) -> str:
-    """Checks that passed and the smallest clearance, or checks that failed and the first of them.
-
-    Args:
-        reports: The report of each phase.
-    """
+    """Checks that passed and the smallest clearance, or checks that failed and the first of them."""
     checks = [check for report in reports for check in report.checks]
     failed = [check.message for check in checks if not check.passed]
     if failed:

@@ -27,7 +27,6 @@ def phase_drawings(phase: DrawnPhase, *, floor_plan: str = "") -> dict[str, str]
     """The drawings of one phase, by file name.
 
     Args:
-        phase: The phase.
         floor_plan: Its floor plan, where that was drawn before.
     """
     return {STILL: run_still(*phase), FLOOR_PLAN: floor_plan or phase_floor_plan(phase)}
@@ -39,12 +38,7 @@ def phase_floor_plan(phase: DrawnPhase) -> str:
 
 
 def program_drawings(cell: Cell, phases: Sequence[DrawnPhase]) -> dict[str, str]:
-    """The drawings of a program with several phases: the picture of the one that decides, and all of its motion.
-
-    Args:
-        cell: The cell of the whole program.
-        phases: Its phases.
-    """
+    """The drawings of a program with several phases: the picture of the one that decides, and all of its motion."""
     worst = min(phases, key=lambda phase: graver(worst_instant(phase.report, phase.cell)))
     return {STILL: run_still(*worst), FLOOR_PLAN: _floor_plan(cell, phases)}
 

@@ -48,7 +48,6 @@ def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent
     """Project the paths onto the part, examine or find the start postures, and look for collisions and loads there.
 
     Args:
-        cell: The cell.
         scene: Its scene, where that is at hand.
         progress: Called with the stage and the fraction done.
 

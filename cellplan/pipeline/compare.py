@@ -131,10 +131,6 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
     """Solve a cell or a mode of it, or read and verify a run.
 
     A mode that has no solution from home to home is solved without these moves, and says that they are missing.
-
-    Args:
-        job: What is compared.
-        variant: Its number and values.
     """
     is_mode = len(job.subjects) == 1
     path = job.subjects[0 if is_mode else variant.number]

@@ -40,7 +40,6 @@ def floor_plan(
     """The floor plan of a cell.
 
     Args:
-        cell: The cell.
         start: Joint positions at which all is shown, by robot in [rad] or [m], shape (n,) each.
         motions: Joint positions of which the swept area is shown, shape (N, n) each; none for a cell that stands.
         paths: Points of the path of each task in [m], shape (N, 3), on the part or in the world as the task says.

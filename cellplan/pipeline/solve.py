@@ -70,7 +70,6 @@ def solve_motion(
     """All phases, verified but for their clearance, and the scene of the solved cell; see ``solve``.
 
     Args:
-        cell: The cell.
         task: Name of the only task to work on.
         near: Folder of a run of which the branches are kept.
         progress: Called with the stage and the fraction done.
@@ -142,7 +141,6 @@ def certified(
 
     Args:
         solution: The solution of ``solve_motion``.
-        scene: Its scene.
         is_reported: See ``solve``; never of a clearance without the curves of a report.
         progress: Called with the stage and the fraction done.
         early: Has the clearance.
@@ -215,7 +213,6 @@ def with_verdict(
     """The same rows under headers that carry the verdict, the digests, a remark, and what is left out.
 
     Args:
-        cell: The cell.
         program: The tables as text.
         phases: The phases of the program.
         reports: The report of each of them.

@@ -10,7 +10,6 @@ def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> 
     """Refuse jobs whose motion is not one synchronous pseudo-inverse motion on the clock of the cell.
 
     Args:
-        cell: The cell.
         what: What the job is needed for, as messages name it.
         paths: Robots that may have a given joint path.
 

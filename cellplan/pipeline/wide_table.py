@@ -29,9 +29,6 @@ def verified_rows(run: VerifiedRun) -> ProgramRows:
 def render_wide_tables(run: VerifiedRun) -> dict[str, str]:
     """Text of every wide table, by its path in the folder of the export: one for each program of the run.
 
-    Args:
-        run: The verified run.
-
     Raises:
         InputError: A joint cannot be written with the decimals of the format, or two columns have the same name.
     """

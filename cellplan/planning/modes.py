@@ -19,7 +19,6 @@ def plan_phases(cell: Cell, *, only: str | None = None) -> Plan:
     what leads from one to the next is not part of the program.
 
     Args:
-        cell: The cell.
         only: Name of the only task to work on; None for all.
 
     Raises:
@@ -47,8 +46,6 @@ def standing(cell: Cell, phase: Phase, q: Array) -> Array:
     """Stacked configurations of a phase with its idle robots at those of their homes that are known.
 
     Args:
-        cell: The cell.
-        phase: The phase.
         q: Stacked joint positions in [rad] or [m], shape (..., nq).
     """
     placed = q.copy()

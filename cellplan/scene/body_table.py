@@ -31,7 +31,6 @@ class BodyTable:
         Args:
             forest: Where links are.
             carriers: The body of the scene that each body is, or is cut from.
-            bodies: The bodies.
         """
         return cls(
             links=np.array([forest.place(each.robot, each.link) for each in carriers], dtype=np.intp),

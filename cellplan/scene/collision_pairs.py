@@ -44,7 +44,6 @@ class CollisionPairs:
         """Sort all pairs of bodies.
 
         Args:
-            cell: The cell.
             bodies: All solids, half-spaces last.
             engine: The bodies that are no half-spaces.
             chains: Kinematic chain of each robot.

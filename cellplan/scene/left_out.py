@@ -42,7 +42,6 @@ def left_out(
     Bodies that never move and keep the demanded clearance are not listed: nothing was excused there.
 
     Args:
-        cell: The cell.
         bodies: All solids.
         pairs: Pairs that are watched.
         excluded: Pairs that are not.

@@ -129,7 +129,6 @@ def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Seque
     """Refuse a cell in which what the user mounted touches links of its own robot in every configuration.
 
     Args:
-        cell: The cell.
         bodies: All solids.
         faults: Each such body and the links that it touches.
 

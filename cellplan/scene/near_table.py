@@ -189,7 +189,6 @@ def counts_by_hull(body: CollisionBody, tip: Array | None) -> bool:
     hull keeps clear of the tip only what bulges into that hollow is taken for a contact.
 
     Args:
-        body: The body.
         tip: The tip that it is cut off before, in its own frame in [m], shape (3,); None for a body that is not cut.
     """
     if body.is_convex or tip is None:

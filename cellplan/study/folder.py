@@ -71,10 +71,6 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
 def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write the results of a study, each file whole or not at all.
 
-    Args:
-        folder: The folder of the study.
-        files: Content by file name.
-
     Raises:
         InputError: The folder cannot be written.
     """

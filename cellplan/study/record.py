@@ -34,7 +34,6 @@ class Recorder:
         """Begin with what the journal holds.
 
         Args:
-            journal: The journal.
             state: When the study was begun, and where it ends.
             progress: Called after every trial.
             compared: What makes one trial better than another; None for nothing.

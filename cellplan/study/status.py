@@ -81,7 +81,6 @@ class StudyStatus:
 
         Args:
             done: Number of trials that are recorded.
-            best: The best of them.
             compared: What makes one better than another; None for nothing.
             state: Its state; None once it has ended.
             is_running: Whether it runs; else it has ended or was killed.

@@ -82,10 +82,6 @@ class Workers(ThreadPoolExecutor):
         """Begin ``function(*arguments)`` in one of the processes; the returned function waits for its value.
 
         What goes wrong with the process or on the way is done in this one.
-
-        Args:
-            function: A function of a module.
-            *arguments: Plain data.
         """
         begun = self.submit(_called, function, arguments)
 
@@ -147,11 +143,6 @@ def packed(evaluate: Evaluate) -> bytes:
 
 def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:
     """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost.
-
-    Args:
-        evaluate: The packed evaluator.
-        variant: Number and values of the trial.
-        limits: Its limits.
 
     Raises:
         StudyStoppedError: The evaluator says that no trial can be worked out any more.

@@ -63,7 +63,6 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
     Args:
         bound: What is proved of all pairs.
         times: Times of the samples in [s], shape (N,).
-        kind: The class.
         found: Its smallest distance; zero where a pair touches.
     """
     checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]

@@ -32,7 +32,6 @@ def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[
     one check together.
 
     Args:
-        scene: The scene.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         times: Times of the samples in [s], shape (N,); None where there is no motion.
     """

@@ -32,7 +32,6 @@ def standoffs(
     """Distances of the tip of every task on the part, from where errors are judged on its path to the end of it.
 
     Args:
-        cell: The cell.
         schedule: The tasks that are worked on, and the clock.
         chains: Kinematics of each robot.
         q: Positions of each robot in [rad] or [m], shape (N, n).
@@ -55,8 +54,6 @@ def standoff_on(cell: Cell, task: Task, X_PT: Array, *, times: Array | None = No
     """Distances of a tip at some poses of a tool along the path of its task.
 
     Args:
-        cell: The cell.
-        task: The task.
         X_PT: Tool poses on the part, shape (N, 4, 4).
         times: Their times in [s], shape (N,); None before there is a motion.
     """

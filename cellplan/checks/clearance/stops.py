@@ -56,7 +56,6 @@ def stop_report(
     The others are followed to the end of the rows.
 
     Args:
-        scene: The scene.
         schedule: The tasks that are worked on, and the clock.
         q: Positions of each robot in [rad] or [m], shape (N, n).
         progress: Called with the stage and the fraction done.
@@ -82,7 +81,6 @@ def check_stops(cell: Cell, found: StopReport | None) -> list[Check]:
     """Depth and distance against what the cell demands of stops; none where it demands nothing.
 
     Args:
-        cell: The cell.
         found: What happens at worst; None where it is not known, which fails every demand.
     """
     demand = cell.checks.stop

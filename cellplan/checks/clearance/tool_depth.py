@@ -39,7 +39,6 @@ def tool_depths(
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
 
     Args:
-        cell: The cell.
         schedule: The tasks that are worked on, and the clock.
         chains: Kinematics of each robot.
         q: Positions of each robot, shape (N, n).
@@ -62,8 +61,6 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
     None where the task leaves the place or the lean of the axis open: then only the motion says how deep it is.
 
     Args:
-        cell: The cell.
-        task: One of its tasks.
         X_PT: Desired tool poses on the part, shape (N, 4, 4).
     """
     if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):

@@ -36,7 +36,6 @@ def motion_accelerations(
     """Accelerations, jerk and process speeds of the written tables.
 
     Args:
-        cell: The cell.
         chains: Kinematics by robot.
         schedule: The clock, and the tasks that are worked on.
         q: Positions that were read back in [rad] or [m], shape (N, n), by robot.
@@ -63,8 +62,6 @@ def joint_peaks(
     """Largest acceleration and jerk of every joint of one robot, on rows of its own.
 
     Args:
-        cell: The cell.
-        robot: One of its robots.
         times: Times in [s], shape (N,).
         q: Positions in [rad] or [m], shape (N, n).
         jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
@@ -145,7 +142,6 @@ def part_acceleration(cell: Cell, times: Array, X_WP: Array, *, window: float) -
     """The centre of the part's bounding box, and the corner of it that is accelerated most.
 
     Args:
-        cell: The cell.
         times: Times of the rows in [s], shape (N,).
         X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
         window: Time in [s] over which jerk is taken.

@@ -72,7 +72,6 @@ def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int
     In a retimed program the jerk counts as well, as it is limited there.
 
     Args:
-        cell: The cell.
         times: Times of the rows in [s], shape (N,).
         q: Positions by robot in [rad] or [m], shape (N, n) each.
         step: Number of the first row of the step.

@@ -17,7 +17,6 @@ def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
     At such a row the acceleration is the change of velocity from the step before it to the step after it, over a step.
 
     Args:
-        cell: The cell.
         reports: Reports of the phases of one cycle in their order, each of which begins in the last row of the one
             before; the last is followed by the first.
 

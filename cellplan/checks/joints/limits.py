@@ -19,7 +19,6 @@ def joint_uses(robot: Robot, times: Array, q: Array) -> tuple[JointUse, ...]:
     Between two samples a joint moves linearly, so its speed there is the difference quotient.
 
     Args:
-        robot: The robot.
         times: Times in [s], shape (N,).
         q: Positions, shape (N, n).
     """
@@ -40,7 +39,6 @@ def check_shown(robot: Robot, times: Array, q: Array) -> list[Check]:
     """Positions that a controller shows, against the limits that are stated of these: of coupled axes too.
 
     Args:
-        robot: The robot.
         times: Times in [s], shape (N,).
         q: Positions of the model, shape (N, n); every shown one is linear between two rows as these are.
     """

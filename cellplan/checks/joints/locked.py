@@ -20,7 +20,6 @@ def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check
     """Whether each joint that fails stays where it is from its instant on.
 
     Args:
-        cell: The cell.
         times: Times in [s], shape (N,).
         q: Positions by robot, shape (N, n) each.
     """
@@ -34,7 +33,6 @@ def with_locked_joints(
 
     Args:
         checks: The checks of the task.
-        errors: Its errors.
         tolerance: What it allows.
         times: Times in [s], shape (N,).
         locked: Joints that fail.

@@ -50,7 +50,6 @@ def load_uses(
     tool's inertia about its own centre is not known and not counted.
 
     Args:
-        cell: The cell.
         chains: The chain of each robot.
         times: Times of the rows in [s], shape (N,).
         q: Joint positions by robot in [rad] or [m], shape (N, n) each.

@@ -36,7 +36,6 @@ def conditioning(
     Joints that stand still are left out. The units are mixed: metres and radians, without weights.
 
     Args:
-        cell: The cell.
         schedule: The tasks that were worked on.
         chains: Kinematics of each robot.
         q: Positions of each robot, shape (N, n).

@@ -18,7 +18,6 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
     """Largest speeds of one robot's tool tip and joint axes; between two samples a point moves along the chord.
 
     Args:
-        robot: The robot.
         chain: Its kinematics.
         times: Times in [s], shape (N,).
         q: Positions, shape (N, n).
@@ -38,12 +37,7 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
 
 
 def check_tool_speeds(cell: Cell, speeds: Mapping[str, RobotSpeed]) -> list[Check]:
-    """The largest speed of each tool tip in the world, where the cell allows no more.
-
-    Args:
-        cell: The cell.
-        speeds: Speeds by robot.
-    """
+    """The largest speed of each tool tip in the world, where the cell allows no more."""
     limit = cell.checks.tool_speed
     if limit is None:
         return []

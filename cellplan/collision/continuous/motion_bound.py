@@ -100,10 +100,6 @@ class PairMotion:
     def displacement(self, sample: int, others: slice | Indices) -> tuple[Array, Array]:
         """Farthest that a point of the second body seen from the first, and of the first seen from the second, moved.
 
-        Args:
-            sample: The sample that is compared with.
-            others: The samples to compare with it, m of them.
-
         Returns:
             Two arrays in [m], shape (m,).
         """

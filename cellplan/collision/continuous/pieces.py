@@ -94,7 +94,6 @@ def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goa
         engine: The bodies.
         pair: The piece and the other body, or the other way round.
         poses: Where they are.
-        sample: The sample.
         goal: Distance in [m] that is to be proved.
     """
     reading = quick_reading(engine, pair, poses, sample=sample)

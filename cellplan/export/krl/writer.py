@@ -47,9 +47,6 @@ class _Program:
 def render_krl(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>.src`` and ``.dat``, or ``<robot>/<program>.src`` and ``.dat``.
 
-    Args:
-        job: What is written.
-
     Raises:
         InputError: A robot cannot be written: it has no KUKA controller, is no arm of six axes with at most six others
             before it, lacks a signal, or a position cannot be written with the decimals.

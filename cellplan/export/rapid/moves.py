@@ -70,12 +70,6 @@ class Move(NamedTuple):
 def read_move(statement: Statement, unit: RapidUnit, data: RapidData, place: Place) -> Move:
     """One move; everything that it refers to is declared.
 
-    Args:
-        statement: The statement.
-        unit: The robot that moves.
-        data: Its declarations.
-        place: Where the move stands.
-
     Raises:
         InputError: With file and line, when it is no such move.
     """

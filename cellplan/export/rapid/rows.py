@@ -32,11 +32,6 @@ _ABSENT: Final = 9e9
 def rows_of(unit: RapidUnit, moves: Sequence[Move], marks: tuple[int, ...]) -> RobotRows:
     """Rows of a robot; ``q`` of an arm is NaN at targets on the part.
 
-    Args:
-        unit: The robot.
-        moves: Its moves.
-        marks: Rows at which it waits.
-
     Raises:
         InputError: With file and line, when a target is none of this robot.
     """
@@ -78,7 +73,6 @@ def _rounding(unit: RapidUnit, moves: Sequence[Move], q: Array, p: Array) -> Arr
 
     Args:
         unit: The robot.
-        moves: Its moves.
         q: Its rows, NaN at targets on the part, shape (N, n).
         p: Tool on the part in [m] at these, NaN at all others, shape (N, 3).
     """

@@ -65,10 +65,6 @@ class Module:
 def read_module(text: str, file: str) -> Module:
     """A module of declarations and routines, with unknown statements left in the routines.
 
-    Args:
-        text: Content of the file.
-        file: Its path in messages.
-
     Raises:
         InputError: With file and line, when the text is no such module.
     """

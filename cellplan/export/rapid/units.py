@@ -109,7 +109,6 @@ def works_on_part(frame: ExportFrame, robot: str) -> bool:
     """Whether a robot may be programmed with targets on the part: it has an arm and a task there, and does not hold it.
 
     Args:
-        frame: The export.
         robot: Name of the robot.
     """
     cell = frame.cell

@@ -30,11 +30,6 @@ def row_zones(job: ExportJob, program: ProgramRows, units: Sequence[RapidUnit]) 
 
     Robots that are in step stop at the same rows: at those where one of them that moves has no zone. One that stands
     has the smallest zone at the others.
-
-    Args:
-        job: What is written.
-        program: Rows of the robots.
-        units: The robots.
     """
     shares = row_shares(job, program)
     sizes = {

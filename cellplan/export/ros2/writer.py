@@ -33,9 +33,6 @@ REST: Final = 1e-6  # [rad/s] or [m/s] a slower joint rests
 def render_ros2(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>.yaml``, or ``<robot>_1_of_3.yaml`` where ``--split`` is given.
 
-    Args:
-        job: What is written.
-
     Raises:
         InputError: Rows have no speeds or do not rest at their ends, a number cannot be written, or robots rest
             nowhere within the largest number of points.

@@ -24,10 +24,6 @@ def move_speeds(robot: Robot, rows: RobotRows) -> Array:
 
     The leading joint of a move is the one that travels farthest. Where rows have no times, or none travels, the speed
     is that of the approach.
-
-    Args:
-        robot: The robot.
-        rows: Its rows.
     """
     found = np.full(len(rows), APPROACH_SPEED)
     if len(rows) < 2:
@@ -63,8 +59,6 @@ def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
     rows are stops: ``corners.may_round``.
 
     Args:
-        robot: The robot.
-        rows: Its rows.
         blend: Share of a segment, 0 to 0.5, of all rows or of each, shape (N,).
     """
     radii, share = np.zeros(len(rows)), np.broadcast_to(blend, len(rows))[1:-1, None]
@@ -87,7 +81,6 @@ def tool_tips(robot: Robot, q: Array) -> Array:
     """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
 
     Args:
-        robot: The robot.
         q: Positions of the model in [rad] or [m], shape (N, n).
     """
     model = robot.model

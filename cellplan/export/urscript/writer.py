@@ -45,9 +45,6 @@ from cellplan.model.exported import ExportFrame, ExportJob, Promise, RobotRows
 def render_urscript(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.script``, in a folder of each task.
 
-    Args:
-        job: What is written.
-
     Raises:
         InputError: A robot has other joints than six, a position beyond two turns, or lacks something
             that its program needs.

@@ -86,7 +86,6 @@ def read_code(code: Element, counters: Collection[str]) -> tuple[list[Node], int
     """Statements of a program between ``begin`` and ``end``, and the line of its ``end``.
 
     Args:
-        code: The element.
         counters: Names of the numbers that loops may count with.
 
     Raises:

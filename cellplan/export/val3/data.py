@@ -54,10 +54,6 @@ class Data:
 def read_data(text: str, file: str) -> dict[str, Data]:
     """Data of a project by name.
 
-    Args:
-        text: The text of its file.
-        file: Name of the file in messages.
-
     Raises:
         InputError: With file and line.
     """

@@ -44,9 +44,6 @@ def project_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None
 def signal_names(steps: Iterable[Step]) -> dict[tuple[bool, str], str]:
     """Names of the data of signals: the signal itself where it can be one, else a name of this format.
 
-    Args:
-        steps: Instructions of a handshake.
-
     Returns:
         The names by whether it is an input, and by the signal, in the order of their first use.
     """

@@ -95,9 +95,6 @@ class _Project:
 def render_val3(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>/<robot>.pjx`` and so on, or ``<robot>/<program>/<program>.pjx``.
 
-    Args:
-        job: What is written.
-
     Raises:
         InputError: A robot cannot be written: it has no Staubli controller, is no arm of six axes alone, lacks a
             signal, or a position cannot be written with the decimals.

@@ -106,9 +106,6 @@ class ProgramRows:
 def wide_columns(program: ProgramRows) -> Columns:
     """The columns of the wide table by name, in the units of the names.
 
-    Args:
-        program: The program.
-
     Raises:
         InputError: Two columns would have the same name.
     """
@@ -133,7 +130,6 @@ def joint_columns(robot: Robot, q: Array) -> dict[str, Array]:
     """Positions of the joints of a robot by the name of their column.
 
     Args:
-        robot: The robot.
         q: Its joint positions in [rad] or [m], shape (N, n).
     """
     return {
@@ -147,10 +143,6 @@ def kept_distance(kind: ClearanceClass, phase: PhaseRows) -> Array | None:
 
     The curve of a report holds one distance for each stretch of the motion, at its middle. A row lies in the stretch of
     the point before it or in that of the point after it; the smaller of the two is never above the truth.
-
-    Args:
-        kind: The class.
-        phase: The phase.
     """
     clearance, rows = phase.report.clearance, phase.report.times
     curve, times = clearance.curves.get(kind), clearance.curve_times

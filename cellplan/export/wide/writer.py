@@ -40,11 +40,6 @@ def render_wide(program: ProgramRows) -> str:
 def read_wide(cell: Cell, text: str, file: str) -> dict[str, JointTable]:
     """Read times and joint positions of a table back, strictly, by robot.
 
-    Args:
-        cell: The cell.
-        text: Content of the file.
-        file: Its name in messages.
-
     Raises:
         InputError: With file and line, when the text is not such a table.
     """

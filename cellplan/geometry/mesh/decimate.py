@@ -29,7 +29,6 @@ def decimated(mesh: Mesh, limit: int, *, finest: float = FINEST) -> Decimated:
     most. Triangles that shrink to a line are dropped.
 
     Args:
-        mesh: The mesh.
         limit: Number of triangles that are enough; more are left only where the grid is as coarse as it may be.
         finest: Cells along the longest edge that are tried first.
     """

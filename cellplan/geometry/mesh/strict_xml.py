@@ -9,7 +9,6 @@ def parse_strictly(parser: expat.XMLParserType, data: bytes, file: str) -> None:
     """Run a parser, whose handlers for elements and text are set, over the bytes of a file.
 
     Args:
-        parser: The parser.
         data: The bytes.
         file: Name of the file in messages.
 

@@ -31,12 +31,6 @@ def apply_srdfs(
 
     What is wrong with an SRDF, or with a name, is added to the findings of the sources, and what says nothing to their
     remarks.
-
-    Args:
-        valid: The entries of the cell.
-        models: Robot models by name.
-        sources: Reads the files.
-        document: The cell file.
     """
     found, robots = dict(models), dict(valid.robots)
     for name, model in models.items():

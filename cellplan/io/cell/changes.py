@@ -40,7 +40,6 @@ def read_setting(text: str, *, option: str = "--set") -> tuple[str, object]:
     """Address and value of ``KEY=VALUE``; the value is read as strictly as one in a cell file, ``null`` leaves it out.
 
     Args:
-        text: The text.
         option: The option that it belongs to, as messages name it.
 
     Raises:

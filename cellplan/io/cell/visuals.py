@@ -15,12 +15,7 @@ from cellplan.model.cell import Cell
 
 
 def robot_visuals(cell: Cell, robot: str) -> tuple[Visual, ...]:
-    """Visual elements of a robot; none of a robot without a URDF, or whose URDF cannot be read any more.
-
-    Args:
-        cell: The cell, read from a file.
-        robot: Name of the robot.
-    """
+    """Visual elements of a robot; none of a robot without a URDF, or whose URDF cannot be read any more."""
     source = cell.origin.source
     if not isinstance(source, CellFile):
         return ()

@@ -68,7 +68,6 @@ def as_written(model: RobotModel, q: Array) -> Array:
     repeated from the written cell to the last bit.
 
     Args:
-        model: The robot.
         q: Configuration in [rad] or [m], shape (n,).
     """
     return configuration_in_si(model, in_file_units(model, q))

@@ -11,10 +11,6 @@ from cellplan.io.input.findings import shown
 def parse_json(data: bytes, file: str) -> dict[str, Any]:
     """The object that a JSON file holds.
 
-    Args:
-        data: Content of the file.
-        file: Its name in messages.
-
     Raises:
         InputError: With file and line, when the text is not one JSON object with finite numbers and each key once.
     """

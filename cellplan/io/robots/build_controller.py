@@ -75,7 +75,6 @@ def controller_findings(
 
     Args:
         path: Where the entry stands.
-        entry: The entry.
         turns: Whether a joint is revolute, by name, from the base to the flange.
         document: The file.
     """

@@ -32,7 +32,6 @@ def payload_findings(
 
     Args:
         path: Where the entry stands.
-        entry: The entry.
         turning: Names of the turning joints, from the base to the flange.
         document: The file.
     """

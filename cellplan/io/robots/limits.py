@@ -46,7 +46,6 @@ def limit_findings(own: StatedLimits, cell: StatedLimits, *, is_revolute: bool) 
 
     Args:
         own: Limits of the model.
-        cell: Limits of the cell.
         is_revolute: Whether the joint turns; decides the unit of keys and texts.
     """
     unit = joint_unit(is_revolute=is_revolute)

@@ -57,10 +57,6 @@ def render_clock(table: ClockTable, *, cell: str, program: str) -> str:
 def parse_clock(text: str, source: str) -> ClockText:
     """Read a clock back, strictly: nothing is skipped, guessed or repaired.
 
-    Args:
-        text: The content of the file.
-        source: File name for messages.
-
     Raises:
         InputError: With file and line, when the text is not a whole clock, its times do not grow from 0, or its nominal
             time does not start at 0 or falls.

@@ -116,10 +116,6 @@ def program_digest(tables: Mapping[str, str]) -> str:
 def parse_table(text: str, source: str) -> JointTable:
     """Read a joint table back, strictly: nothing is skipped, guessed or repaired.
 
-    Args:
-        text: The content of the file.
-        source: File name for messages.
-
     Returns:
         Times in [s] and joint positions in [rad] or [m].
 

@@ -61,7 +61,6 @@ def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool],
 
     Args:
         target: The file; missing folders above it are made.
-        content: Its content.
         is_own: Whether a file is of that kind and written by cellplan.
         kind: What it is called in messages.
 

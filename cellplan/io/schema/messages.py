@@ -37,10 +37,6 @@ AnyEntry = TypeVar("AnyEntry", bound=Entry)
 def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Finding]]:
     """Read a whole file.
 
-    Args:
-        model: The expected kind of file.
-        document: The file.
-
     Returns:
         The entry, or None when there are findings; and the findings that the YAML reader has not made already.
     """

@@ -100,10 +100,6 @@ class YamlDocument:
 def read_yaml(path: Path, *, file: str) -> YamlDocument:
     """Read a file whose outermost value is a mapping.
 
-    Args:
-        path: Where the file is.
-        file: Its name in messages.
-
     Raises:
         InputError: When the file is missing, not a regular file, too large, not UTF-8 or not YAML.
     """

@@ -35,7 +35,6 @@ def coupling_graph(cell: Cell, plane: PlaneName | None = None, *, measure_grasps
     joint that is not measured. A task in the world has its chain from the world to the tool.
 
     Args:
-        cell: The cell.
         plane: Plane of P in which everything moves; None for space.
         measure_grasps: Whether each further holder is let go and given a whole virtual chain to the part instead, so
             that it is measured how it would stray from its grasp.

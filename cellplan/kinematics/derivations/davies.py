@@ -72,7 +72,6 @@ def network(
     of its leader. The circuits of further holders are among them, so speeds that fulfil it keep their grasps.
 
     Args:
-        cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
         plane: Plane of P in which everything moves (PPR chains, three rows); None for space (PPPS, six rows).
         tree_order: Order in which joints are offered to the spanning tree; any order gives the same speeds.
@@ -103,7 +102,6 @@ def partition(net: Network, primary: Collection[str]) -> tuple[Array, Array]:
     r"""Split the closure into ``N_s qdot_s = N_p qdot_p`` for any choice of primary joints.
 
     Args:
-        net: The network.
         primary: Names of the joints whose speeds are given. All others, in the order of ``net.joints``, are secondary.
 
     Returns:
@@ -123,7 +121,6 @@ def davies_cooperation_jacobian(
     virtual joints locked, that is with the speeds of these blocks at zero, the loops are closed (4.5).
 
     Args:
-        cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
         plane: Plane of P in which everything moves; None for space.
         tree_order: Order in which joints are offered to the spanning tree; the result does not depend on it.
@@ -151,7 +148,6 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     Where the imposed speeds leave freedom, the sought speeds with the smallest weighted sum of squares are taken.
 
     Args:
-        net: The network.
         imposed: Speeds by joint name, in [rad/s] or [m/s].
         weights: Positive weights of all joints in the order of ``net.joints``; ones if None.
 

@@ -118,7 +118,6 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     """Cooperation Jacobian from geometric Jacobians and rotations ([Ribeiro2010]_ Eqs. 3.28-3.34, 4.16).
 
     Args:
-        cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
 
     Returns:

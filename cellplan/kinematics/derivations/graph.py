@@ -59,7 +59,6 @@ def spanning_tree(graph: CouplingGraph, order: Sequence[int] | None = None) -> f
     """Joints that tie all links together without a circuit ([Ribeiro2010]_ App. C.2).
 
     Args:
-        graph: The graph.
         order: All joints by index, in the order in which they are offered to the tree; the order of the graph if None.
             Joints offered late become chords.
     """

@@ -93,7 +93,6 @@ def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent
     """The scene, the job at its nodes, the start at the present base, and the places.
 
     Args:
-        cell: The cell.
         robot: Name of the operator.
         grid: Where its base is tried.
         progress: Called with the stage and the fraction done.
@@ -135,11 +134,6 @@ def requested_cell(request: MapRequest) -> Cell:
 
 def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
     """Refuse a map that cannot be made; call it early, before any long work.
-
-    Args:
-        cell: The cell.
-        name: Name of the operator.
-        grid: Where its base is tried.
 
     Raises:
         InputError: The robot is no operator, the grid is not usable, or the job is not one synchronous pseudo-inverse

@@ -68,12 +68,7 @@ class Tiles:
 
 
 def evaluate(request: MapRequest, variant: Variant) -> Outcome:
-    """Judge the places of a tile.
-
-    Args:
-        request: What the map is made of.
-        variant: Number and values of the tile.
-    """
+    """Judge the places of a tile."""
     return judged(prepared_request(request).asked, variant.values)
 
 

@@ -76,7 +76,6 @@ def judge(
     times of the rows that were written: no tool is then farther from its desired path than from the desired pose.
 
     Args:
-        run: The verified run.
         dialect: The format.
         job: What was written.
         read: What the reader found, program by program.

@@ -38,7 +38,6 @@ def corner_vectors(rows: RobotRows, shares: Array) -> Array:
     """How far a robot may be off at each of its rows by rounding, with sign, in [rad] or [m], shape (N, n).
 
     Args:
-        rows: The rows.
         shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
     """
     found = np.zeros_like(rows.q)
@@ -55,7 +54,6 @@ def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
     It may be off by any share of that, and falls evenly from each row to where its rounding begins and ends.
 
     Args:
-        rows: The rows.
         shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
         times: Times in [s], shape (M,).
     """
@@ -199,7 +197,6 @@ def raised(arms: LeverArms, scene: Scene, off: Array, *, in_step: bool = True) -
 
     Args:
         arms: Lever arms of the cell.
-        scene: The scene.
         off: How far all joints may be off, in [rad] or [m], shape (M, nq).
         in_step: Whether both bodies of a pair are off in the same step; or else each in any.
     """

@@ -16,7 +16,6 @@ def export_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> 
     """Notes for the head of every file, of any characters.
 
     Args:
-        run: The run.
         prepared: What is written.
         judgement: What was found in what was read back.
     """

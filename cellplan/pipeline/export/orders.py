@@ -71,7 +71,6 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
     """Marks of every program of a run, between which every order of the robots is certified.
 
     Args:
-        run: The run.
         progress: Called with the stage and the fraction done.
 
     Raises:
@@ -167,10 +166,8 @@ class PhaseSearch:
         """Take the rows of a phase.
 
         Args:
-            cell: The cell.
             scene: Its scene while the tasks of the phase are worked on.
             program: The program of all robots.
-            phase: The phase.
         """
         self._scene, self._phase = scene, phase
         self._times = program.times[phase.first : phase.last + 1]

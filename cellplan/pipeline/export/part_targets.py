@@ -64,8 +64,6 @@ def joints_of_part_poses(
     two must agree in the middle between rows, where they are farthest apart.
 
     Args:
-        frame: The export.
-        written: The programs that were written.
         read: What their reader found.
 
     Raises:

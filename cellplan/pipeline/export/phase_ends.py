@@ -76,7 +76,6 @@ def ends_allow(run: VerifiedRun, first: str, second: str, *, most: float = MOST_
     """The largest skew in [s], up to one, that is proved across the ends of all phases, and the end that limits it.
 
     Args:
-        run: The run.
         first: A robot.
         second: One on another clock.
         most: Largest skew in [s] that is asked for.

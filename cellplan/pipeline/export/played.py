@@ -58,7 +58,6 @@ class Played:
         """A program that was read.
 
         Args:
-            run: The verified run.
             full: All rows of all robots, as in the run.
             files: What was read, and what was written; times that were not read are those that were written.
             shares: Within which rows are rounded, by robot, where what was read does not say so.

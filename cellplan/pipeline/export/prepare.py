@@ -57,7 +57,6 @@ def prepare(
     """Choose promise, marks and rows of an export.
 
     Args:
-        run: The verified run.
         dialect: The format.
         choice: What the caller chose.
         shared: What exports of the run share; None for this one only.
@@ -124,11 +123,6 @@ def frame_of(run: VerifiedRun | ReadRun, robots: Sequence[str], promise: Promise
 
 def refuse_unfit(run: ReadRun, dialect: Dialect, choice: Choice) -> None:
     """Refuse an export of which the files of a run say already that it cannot be, before anything is verified.
-
-    Args:
-        run: The run as it was read.
-        dialect: The format.
-        choice: What the caller chose.
 
     Raises:
         InputError: All that is not stated in the cell, or does not fit.

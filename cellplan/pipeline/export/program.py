@@ -62,10 +62,6 @@ def require_format(name: str) -> None:
 def refuse_choice(form: str, choice: Choice) -> None:
     """Refuse what a format cannot do whatever the run; call it early, before any long work.
 
-    Args:
-        form: Name of the format.
-        choice: What was chosen.
-
     Raises:
         InputError: It cannot.
     """
@@ -149,7 +145,6 @@ def exported(
     """The files of an export and its record, after all checks were made on what is read from them.
 
     Args:
-        run: The verified run.
         form: Name of the format.
         choice: What was chosen.
         shared: What exports of the run share; None for this one only.

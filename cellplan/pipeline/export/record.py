@@ -23,13 +23,7 @@ Record = dict[str, Any]
 
 
 def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Record:
-    """What ``export.json`` says of an export by a dialect.
-
-    Args:
-        run: The run.
-        prepared: What was to be written.
-        written: What was written.
-    """
+    """What ``export.json`` says of an export by a dialect."""
     frame = written.job.frame
     about = {
         "promise": str(frame.promise),
@@ -53,14 +47,7 @@ def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Rec
 
 
 def table_record(run: VerifiedRun, name: str, decimals: int, files: Mapping[str, str]) -> Record:
-    """What ``export.json`` says of tables of all robots that no controller plays.
-
-    Args:
-        run: The run.
-        name: Name of the format.
-        decimals: Of its numbers.
-        files: Text by path.
-    """
+    """What ``export.json`` says of tables of all robots that no controller plays."""
     about = {"robots": [robot.name for robot in run.cell.robots], "decimals": decimals}
     return _record(run, name, about, files)
 

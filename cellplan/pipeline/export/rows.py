@@ -43,7 +43,6 @@ def full_rows(run: VerifiedRun, robots: Collection[str] | None = None) -> tuple[
     """All rows of every program of a run, without marks.
 
     Args:
-        run: The verified run.
         robots: Names of the robots; None for all.
     """
     names = [robot.name for robot in run.cell.robots if robots is None or robot.name in robots]

@@ -24,11 +24,7 @@ class Shared:
     """
 
     def __init__(self, run: VerifiedRun) -> None:
-        """Begin with nothing.
-
-        Args:
-            run: The verified run.
-        """
+        """Begin with nothing."""
         self.run = run
         self._found: dict[object, Any] = {}
 

@@ -66,7 +66,6 @@ def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None
     """How far the starts of the controllers of a run may be apart; None where its cell states no two controllers.
 
     Args:
-        run: The run.
         progress: Called with the stage and the fraction done.
     """
     if not has_clocks(run.cell):

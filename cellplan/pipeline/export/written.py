@@ -35,7 +35,6 @@ def write(run: VerifiedRun, prepared: Prepared, *, progress: Progress = silent) 
     """Render the files of an export, read them back, and judge what was read; then say so in their heads.
 
     Args:
-        run: The run.
         prepared: What is to be written.
         progress: Called with the stage and the fraction done.
 
@@ -54,7 +53,6 @@ def with_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Wr
     """The files of an export that say in their heads what was found in them.
 
     Args:
-        run: The run.
         prepared: What is to be written.
         judgement: What was found in what was read back.
     """
@@ -77,7 +75,6 @@ def judged(
     """Make all checks on what was read.
 
     Args:
-        run: The run.
         prepared: What was to be written.
         read: What was read.
         progress: Called with the stage and the fraction done.

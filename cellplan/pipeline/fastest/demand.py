@@ -87,7 +87,6 @@ def calmest(
     Args:
         base: The cell as it is written.
         per_hour: Parts per hour, which one of the shortest programs makes.
-        written: The program as it is written.
         laws: The shortest one by the time laws.
         common: The shortest one by the common speed.
         solved: Solves the cell with other values.

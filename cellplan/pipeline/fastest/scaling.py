@@ -16,7 +16,6 @@ def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
     """Values of the cell file with which everything takes longer by a factor, by address; see ``Cell.with_values``.
 
     Args:
-        cell: The cell.
         factor: More than 1 for slower.
     """
     motion = cell.motion

@@ -54,7 +54,6 @@ def shortest_by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -
 
     Args:
         base: The cell as it is written.
-        written: Its program.
         solved: Solves the cell with other values.
 
     Raises:
@@ -83,7 +82,6 @@ def from_both_sides(
 
     Args:
         number: Steps that the first program is said to take.
-        first: The first program.
         at: The program in a number of steps; a ``TooFewStepsError`` says that a task needs more of them.
         asked: How many times as long a program must last, at most 1 where it keeps its limits.
     """

@@ -37,10 +37,8 @@ def page_findings(
 
     Args:
         stored: The run; its reports are known to say what was found.
-        cell: Its cell.
         motions: What was found.
         drawn: The pictures of it.
-        drawings: Its drawings of the cell.
     """
     yield from foreign_drawings(stored, drawings)
     for motion in motions:

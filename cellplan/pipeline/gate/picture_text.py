@@ -22,10 +22,6 @@ def foreign_piece(got: str, drawn: str) -> str | None:
 
     Figures at the axes and the courses of curves are not compared: where a curve shows nothing but the noise of the
     arithmetic, they are others on every processor.
-
-    Args:
-        got: The picture on disk, an SVG file.
-        drawn: The picture that was drawn anew.
     """
     head, _, body = got.partition(SVG_START)
     other_head, _, other_body = drawn.partition(SVG_START)

@@ -36,7 +36,6 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     """Read the cell of a run, and refuse it when something that the run rests on has changed.
 
     Args:
-        stored: The run.
         cell: The cell file that was solved; None when it is not at hand, which is enough for cells that name no files
             of their own.
         allow_dirs: Folders, beside the cell's own, that the files it names may lie in.

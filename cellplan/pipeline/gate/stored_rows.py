@@ -125,11 +125,6 @@ class StoredRows:
 def read_rows(stored: StoredRun, cell: Cell, demanded: DemandedProgram) -> StoredRows:
     """Read the tables of a run back, each under the header and on the clock that it must have.
 
-    Args:
-        stored: The run.
-        cell: Its cell.
-        demanded: The program that the cell demands.
-
     Raises:
         InputError: With file and line, when something is not as the plan of the cell demands.
     """

@@ -19,7 +19,6 @@ def exceeded_at(program: TimedProgram, cycle: float, span: float) -> tuple[float
     """Times of the peaks at which joints ask for a longer cycle than the nodes do.
 
     Args:
-        program: The program.
         cycle: Shortest cycle at the nodes in [s].
         span: Time in [s] from the first node to the last.
     """

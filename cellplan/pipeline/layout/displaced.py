@@ -64,7 +64,6 @@ def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
     Distances are proved to be kept; the smallest ones are not searched for.
 
     Args:
-        layout: The layout.
         variant: The displacement ``d`` in [m] and [rad] and the ``start`` of a displacement nearby, as values.
     """
     values: Mapping[str, Any] = variant.values

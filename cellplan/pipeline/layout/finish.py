@@ -152,12 +152,7 @@ class Finish:
         return trials
 
     def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
-        """A layout of the search, certified or with the reason why not.
-
-        Args:
-            trial: Number of its trial.
-            figures: Figures of the trial.
-        """
+        """A layout of the search, certified or with the reason why not."""
         x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
         room, is_first, before = _Room(), True, self.solves
         while True:

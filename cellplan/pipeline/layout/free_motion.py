@@ -14,7 +14,6 @@ def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
     """Keys of ``layout.vary``, without ``robots.``, for what is named.
 
     Args:
-        cell: The cell.
         words: ``start``: the start posture of the positioner; ``weights``: of all joints; ``path``: the joint path
             of the positioner; ``spin``: how the tools are turned about their own axes.
 

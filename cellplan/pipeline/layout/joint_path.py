@@ -90,7 +90,6 @@ class PathSearch:
 
         Args:
             nodes: The number.
-            bodies: The bodies of the cell.
             acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], shape (nq,).
         """
         base, asked = self.own.base, self.asked

@@ -244,12 +244,7 @@ def _with_found_start(ready: Prepared) -> Prepared:
 
 
 def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> Prepared:
-    """The cell of a request, with the discrete choices of one trial; made once in each process.
-
-    Args:
-        request: What is searched for.
-        choice: Values by address.
-    """
+    """The cell of a request, with the discrete choices of one trial; made once in each process."""
     return _prepared(request, tuple(sorted((choice or {}).items())))
 
 

@@ -133,12 +133,7 @@ class Proposals:
 
 
 def proposals_of(request: LayoutRequest, ready: Prepared) -> "Proposals":
-    """What the rounds of a search of a cell try.
-
-    Args:
-        request: What is searched for.
-        ready: The cell.
-    """
+    """What the rounds of a search of a cell try."""
     choices = tuple(Choices.of(ready.cell).values())
     return Proposals(request=request, choices=choices, branches=_branches(ready.unled or ready))
 

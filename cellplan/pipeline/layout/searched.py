@@ -71,10 +71,6 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
 def _refuse_open_tasks(cell: Cell, *, asked: str) -> None:
     """Refuse tasks that leave their robot a choice where a joint path of the positioner is searched.
 
-    Args:
-        cell: The cell.
-        asked: What asks for the search.
-
     Raises:
         InputError: A task leaves a component open, or its robot has a joint too many or too few for six.
     """
@@ -116,10 +112,6 @@ def _refuse_margins(cell: Cell) -> None:
 
 def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
     """The cells whose layouts are tried too.
-
-    Args:
-        request: What is searched for.
-        cell: The cell that is searched.
 
     Raises:
         InputError: One cannot be read or has other robots.

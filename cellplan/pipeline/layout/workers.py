@@ -16,10 +16,6 @@ def layout_workers(count: int, request: LayoutRequest) -> Workers:
 
     Where the first conforming layout ends the search, mostly the first trial is the last one: one process begins, with
     that trial.
-
-    Args:
-        count: Number of processes.
-        request: What is searched for.
     """
     is_one = request.objective is Objective.CONFORMING
     first = partial(_call, "evaluate_first" if is_one else "prepared", request.anywhere)

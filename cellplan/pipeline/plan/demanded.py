@@ -60,7 +60,6 @@ class DemandedProgram:
         """The program on its clock.
 
         Args:
-            cell: The cell.
             written: The clock of a run, for the number of rows of transfer moves, and the nominal times of a retimed
                 program.
             file: File of that clock.

@@ -21,7 +21,6 @@ def table_headers(
     """Header of every table of a program whose checks passed, by robot.
 
     Args:
-        cell: The cell.
         phases: The phases of the program, on its clock.
         reports: The report of each of them.
         digests: SHA-256 by what it is the digest of.

@@ -47,7 +47,6 @@ def find_homes(
 
     Args:
         scene: The scene of the cell, every start posture filled in.
-        runs: The runs as they were planned.
         known: Homes that are tried first, by robot.
         progress: Called with the stage and the fraction done.
 
@@ -115,8 +114,6 @@ class _Search:
 
         Args:
             scene: The scene of the cell, with all homes that are known so far.
-            runs: All runs.
-            robot: The robot.
         """
         self._cell, self._robot, self._chain = scene.cell, robot, scene.chains[robot.name]
         self._runs = [_idle_run(scene, run, robot.name) for run in runs if robot.name in run.phase.idle]

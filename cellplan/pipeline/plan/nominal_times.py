@@ -21,7 +21,6 @@ def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, f
     Args:
         clock: The program as the time laws of the cell have it; it stays where the cell demands it as written.
         written: The clock of the run.
-        cell: Its cell.
         file: File of that clock.
 
     Raises:

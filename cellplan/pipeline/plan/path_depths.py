@@ -17,7 +17,6 @@ def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check
     """Checks of those tools that would stand too deep in the part, or off it, on the desired path.
 
     Args:
-        cell: The cell.
         toolpaths: The path of each task by its name.
     """
     found = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]

@@ -156,7 +156,6 @@ def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] |
     """The first row and joint at which a robot moves that holds still in a phase; None where it does hold still.
 
     Args:
-        phase: The phase.
         robot: Name of the robot.
         q: Its joint positions in the rows of the phase in [rad] or [m], shape (n, joints).
     """
@@ -171,7 +170,6 @@ def off_given_path(phase: Phase, robot: Robot, sigma: Array, q: Array) -> tuple[
 
     Args:
         phase: The phase, which is the only one of its program.
-        robot: The robot.
         sigma: Nominal times of the rows in [s], shape (N,).
         q: Its joint positions in these rows in [rad] or [m], shape (N, joints).
     """

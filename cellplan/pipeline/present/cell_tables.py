@@ -16,11 +16,7 @@ POSE: tuple[str, ...] = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_d
 
 
 def cell_tables(cell: Cell) -> Tables:
-    """The tables of a cell, in the units of its file.
-
-    Args:
-        cell: The cell.
-    """
+    """The tables of a cell, in the units of its file."""
     return {
         "robots": lambda: columns_of(_robot_row(cell, robot) for robot in cell.robots),
         "joints": lambda: columns_of(_joint_rows(cell)),

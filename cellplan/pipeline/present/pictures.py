@@ -18,12 +18,7 @@ Pictures = dict[str, str]  # SVG by what it shows
 
 
 def run_pictures(report: Report, cell: Cell) -> Pictures:
-    """Clearance over time, and the joints that come nearest to their limits.
-
-    Args:
-        report: The report of one phase.
-        cell: The cell as it is in it.
-    """
+    """Clearance over time, and the joints that come nearest to their limits."""
     shown = {
         name: figure for name, figure in run_figures(report, cell=cell).items() if name in ("clearance", "margins")
     }
@@ -31,11 +26,7 @@ def run_pictures(report: Report, cell: Cell) -> Pictures:
 
 
 def record_pictures(record: Record) -> Pictures:
-    """The picture of a study, a layout search, a map or the shortest cycles; none for other records.
-
-    Args:
-        record: Content of its JSON file.
-    """
+    """The picture of a study, a layout search, a map or the shortest cycles; none for other records."""
     kind = format_of(record)
     draw = KINDS[kind].pictures if kind in KINDS else FIGURES.get(kind)
     figures = {} if draw is None else draw(record)

@@ -141,9 +141,6 @@ def _(result: Screening) -> Tables:
 def record_at(path: Path) -> Record:
     """The record of a JSON file, or of the folder of a run, a study, a map, a repair or a rehearsal.
 
-    Args:
-        path: The file or the folder.
-
     Raises:
         InputError: There is none, or it cannot be read.
     """

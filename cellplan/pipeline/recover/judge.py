@@ -102,7 +102,6 @@ def judged(
         texts: The table of each robot, by its name.
         phases: What they were written from: of these only kinds, scenes and numbers of rows are used.
         places: The phases of the run.
-        state: The stopped state.
 
     Raises:
         InputError: A table is not whole.

@@ -26,7 +26,6 @@ class WaysBack:
 
         Args:
             places: The phases of the run.
-            state: The stopped state.
             fixed: Names of the robots that are to stand still.
             refused: See above.
         """
@@ -100,13 +99,7 @@ class HoldersBack:
     """Robots that hold the part together, back along the program while all others stand."""
 
     def __init__(self, places: RunPlaces, state: StoppedState, scene: Scene) -> None:
-        """Prepare; nothing is planned yet.
-
-        Args:
-            places: The phases of the run.
-            state: The stopped state.
-            scene: The scene of the recovery.
-        """
+        """Prepare; nothing is planned yet."""
         self._places, self._state, self._scene = places, state, scene
         self._group = scene.cell.positioners
 

@@ -72,7 +72,6 @@ def correct_from_pass_to_pass(
 
     Args:
         job: The program as it was solved, and what it is for.
-        real: The real cell.
         system: The measuring system.
         rng: Where its noise comes from.
         rounds: Maximum number of corrections.

@@ -34,12 +34,7 @@ NO_MOTION: Final = "no layout nearby was found in which all tools follow their p
 
 
 def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
-    """The least change of one attempt that passes every check, or why there is none; the cell as given for none.
-
-    Args:
-        request: What is repaired.
-        variant: Number and data of the attempt.
-    """
+    """The least change of one attempt that passes every check, or why there is none; the cell as given for none."""
     ready = ready_cell(request)
     if variant.values.get("kind") == GIVEN:
         return _outcome(_of_values(ready, {}, 0.0))

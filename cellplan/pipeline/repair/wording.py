@@ -17,13 +17,7 @@ SHOWN: Final = 0.005  # [deg] below which a joint of a start posture counts as u
 
 
 def change_text(cell: Cell, attempt: Attempt, values: Mapping[str, Any]) -> str:
-    """What changes, in one line.
-
-    Args:
-        cell: The cell as it is given.
-        attempt: What was allowed to change.
-        values: What changes, by address.
-    """
+    """What changes, in one line."""
     match attempt.kind:
         case RemedyKind.DURATION:
             motion = cell.motion.duration
@@ -118,12 +112,7 @@ def _arrows(parts: Mapping[str, tuple[Any, Any]]) -> str:
 
 
 def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[EffectRecord]:
-    """What a remedy does to the checks that fail as the cell is given.
-
-    Args:
-        given: Figures of the given cell.
-        figures: Figures of the cell with the remedy.
-    """
+    """What a remedy does to the checks that fail as the cell is given."""
     after = {(check["name"], check["subject"]): check for check in figures["checks"]}
     found: list[EffectRecord] = []
     for check in given["failed"]:

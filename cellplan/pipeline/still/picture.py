@@ -43,13 +43,7 @@ MUTING: Final = 0.62  # [-]
 
 
 def run_still(cell: Cell, schedule: Schedule, report: Report) -> str:
-    """SVG of the instant that decides the verdict of a run.
-
-    Args:
-        cell: The cell as it is in the run.
-        schedule: Its tasks.
-        report: What was found.
-    """
+    """SVG of the instant that decides the verdict of a run."""
     return still_svg(still_picture(cell, schedule, report))
 
 

@@ -35,7 +35,6 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
     ranges, and the scene says why.
 
     Args:
-        cell: The cell.
         geometries: Takes the shapes.
         progress: Called with the stage and the fraction done.
     """
@@ -74,7 +73,6 @@ def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Sce
     """The scene of the best try of a transfer move that was not found, in nominal time.
 
     Args:
-        blocked: The try.
         what: What is in its way, in words.
         geometries: Takes the shapes.
     """

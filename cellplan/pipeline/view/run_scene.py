@@ -62,7 +62,6 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     """The scene of a run.
 
     Args:
-        stored: The run.
         cell: The cell that was solved.
         geometries: Takes the shapes.
 
@@ -126,7 +125,6 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
     """The phases of the program in their order; those of further cycles repeat the first.
 
     Args:
-        stored: The run.
         cell: The cell that was solved.
         labels: Names of the phases of one cycle; a run of a single task has others, all in one scene.
     """

@@ -30,10 +30,6 @@ def closed_path(run: AccurateRun, problem: TrackingProblem) -> CollocatedPath | 
     map of one cycle onto the next need not be a contraction. Before the first cycle and after the last one there is
     nothing to close, and no drift.
 
-    Args:
-        run: The run.
-        problem: Its tasks.
-
     Raises:
         InputError: A path is open.
         NoSolutionError: A cycle does not close.

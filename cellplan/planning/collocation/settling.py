@@ -32,7 +32,6 @@ def settled(
     """Start postures with the tools brought to their paths, by Newton's method.
 
     Args:
-        tasks: The tasks.
         desired: Desired poses and twists at the start.
         placement: Where the robots of the cells stand.
         start: Start postures near them in [rad] or [m], shape (nq, cells).

@@ -57,7 +57,6 @@ def start_offset(
     """How far the tools stand beside their paths at the start; None when they stand on them.
 
     Args:
-        tasks: The tasks.
         desired: Desired poses and twists of the tools at first, a batch of one.
         placement: Where the robots stand.
         start: Stacked start posture, shape (nq,).

@@ -26,10 +26,6 @@ PROBES: Final = 257  # poses checked before a toolpath is handed on
 def build_toolpath(task: Task, part: Part) -> Toolpath:
     """The toolpath of a task: its curve, projected onto the part, with the tool's orientation along it and its stops.
 
-    Args:
-        task: The task.
-        part: The part it works on.
-
     Raises:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.

@@ -25,8 +25,6 @@ def refuse_path_in_metres(drawn: Curve, *, task: Task, part: Part) -> None:
 
     Args:
         drawn: The path as it is listed, in P, before it is projected.
-        task: The task.
-        part: The part.
 
     Raises:
         InputError: With its length, asking for the unit.
@@ -49,12 +47,6 @@ def refuse_path_in_metres(drawn: Curve, *, task: Task, part: Part) -> None:
 
 def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part) -> None:
     """Refuse a path that is shorter than anybody works, or far from the part that it is given on.
-
-    Args:
-        tip: The tool tip in P.
-        arc: Its length.
-        task: The task.
-        part: The part.
 
     Raises:
         InputError: With the length, or the farthest point and its distance from the part.

@@ -41,7 +41,6 @@ class Lines:
         """Place the cell.
 
         Args:
-            cell: The cell.
             q: Stacked joint positions in [rad] or [m], shape (nq,).
         """
         self._cell, self._q, self._model = cell, q, CombinedModel(cell)

@@ -10,10 +10,6 @@ from cellplan.model.task import Task
 def with_only_task(cell: Cell, name: str) -> Cell:
     """The cell with one of its tasks only, in the order of its robot and after nothing else.
 
-    Args:
-        cell: The cell.
-        name: Name of the task.
-
     Raises:
         InputError: There is no such task.
     """

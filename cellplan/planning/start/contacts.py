@@ -44,7 +44,6 @@ def contacts_of(
     Args:
         trials: The bodies.
         cell: The cell in the order of names.
-        robot: The robot.
         tried: Its configurations, each with that of the positioner.
     """
     among = _own_pairs(trials, cell, robot)

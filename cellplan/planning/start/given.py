@@ -103,7 +103,6 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
     """One line on a given start that is off its task or its grasp, in [m] and [rad].
 
     Args:
-        cell: The cell.
         relation: The task or grasp.
         off: Distance and angle.
         at_best: Label before them where they are the smallest of several.

@@ -32,7 +32,6 @@ def home_candidates(model: RobotModel, chain: ScrewChain, start: Array, rng: np.
     configurations drawn from boxes round the start; of equal displacements this order counts.
 
     Args:
-        model: The robot.
         chain: Its kinematics.
         start: Its start in [rad] or [m], shape (n,).
         rng: Where the drawn ones come from.

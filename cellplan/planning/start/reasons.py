@@ -26,10 +26,6 @@ def why_nothing(search: StartSearch, holder_count: int) -> str:
 
     A contact that no configuration of a robot avoids comes first, then the contact that occurs most often. Where some
     robot does not come to its task at all, the line says by how much it fails and for which robot.
-
-    Args:
-        search: The search that failed.
-        holder_count: Configurations of the positioner that were tried.
     """
     if search.failures.touching:
         unavoidable = _unavoidable(search)

@@ -127,7 +127,6 @@ def least_steps(motion: AtKeptRate, is_allowed: Callable[[Array], bool]) -> int 
     """The fewest steps found with which a motion keeps all limits; None when slower rates beside it do not help.
 
     Args:
-        motion: The motion.
         is_allowed: Whether rows keep all limits, by their nominal times in [s].
     """
     low = whole_steps(motion.kept_seconds, motion.step)

@@ -88,9 +88,6 @@ class JointWeights:
         ``|s . ((p - s0) x m g)|`` for a revolute joint and ``|s . m g|`` for a sliding one. The reference is the weight
         of the heaviest load of a robot, on an arm of 1 m for revolute joints.
 
-        Args:
-            state: Kinematics of the cell.
-
         Returns:
             Shares, 0 or more, shape (nq,).
         """

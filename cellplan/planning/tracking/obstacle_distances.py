@@ -42,7 +42,6 @@ class ClosestPairs:
         """Choose the pairs.
 
         Args:
-            scene: The scene.
             classes: Classes of pairs that are considered; those of one robot with itself only when asked for.
         """
         self._scene = scene

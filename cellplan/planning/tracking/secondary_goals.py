@@ -70,7 +70,6 @@ class SecondaryGoals:
         """Make ready what each goal needs.
 
         Args:
-            cell: The cell.
             model: The combined model of its robots.
             tasks: The tasks and closures, one block row each.
             start: Stacked configuration at the first time, shape (nq,).

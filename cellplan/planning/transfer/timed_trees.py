@@ -120,7 +120,6 @@ def shortened_in_time(check: MoveCheck, way: TimedWay, rng: np.random.Generator)
 
     Args:
         check: Which moves are free.
-        way: The way.
         rng: Where the places of the shortcuts come from.
     """
     for _ in range(SHORTCUTS):

@@ -152,8 +152,6 @@ def _draw_dimension(document: "Drawing", each: Dimension, *, corner: Array, heig
     """A DIMENSION below or left of the plan, with the lines and the text that show it as its block.
 
     Args:
-        document: The drawing.
-        each: The dimension.
         corner: Left lower corner of the first row of dimensions, shape (2,).
         height: Height of texts.
         number: Number of the dimension.

@@ -23,11 +23,7 @@ class CompiledTemplates(FileSystemBytecodeCache):
     """
 
     def __init__(self, environment: Environment) -> None:
-        """Prepare.
-
-        Args:
-            environment: The environment that templates are compiled in.
-        """
+        """Prepare."""
         options = {name: getattr(environment, name) for name in OPTIONS}
         release = zlib.crc32(f"{jinja2.__version__} {options} {sorted(environment.extensions)}".encode())
         module = importlib.util.cache_from_source(str(TEMPLATES / "page.py"))

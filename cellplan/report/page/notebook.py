@@ -59,11 +59,7 @@ class Card:
 
 
 def card_html(card: Card) -> str:
-    """A card as a piece of a page.
-
-    Args:
-        card: What it shows.
-    """
+    """A card as a piece of a page."""
     pictures = {
         title: f"data:image/svg+xml;base64,{b64encode(svg.encode()).decode()}" for title, svg in card.pictures.items()
     }

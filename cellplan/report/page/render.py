@@ -65,7 +65,6 @@ def report_page(
     Args:
         record: Result of ``run_record``.
         checks: The checks of the run.
-        cell: Its cell.
         plots: SVG pictures by file name, which lie in ``plots/`` beside the page; others are ignored.
         **beside: What lies beside it, and its pictures.
     """
@@ -87,7 +86,6 @@ def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> st
 
     Args:
         record: Result of ``summary_record``.
-        cell: The cell.
         **beside: What lies beside it, and its pictures.
     """
     parts = {"links": _links(record, (), beside), "errors": phase_errors(record)}

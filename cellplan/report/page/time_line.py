@@ -31,7 +31,6 @@ def time_line(record: Record, cell: Cell) -> dict[str, Any]:
 
     Args:
         record: Of a run, or of a program with several phases, whose first cycle is shown.
-        cell: The cell.
     """
     phases = _phases(record)
     total = max((phase["end_s"] for phase in phases), default=0.0) or 1.0

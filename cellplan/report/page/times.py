@@ -51,12 +51,7 @@ class TimeLinks:
         return TimeLink(fixed(at, 3), chosen, self.address(chosen))
 
     def of(self, entry: Record, key: str = AT) -> str | TimeLink:
-        """An instant in a table, with its phase where the record is that of a program.
-
-        Args:
-            entry: What holds the figure.
-            key: Key of its time.
-        """
+        """An instant in a table, with its phase where the record is that of a program."""
         phase = self._phase(entry, key)
         return self._followed(entry, key, f' <span class="soft">{escape(phase)}</span>' if phase else "")
 

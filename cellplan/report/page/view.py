@@ -31,11 +31,7 @@ SCRIPTS: Final = (
 
 
 def view_page(record: ViewRecord) -> str:
-    """The page as text; it loads nothing and works without a network.
-
-    Args:
-        record: What it shows.
-    """
+    """The page as text; it loads nothing and works without a network."""
     return template("view/view.html").render(
         r=record,
         mark=MARK,

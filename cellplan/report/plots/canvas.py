@@ -55,12 +55,7 @@ def style() -> Iterator[None]:
 
 
 def paint(figure: Figure, kind: str) -> bytes:
-    """A figure as PNG or PDF, without date and program name.
-
-    Args:
-        figure: The figure.
-        kind: Name of the format.
-    """
+    """A figure as PNG or PDF, without date and program name."""
     found, buffer = placed(figure), io.BytesIO()
     with style():
         canvas = Canvas(figsize=(found.width / INCH, found.height / INCH))

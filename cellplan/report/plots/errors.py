@@ -95,7 +95,6 @@ def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> Axis:
     Args:
         curves: Errors, not negative, shape (K,) each.
         allowed: Their tolerance.
-        unit: Their unit.
     """
     largest = max(float(curve.max()) for curve in curves)
     positive = [float(curve[curve > 0.0].min()) for curve in curves if curve.max() > 0.0]

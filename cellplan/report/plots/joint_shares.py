@@ -22,13 +22,7 @@ Shares = Mapping[str, tuple[Sequence[JointUse], Array]]  # by robot: its joints 
 
 
 def margins_figure(report: Report, robots: Sequence[str], colours: Mapping[str, str]) -> Figure | None:
-    """Distance of every joint to its nearer limit; None where no joint has two.
-
-    Args:
-        report: What is drawn.
-        robots: Robots that are shown.
-        colours: Colour of each robot.
-    """
+    """Distance of every joint to its nearer limit; None where no joint has two."""
     shares = {robot: _margins(report, robot) for robot in robots}
     shares = {robot: share for robot, share in shares.items() if share[0]}
     return _figure(
@@ -41,13 +35,7 @@ def margins_figure(report: Report, robots: Sequence[str], colours: Mapping[str, 
 
 
 def speeds_figure(report: Report, robots: Sequence[str], colours: Mapping[str, str]) -> Figure | None:
-    """Speed of every joint as a share of its limit; None without robots.
-
-    Args:
-        report: What is drawn.
-        robots: Robots that are shown.
-        colours: Colour of each robot.
-    """
+    """Speed of every joint as a share of its limit; None without robots."""
     named = {robot: [use for use in report.joints if use.robot == robot] for robot in robots}
     shares = {
         robot: (uses, PERCENT * np.abs(report.qd[robot]) / np.array([use.velocity_limit for use in uses]))

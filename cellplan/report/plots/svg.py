@@ -27,21 +27,13 @@ STYLE: Final = re.compile(r"<style>.*?</style>", re.DOTALL)
 
 
 def svg_text(figure: Figure) -> str:
-    """A figure as the text of an SVG file.
-
-    Args:
-        figure: The figure.
-    """
+    """A figure as the text of an SVG file."""
     found = placed(figure)
     return "\n".join([*_head(found), *map(_words, found.words), *_swatches(found), *_panels(found), "</svg>\n"])
 
 
 def inline_svg(text: str) -> str:
-    """An SVG file as part of a page, which has the style of all pictures.
-
-    Args:
-        text: The file.
-    """
+    """An SVG file as part of a page, which has the style of all pictures."""
     return STYLE.sub("", text, count=1)
 
 

@@ -174,11 +174,7 @@ def left_out_record(left_out: Iterable[LeftOut]) -> list[LeftOutRecord]:
 
 
 def other_classes(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Minima of the classes that the smallest one of all does not belong to, by what each is called.
-
-    Args:
-        record: The clearance of the record of a run.
-    """
+    """Minima of the classes that the smallest one of all does not belong to, by what each is called."""
     of_all = (record["whole"]["pair"], record["whole"]["minimum_mm"])
     minima = {words: record[kind] for kind, words in CLASSES.items() if kind in record}
     known = {words: each for words, each in minima.items() if each["minimum_mm"] is not None}

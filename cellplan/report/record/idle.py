@@ -24,7 +24,6 @@ def missing_moves(cell: Cell, runs: Mapping[str | None, Iterable[str]]) -> list[
     """Lines on moves that the programs of several runs do not contain, each with the name of its run.
 
     Args:
-        cell: The cell.
         runs: Names of its tasks, by the name of the run.
     """
     lines = {run: not_in_program(cell, tuple(tasks)) for run, tasks in runs.items()}

@@ -40,12 +40,7 @@ def phase_key(key: str) -> str:
 
 
 def in_phase(record: Record, phase: str) -> Any:
-    """A record of one phase, and of the records in it, in which every instant names that phase.
-
-    Args:
-        record: Figures of the phase.
-        phase: Its name.
-    """
+    """A record of one phase, and of the records in it, in which every instant names that phase."""
     named: dict[str, Any] = {}
     for key, value in record.items():
         named[key] = _in_phase(value, phase)
@@ -62,12 +57,7 @@ def _in_phase(value: Any, phase: str) -> Any:
 
 
 def instant_text(entry: Record, key: str = AT) -> str:
-    """When a figure is reached: its time, and its phase in the record of a program; empty without a time.
-
-    Args:
-        entry: What holds the figure.
-        key: Key of the time.
-    """
+    """When a figure is reached: its time, and its phase in the record of a program; empty without a time."""
     if entry[key] is None:
         return ""
     phase = entry.get(phase_key(key))

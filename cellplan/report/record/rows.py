@@ -39,7 +39,6 @@ def columns_of(rows: Iterable[Row], names: Iterable[str] = ()) -> dict[str, Any]
     """Values of each column in the order of the rows; None where a row has none.
 
     Args:
-        rows: The rows.
         names: Columns that are there even without a row, in their order.
     """
     found = list(rows)
@@ -115,12 +114,7 @@ def flat(entry: Mapping[str, Any], prefix: str = "") -> Row:
 
 
 def by_name(entries: Mapping[str, Mapping[str, Any]], name: str) -> Iterator[Row]:
-    """A row for each entry, which begins with its name.
-
-    Args:
-        entries: Records by name.
-        name: Name of the column of the names.
-    """
+    """A row for each entry, which begins with its name."""
     return ({name: key, **flat(entry)} for key, entry in entries.items())
 
 

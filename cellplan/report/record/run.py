@@ -127,7 +127,6 @@ def run_record(
 
     Args:
         report: The run.
-        cell: Its cell.
         provenance: Origin of the result.
         motion: The planned motion, for the effort of its steps; None if it is not available.
         transfers: How the transfer moves of its phase were found, by the name of the phase.

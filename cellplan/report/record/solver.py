@@ -141,7 +141,6 @@ def solver_record(
     """The method with its settings under the keys of the cell file, and the effort of its steps.
 
     Args:
-        solver: The settings.
         motion: The planned motion; None if it is not available, or if there are several.
         transfers: How the transfer moves of each phase were found; None or empty without such moves.
         moved: How far starts were moved.

@@ -75,7 +75,6 @@ def summary_record(
 
     Args:
         reports: Report by the name of the run, which is its phase and its folder.
-        cell: The cell.
         provenance: Origin of the result.
         transfers: How the transfer moves of each phase were found, by the name of the phase.
         moved: How far starts were moved.

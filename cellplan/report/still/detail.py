@@ -58,8 +58,6 @@ def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[
     """What matters, enlarged in a window without what hides it, with a frame round its place in the picture.
 
     Args:
-        picture: The picture.
-        camera: Its camera.
         window: Where the detail is.
         classes: Names of the classes of materials and tones, which are added to.
     """

@@ -25,7 +25,6 @@ def facets(shape: Solid, segments: int) -> Array:
     """Facets in the frame of the shape in [m], shape (K, 4, 3).
 
     Args:
-        shape: The solid.
         segments: Sides round the circumference of a round one, even; a mesh has about their square of triangles.
     """
     match shape:
@@ -45,7 +44,6 @@ def silhouette(shape: Solid, X_WS: Array, axes: Array) -> Array:
     """A flat octagon as large as a solid looks, in the world in [m], shape (3, 4, 3).
 
     Args:
-        shape: The solid.
         X_WS: Its pose in the world, shape (4, 4).
         axes: Axes of the camera, shape (3, 3).
     """

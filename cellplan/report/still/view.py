@@ -25,12 +25,7 @@ STEP: Final = 1e-6  # [-] scores that differ by less are equal
 
 
 def best_axes(picture: StillPicture, aspect: float) -> Array:
-    """Axes of the camera for a picture, shape (3, 3).
-
-    Args:
-        picture: The picture.
-        aspect: Width of the sheet by its height.
-    """
+    """Axes of the camera for a picture, shape (3, 3)."""
     choices = [(view_axes(a, e), usual) for e, usual in zip(ELEVATIONS, USUAL, strict=True) for a in AZIMUTHS]
     axes = np.array([each for each, _ in choices])
     scores = np.array([usual for _, usual in choices]) + WIDE * _filled(picture, axes, aspect)

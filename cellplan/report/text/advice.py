@@ -19,7 +19,6 @@ def advice_lines(record: Record, folder: Path, cell: Path) -> list[str]:
 
     Args:
         record: As ``advice_record`` returns it.
-        folder: Its folder.
         cell: The cell file, as the user named it.
     """
     lines = [f"{record['cell']}: {verdict_line(record)}", *_given(record)]

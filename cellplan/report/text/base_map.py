@@ -10,7 +10,6 @@ def map_lines(record: Record, folder: Path) -> list[str]:
 
     Args:
         record: As ``base_map`` returns it.
-        folder: Its folder.
     """
     counts = record["counts"]
     others = ", ".join(

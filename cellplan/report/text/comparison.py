@@ -19,7 +19,6 @@ def comparison_lines(record: Record, folder: Path) -> list[str]:
 
     Args:
         record: As ``comparison_record`` returns it.
-        folder: Its folder.
     """
     variants = record["variants"]
     subject = "modes" if record["of"] == "modes" else "cells and runs"

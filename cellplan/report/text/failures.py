@@ -13,7 +13,6 @@ def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
     """A line for each failed check below a heading for each group; nothing if all checks passed.
 
     Args:
-        checks: The checks of a record.
         more: Where the checks stand that are not shown.
     """
     groups: dict[str, list[str]] = {}

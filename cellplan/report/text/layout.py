@@ -17,7 +17,6 @@ def layout_lines(record: Record, folder: Path) -> list[str]:
 
     Args:
         record: As ``layout_record`` returns it.
-        folder: Its folder.
     """
     lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
     lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]

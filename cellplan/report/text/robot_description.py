@@ -5,11 +5,7 @@ from typing import Any
 
 
 def description_lines(record: dict[str, Any]) -> list[str]:
-    """A description as lines, the lines for a cell last.
-
-    Args:
-        record: As `description_record` makes it.
-    """
+    """A description as lines, the lines for a cell last."""
     return [
         record["name"],
         f"  {_reach(record)}{record['source']}",

@@ -8,11 +8,7 @@ from cellplan.report.text.columns import Row
 
 
 def stop_rows(record: Record) -> Iterator[Row]:
-    """The deepest tool and the nearest robots when one robot stops; nothing where no controller says how others go on.
-
-    Args:
-        record: Record of a run.
-    """
+    """The deepest tool and the nearest robots when one robot stops; none where no controller says how others go on."""
     if "stops" not in record:
         return
     depths = record["stops"]["depths"]

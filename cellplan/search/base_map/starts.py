@@ -51,8 +51,6 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
 
     Args:
         goal: What is reached.
-        places: The places.
-        model: The robot.
         X_WB: Its present base, shape (4, 4).
         seed: Seed of the random configurations.
 

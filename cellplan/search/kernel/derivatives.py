@@ -42,7 +42,6 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
         layout: The layout, a batch of one.
         q: Joint positions at the nodes in [rad] or [m], shape (N, nq), as ``run`` gives them.
         qd: Their speeds, shape (N, nq).
-        directions: The directions.
     """
     keep_freed_memory()
     rates = _Rates(job, layout, q, qd, directions)

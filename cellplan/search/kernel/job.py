@@ -58,7 +58,6 @@ class Job:
         """Place nodes evenly between the times at which the desired motion is not smooth.
 
         Args:
-            cell: The cell.
             schedule: Its tasks on the common clock.
             moving: Names of the robots that may move.
             nodes: About how many nodes there are.
@@ -83,7 +82,6 @@ class Job:
         """The job at given nodes.
 
         Args:
-            cell: The cell.
             schedule: Its tasks on the common clock.
             moving: Names of the robots that may move.
             nodes: Times of the nodes in [s], never falling, and begin and end of the stretch of each, shape (N,) each.

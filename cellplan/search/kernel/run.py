@@ -49,10 +49,6 @@ class Motions:
 def run(job: Job, layouts: Layouts) -> Motions:
     """The motions of all candidates.
 
-    Args:
-        job: The tasks at their nodes.
-        layouts: The candidates.
-
     Raises:
         ValueError: The candidates are not cells of these robots.
     """

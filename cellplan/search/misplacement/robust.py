@@ -176,7 +176,6 @@ def robust_layout(
     """Improve a layout until its corners keep all demands; the best of what was found, None without a motion.
 
     Args:
-        search: The search.
         begin: Variables, shape (n,), and start posture, shape (nq,).
         signs: Seeded corners, each displacement -1 or 1, shape (C, m).
         rounds: Number of rounds at most.

@@ -30,7 +30,6 @@ def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, with
     """Pairs of bodies that are less than a distance beyond what is demanded of any.
 
     Args:
-        bodies: The bodies of the cell.
         x: Variables of the layout, shape (n,).
         q: Joint positions at all nodes in [rad] or [m], shape (N, nq).
         nodes: The nodes that are asked for, shape (K,).

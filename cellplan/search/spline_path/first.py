@@ -22,7 +22,6 @@ def first_path(
     """The path that a search begins with, and the start posture of all joints that goes with it, shape (nq,).
 
     Args:
-        cell: The cell.
         schedule: Its tasks on the common clock.
         layout: The layout, a batch of one, with a start posture near the right one.
         count: Number of coefficients of each joint.

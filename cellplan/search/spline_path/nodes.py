@@ -47,7 +47,6 @@ class PathNodes:
         """Place nodes for a spline of so many coefficients.
 
         Args:
-            cell: The cell.
             schedule: Its tasks on the common clock.
             count: Number of coefficients of each joint.
             degree: Degree of the spline, 3 or 5.

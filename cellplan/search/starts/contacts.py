@@ -40,7 +40,6 @@ class Contacts:
         """Keep the pairs of which a body goes with one of some robots, the other with any of these or with none.
 
         Args:
-            scene: The scene.
             robots: Names of the robots.
             against: Names of further robots, whose pairs with each other do not count.
         """

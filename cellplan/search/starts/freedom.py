@@ -46,8 +46,6 @@ class Freedom:
         """Sort the variables by what changes when each of them does.
 
         Args:
-            cell: The cell.
-            variables: The variables.
             start: A start posture, shape (nq,).
         """
         count = len(variables.names)
@@ -115,7 +113,6 @@ def drawn_within(variables: StartVariables, columns: Indices, count: int, rng: n
     """Values of some variables drawn evenly within their bounds, shape (count, n); ten steps where these are infinite.
 
     Args:
-        variables: The variables.
         columns: Those that are drawn; all others keep the given values.
         count: How many.
         rng: Random numbers.

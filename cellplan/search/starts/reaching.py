@@ -154,11 +154,6 @@ def _move_bases(X_WB: Array, at: Array, move: Array, bounds: BaseBounds) -> None
 def followed(arm: FreeArm, goal: Goal, draws: Placed) -> tuple[Array, Flags]:
     """Tools led along the whole path, from node to node, with the bases and what the path is on at rest.
 
-    Args:
-        arm: The robot.
-        goal: The path.
-        draws: Draws with the tools at its start.
-
     Returns:
         Configurations at the nodes, shape (B, N, n), not valid where a path was lost, and which draws followed it all,
         shape (B,). They may be out of limits.

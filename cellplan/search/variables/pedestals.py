@@ -32,7 +32,6 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     stays an obstacle.
 
     Args:
-        cell: The cell.
         settings: What may change.
 
     Returns:
@@ -70,8 +69,6 @@ def with_room_below(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0
     """Ranges of heights narrowed so that a column below a base, or above one that hangs, does not vanish.
 
     Args:
-        cell: The cell.
-        ranges: The ranges.
         spare: Length in [m] by which bases may be off their heights.
 
     Raises:

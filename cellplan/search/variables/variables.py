@@ -48,7 +48,6 @@ class Variables:
         """The variables that a cell file gives.
 
         Args:
-            cell: The cell.
             without: Addresses of numbers that stay as they are, whatever the file says.
 
         Raises:

@@ -22,7 +22,6 @@ def drawn_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -
     """Shapes that a link draws, with their poses in its frame, shape (4, 4); none where one cannot be read.
 
     Args:
-        link: The link.
         shelf: Reads its meshes.
         largest: Bytes of the largest mesh file that is read.
     """

@@ -60,13 +60,7 @@ def usual_flange(tree: UrdfTree) -> str:
 
 
 def flange_remarks(tree: UrdfTree, flange: str, *, is_named: bool) -> Iterator[str]:
-    """What a user has to know about the orientation of a flange.
-
-    Args:
-        tree: The links and joints.
-        flange: The link that is taken.
-        is_named: Whether the user named it.
-    """
+    """What a user has to know about the orientation of a flange."""
     last, file = last_joint(tree, flange), tree.document.file
     if last is None or last.kind == "prismatic":
         return

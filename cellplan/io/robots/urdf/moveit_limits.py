@@ -31,10 +31,6 @@ class MoveitLimits:
 def read_moveit_limits(path: Path, file: str) -> MoveitLimits:
     """Read the limits that a file states; with ``has_velocity_limits: false`` it states no velocity, and so on.
 
-    Args:
-        path: The file.
-        file: Its name in messages.
-
     Raises:
         InputError: All findings about the file at once.
     """

@@ -55,8 +55,6 @@ def check_spelling(links: Iterable[Element], joints: Iterable[Element], remarks:
     """Compare all names below links and joints with the known ones.
 
     Args:
-        links: Elements of the links.
-        joints: Elements of the joints.
         remarks: Takes the names that are not known.
 
     Raises:

@@ -136,7 +136,6 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collect
     Args:
         srdf: The file.
         name: ``STATE`` or ``GROUP/STATE``.
-        model: The robot.
         added: Joints that are not the file's, such as a rail below the robot: at zero, or at the nearest limit.
 
     Raises:

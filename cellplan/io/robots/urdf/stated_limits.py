@@ -50,7 +50,6 @@ def read_limit(joint: Element, owner: str, *, kind: str, remarks: Remarks) -> Ur
     """Limits of a joint; what leaves no room, is not positive or is beyond all machines counts as not given.
 
     Args:
-        joint: The element.
         owner: The joint in messages.
         kind: Its type.
         remarks: Takes what is stated and not used.

@@ -25,10 +25,6 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
 
     A link of which one cannot be read is left out: it is drawn by its bodies.
 
-    Args:
-        path: The file.
-        options: Where its meshes lie.
-
     Raises:
         InputError: The file is no URDF.
     """
