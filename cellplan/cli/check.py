@@ -91,6 +91,7 @@ def _record(result: CellCheck) -> dict[str, Any]:
         "start_choice": result.choice,
         "moved_starts": [moved_start_record(each) for each in result.moved],
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
+        "path_bulge_mm": {name: number(1e3 * bulge) for name, bulge in result.bulges.items()},
         "controllers": {
             name: {
                 "kind": str(controller.kind),

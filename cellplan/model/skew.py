@@ -13,6 +13,7 @@ class SkewLimit(StrEnum):
     TOOL = "tool tolerance"
     DEPTH = "tool depth"
     CLEARANCE = "clearance"
+    END = "phase end"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

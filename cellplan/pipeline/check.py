@@ -14,7 +14,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Check
 from cellplan.pipeline.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.pipeline.plan.path_depths import depths_on_paths
-from cellplan.pipeline.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts
+from cellplan.pipeline.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts, refuse_unnamed_supports
 from cellplan.pipeline.plan.start import chosen_start
 from cellplan.planning.modes import plan_phases, standing
 from cellplan.planning.path.build import build_toolpath
@@ -32,6 +32,7 @@ class CellCheck:
 
     cell: Cell  # the cell with every start posture filled in
     found: tuple[str, ...]  # names of the robots whose start posture was searched for
+    bulges: Mapping[str, float]  # largest distance in [m] of a smooth path from the lines between its points, by task
     choice: str | None  # how the start was chosen, in words; None when all of it was given
     path_lengths: Mapping[str, float]  # length of each task's path on the surface in [m]
     checks: tuple[Check, ...]  # the verified statements
@@ -65,6 +66,7 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     scenes, blocks = StageScenes.of(cell), [stage for stage in program_stages(cell) if stage.cell.tasks]
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
+    refuse_unnamed_supports(scenes)
     made = {
         stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
     }
@@ -82,6 +84,7 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
         found=tuple(dict.fromkeys(name for one in made.values() for name in one.found)),
         choice="; ".join(words) or None,
         path_lengths={name: length for one in made.values() for name, length in one.path_lengths.items()},
+        bulges={name: bulge for one in made.values() for name, bulge in one.bulges.items()},
         checks=tuple(checks),
         moved=tuple(dict.fromkeys(each for one in made.values() for each in one.moved)),
         left_out=scenes.held.left_out,
@@ -117,6 +120,7 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
         found=found,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
+        bulges={name: toolpath.bulge for name, toolpath in toolpaths.items() if toolpath.bulge is not None},
         checks=(
             at_start,
             *_on_trial(choice),

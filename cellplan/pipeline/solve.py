@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
 
+from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import completed, run_clearance, stacked, verify_motion, with_clocks
 from cellplan.io.run.clock_table import render_clock
@@ -145,7 +146,7 @@ def certified(
         progress: Called with the stage and the fraction done.
         early: Has the clearance.
     """
-    reports = []
+    phases = []
     for run in solution.runs:
         own = run.scene or scene
         q = stacked(own.cell, run.report.q)
@@ -156,8 +157,9 @@ def certified(
         )
         with_figures = is_reported and (early is None or early.with_curves)
         report = completed(run.report, found)
-        reports.append(with_clocks(report, own, run.schedule, is_reported=with_figures, progress=progress))
-    reports = with_joins(solution.cell, reports)
+        report = with_clocks(report, own, run.schedule, is_reported=with_figures, progress=progress)
+        phases.append(JudgedPhase(scene=own, schedule=run.schedule, report=report))
+    reports = with_joins(solution.cell, with_phase_ends(solution.cell, phases))
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))

@@ -76,12 +76,18 @@ def sweep(
     base = _base_cell(job)
     require_task(base, job.task)
     variants = combinations(axes)
+    settings = dict(map(read_setting, job.settings))
     for axis in axes:
+        if axis.address in settings:
+            raise InputError(
+                f"--vary: expected a key that nothing else sets, got '{axis.address}', which is set to "
+                f"{settings[axis.address]} already (--set, --mode)"
+            )
         _require_a_valid_value(base, axis)
     header = {
         "kind": "sweep",
         "cell": base.name,
-        "settings": plain_values(dict(map(read_setting, job.settings))),
+        "settings": plain_values(settings),
         "task": job.task,
         "vary": {axis.address: list(axis.values) for axis in axes},
         "inputs": dict(base.inputs),

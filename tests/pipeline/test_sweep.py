@@ -72,6 +72,17 @@ def test_a_key_that_no_cell_has_is_refused_before_anything_is_solved(tmp_path: P
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.parametrize("option", [("--set", "motion.mode=pairwise"), ("--mode", "pairwise")])
+def test_a_key_that_is_set_and_varied_is_refused(
+    option: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["sweep", str(CELL), "--vary", "motion.mode=simultaneous,part_at_rest", *option]
+    assert run([*arguments, "-o", str(tmp_path / "study"), "--quiet"]) == 2
+    expected = "--vary: expected a key that nothing else sets, got 'motion.mode', which is set to pairwise already"
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
 def test_the_command_prints_a_row_for_each_variant(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = [option for text in SLOW for option in ("--set", text)]
     arguments = [str(CELL), "--vary", "motion.duration_s=1:2:1", "-o", str(tmp_path / "s"), "--workers", "1", *settings]

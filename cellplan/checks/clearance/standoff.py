@@ -131,7 +131,7 @@ def _check(task: Task, found: Standoff) -> Check:
     when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
     meets = not np.isinf(found.worst_along)
     axis = f"{MM * found.worst_along:.1f} mm along its axis" if meets else "which its axis does not meet"
-    key = "standoff_mm" if task.standoff is None else f"standoff_mm = [{MM * low:g}, {MM * high:g}]"
+    key = "no standoff_mm is stated" if task.standoff is None else f"standoff_mm = [{MM * low:g}, {MM * high:g}]"
     where = f"the tip is {MM * found.worst_nearest:.1f} mm from the part{when}, {axis}"
     message = f"standoff of task '{task.name}': {where}"
     cure = (

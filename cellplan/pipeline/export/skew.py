@@ -1,15 +1,15 @@
 """Allowed skew of a run: how far the starts of controllers may be apart, over all of its phases."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from cellplan.checks.clearance.skew import allowed_skew, has_clocks
 from cellplan.model.progress import Progress, silent
 from cellplan.model.skew import MOST_SKEW, PairSkew
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.phase_ends import ends_allow
 from cellplan.pipeline.export.run_programs import scenes_of
+from cellplan.report.text.skew import demand_text
 from cellplan.report.text.skew import skew_text as report_text
 
 PER_SECOND: Final = 1e3  # [ms/s]
@@ -81,14 +81,7 @@ def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None
             own = _clock_pair(pair, motion.name)
             if key not in found or own.allowed < found[key].allowed:
                 found[key] = own
-    pairs = tuple(_across_ends(run, pair) for pair in found.values())
-    return RunSkew(pairs=pairs, cycle=float(run.motion.times[-1]))
-
-
-def _across_ends(run: VerifiedRun, pair: ClockPair) -> ClockPair:
-    """A pair with what the ends of phases allow, where that is less than what the phases do."""
-    found = ends_allow(run, pair.first, pair.second, most=pair.allowed)
-    return pair if found is None else replace(pair, allowed=found[0], reason=found[1])
+    return RunSkew(pairs=tuple(found.values()), cycle=float(run.motion.times[-1]))
 
 
 def skew_text(seconds: float) -> str:
@@ -103,5 +96,5 @@ def _clock_pair(pair: PairSkew, phase: str | None) -> ClockPair:
         reason = "nothing limits it"
     else:
         where = "" if phase is None else f"{phase}, "
-        reason = f"{least.limit} of {least.subject}, {where}{least.at_s:.3f} s"
+        reason = f"{demand_text(least.limit, least.subject)}, {where}{least.at_s:.3f} s"
     return ClockPair(first=pair.first, second=pair.second, allowed=pair.allowed, stated=pair.stated, reason=reason)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.cache import nothing_kept
+from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
@@ -86,7 +87,11 @@ def _opened(
     motions = tuple(
         _verified(scene, rows, place, cell=source.cell, progress=progress) for place, scene in enumerate(scenes)
     )
-    reports = with_joins(source.cell, [motion.report for motion in motions])
+    phases = [
+        JudgedPhase(scene=scene, schedule=motion.schedule, report=motion.report)
+        for scene, motion in zip(scenes, motions, strict=True)
+    ]
+    reports = with_joins(source.cell, with_phase_ends(source.cell, phases))
     motions = tuple(replace(motion, report=report) for motion, report in zip(motions, reports, strict=True))
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.certify import certify
-from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
+from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.collision.distance import measure
 from cellplan.collision.separation import heights
@@ -25,6 +25,7 @@ from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.planning.transfer.reasons import nearest_words
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import Mount
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
 GAP_TOL: Final = 1e-4  # [m] distances are worked out to that
@@ -96,26 +97,27 @@ def _gaps(scene: Scene) -> dict[str, float]:
     return gaps
 
 
-def refuse_unnamed_support(stage: Stage, scene: Scene, q: Array) -> None:
-    """Refuse a place at which the part is nearer to a body of the environment than allowed, and does not rest on it.
-
-    Args:
-        stage: The stage; only that which lifts the part, or lowers it, is judged.
-        scene: Its scene, in which the part may touch the body that it rests on.
-        q: Stacked joint positions of its rows in [rad] or [m], shape (N, nq).
+def refuse_unnamed_supports(scenes: StageScenes) -> None:
+    """Refuse places at which the part is nearer to a body of the environment than allowed, and does not rest on it.
 
     Raises:
         InputError: With the body and the distance.
     """
-    if stage.move not in (PartMove.LIFT, PartMove.LOWER):
-        return
-    kinds = [{scene.bodies[pair.first].kind, scene.bodies[pair.second].kind} for pair in scene.pairs]
-    own = scene_of_rows(scene, [row for row, both in enumerate(kinds) if both == {Kind.PART, Kind.OBSTACLE}])
-    lying = q[[0 if stage.move is PartMove.LIFT else -1]].repeat(2, axis=0)
-    if own.pairs and not certify(own, lying, with_minimum=False).is_kept:
-        words, _ = nearest_words(own, lying)
-        where = scene.cell.origin.at(f"{_key(stage)}.rests_on")
-        raise InputError(f"{where}: {words} where the part lies: name the body that it rests on, or move the place")
+    demands = dict[str, float]()  # least distance of the held part in [m] by body; 0 where only contact is forbidden
+    for pair in scenes.held.pairs:
+        bodies = {body.kind: body for body in (scenes.held.bodies[pair.first], scenes.held.bodies[pair.second])}
+        if bodies.keys() == {Kind.PART, Kind.OBSTACLE}:
+            demands[bodies[Kind.OBSTACLE].name] = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
+    for key, place, scene in _places(scenes):
+        for name, gap in _gaps(scene).items():
+            if name in place.supports or name not in demands or gap > max(demands[name] - GAP_TOL, 0.0):
+                continue
+            held = f"is {MM * gap:.4g} mm from" if gap > 0.0 else "touches"
+            raise InputError(
+                f"{scenes.cell.origin.at(f'program.{key}.rests_on')}: 'part' {held} '{name}', "
+                f"{MM * demands[name]:g} mm are demanded where the part lies: name the body that it rests on, or move "
+                f"the place"
+            )
 
 
 def refuse_crowded_homes(scene: Scene, home: Array) -> None:

@@ -24,7 +24,7 @@ from cellplan.pipeline.plan.program_faults import (
     refuse_crowded_homes,
     refuse_hanging_parts,
     refuse_sunk_parts,
-    refuse_unnamed_support,
+    refuse_unnamed_supports,
 )
 from cellplan.pipeline.plan.retiming import transfer_retimer
 from cellplan.pipeline.plan.run import PlannedRun, plan_run
@@ -85,6 +85,7 @@ def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress
     scenes = StageScenes.of(cell)
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
+    refuse_unnamed_supports(scenes)
     search = _Worked(cell, scenes, progress, near)
     runs = search.runs()
     started = search.cell
@@ -152,7 +153,6 @@ class _Worked:
         self.moved[stage.phase.name] = (*moved, *more)
         with located(stage, self.cell, self._given):
             planned = plan_run(started, paths, stage.phase, progress=self._progress)
-        refuse_unnamed_support(stage, scene, planned.motion.q)
         at_work = set(stage.phase.roles) - set(stage.phase.idle)
         self._last |= {name: planned.motion.q[-1, own.columns(name)] for name in sorted(at_work)}
         return planned if stage.move is None else replace(planned, scene=scene)

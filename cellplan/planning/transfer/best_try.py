@@ -84,8 +84,9 @@ def in_the_way(scene: Scene, tried: Try) -> BlockedTry:
         return BlockedTry(scene=scene, tried=tried, bodies=("", ""), missing=0.0, row=0, words="nothing is in the way")
     missing, depth, row, pair = max(short, key=lambda each: each[0])
     first, second = bound.names(pair)
-    held = f"is {depth * MM:.3g} mm deep in" if depth > 0.0 else f"is {pair.proved * MM:.3g} mm from"
-    held = "touches" if pair.touches and not depth > 0.0 else held
+    is_deep = round(depth * MM, 3) > 0.0  # less is rounding: the bodies touch
+    held = f"is {depth * MM:.3g} mm deep in" if is_deep else f"is {pair.proved * MM:.3g} mm from"
+    held = "touches" if pair.touches and not is_deep else held
     demand = f", {pair.demand * MM:g} mm are demanded" if pair.keeps_clearance else ""
     words = f"'{first}' {held} '{second}'{demand}"
     return BlockedTry(scene=scene, tried=tried, bodies=(first, second), missing=missing, row=row, words=words)

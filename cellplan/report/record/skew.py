@@ -15,7 +15,9 @@ MS: Final = 1e3  # [ms/s]
 class SkewLimitRecord(TypedDict):
     """What one demand allows."""
 
-    limit: Annotated[str, "`tool tolerance`, `tool depth` or `clearance`"]
+    limit: Annotated[
+        str, "`tool tolerance`, `tool depth`, `clearance`, or `phase end` for what the end of a phase allows"
+    ]
     skew_ms: Annotated[Number, "largest skew that is proved to keep it, at most 200"]
     or_more: Annotated[bool, "whether nothing limits it up to 200 ms"]
     subject: Annotated[str, "task, grasp or bodies that limit it; empty without a limit"]

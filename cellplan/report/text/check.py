@@ -21,6 +21,11 @@ def check_lines(record: Record) -> list[str]:
         (f"task {name}", f"{length:.4g} mm", direction_text(record["direction"][name]))
         for name, length in record["path_length_mm"].items()
     ]
+    bulges: list[Row] = [
+        (f"task {name}", f"{bulge:.3g} mm", "largest bulge of its path from the sides between its points")
+        for name, bulge in record["path_bulge_mm"].items()
+        if bulge
+    ]
     controllers: list[Row] = [
         (f"controller {name}", controller["kind"], ", ".join(controller["robots"]))
         for name, controller in record["controllers"].items()
@@ -29,7 +34,7 @@ def check_lines(record: Record) -> list[str]:
         f"{record['cell']}: {record['status']}",
         f"  {count_text(record['checks'])}",
         *failure_lines(record["checks"], "check --json"),
-        *aligned([*starts, *paths, *controllers]),
+        *aligned([*starts, *paths, *bulges, *controllers]),
         *(f"  {line}" for line in moved_start_lines(record["moved_starts"])),
         *(f"  note: {remark}" for remark in record["remarks"]),
         *(f"  {each['message']}" for each in record["checks"] if each["passed"] and not reaches_nowhere(each)),
@@ -39,4 +44,6 @@ def check_lines(record: Record) -> list[str]:
 
 def _posture(start: Record) -> str:
     """A start posture by joint."""
-    return ", ".join(f"{joint} {position:.4g}" for joint, position in start.items())
+    return ", ".join(
+        f"{joint} {round(position, 9) + 0.0:.4g}" for joint, position in start.items()
+    )  # -1e-12 is rounding

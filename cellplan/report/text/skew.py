@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from cellplan.model.skew import MOST_SKEW, PairSkew, SkewReport
+from cellplan.model.skew import MOST_SKEW, PairSkew, SkewLimit, SkewReport
 from cellplan.report.record.common import Record
 from cellplan.report.record.phases import instant_text
 from cellplan.report.text.columns import Row
@@ -19,9 +19,8 @@ def skew_row(record: Record) -> Iterator[Row]:
     least = min(pair["limits"], key=lambda each: float(each["skew_ms"]))
     where = f"{pair['robots'][0]} - {pair['robots'][1]}"
     if least["subject"]:
-        where = f"{where}, {least['limit']} of {least['subject']} {instant_text(least)}"
-    name = "allowed skew in a phase" if record.get("cycles") else "allowed skew"  # ends of phases: see export
-    yield name, skew_text(float(pair["allowed_ms"]), or_more=pair["or_more"]), where
+        where = f"{where}, {demand_text(least['limit'], least['subject'])} {instant_text(least)}"
+    yield "allowed skew", skew_text(float(pair["allowed_ms"]), or_more=pair["or_more"]), where
 
 
 def skew_notes(skew: SkewReport) -> tuple[str, ...]:
@@ -40,6 +39,11 @@ def skew_notes(skew: SkewReport) -> tuple[str, ...]:
     return tuple(line.encode("ascii", "replace").decode("ascii") for line in lines)
 
 
+def demand_text(limit: str, subject: str) -> str:
+    """What limits a skew: a demand of its subject, or what a subject does where the next phase begins."""
+    return f"{subject} across the end of the phase" if limit == SkewLimit.END else f"{limit} of {subject}"
+
+
 def skew_text(skew_ms: float, *, or_more: bool) -> str:
     """A skew in milliseconds, rounded down to three significant digits, so that a small one is not none."""
     if or_more:
@@ -53,7 +57,7 @@ def skew_text(skew_ms: float, *, or_more: bool) -> str:
 def _pair_line(pair: PairSkew) -> str:
     """What two clocks may be apart, and why."""
     least, stated = pair.least, ""
-    why = "" if least is None or not least.subject else f" ({least.limit} of {least.subject})"
+    why = "" if least is None or not least.subject else f" ({demand_text(least.limit, least.subject)})"
     if pair.stated is not None:
         stated = f", stated {1e3 * pair.stated:g} ms: {'kept' if pair.is_kept else 'NOT KEPT'}"
     return f"{pair.first} - {pair.second}: {_skew(pair.allowed)}{why}{stated}"

@@ -83,8 +83,8 @@ def test_a_seam_in_the_air_fails_with_its_distances_and_the_keys() -> None:
     assert not check.passed
     assert check.message == (
         "standoff of task 'work_of_gun': the tip is 60.0 mm from the part at 0.000 s, 60.0 mm along its axis; "
-        "allowed 0 to 2 mm and its tolerance (standoff_mm): put the path on the part, state the distance of the "
-        "process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"
+        "allowed 0 to 2 mm and its tolerance (no standoff_mm is stated): put the path on the part, state the distance "
+        "of the process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"
     )
 
 

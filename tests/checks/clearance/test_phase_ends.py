@@ -1,5 +1,6 @@
 """Skew across the ends of phases: against places of both programs that are sampled densely."""
 
+import json
 from itertools import pairwise
 
 import numpy as np
@@ -8,10 +9,9 @@ from builders.home_to_home import PICK_AND_PLACE
 
 from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.skew import MOST_SKEW
+from cellplan.model.skew import MOST_SKEW, AllowedSkew, SkewLimit
 from cellplan.model.task import Frame
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.phase_ends import ends_allow
 from cellplan.pipeline.export.skew import run_skew
 
 CONTROLLERS = """\
@@ -54,25 +54,49 @@ def worst_across(run: VerifiedRun, skew: float) -> float:
     return worst
 
 
+def limits_of_ends(run: VerifiedRun) -> list[tuple[str | None, AllowedSkew]]:
+    """What the ends of phases allow, where that is less than the phases themselves do, with the phase that ends."""
+    return [
+        (motion.name, limit)
+        for motion in run.motions
+        if motion.report.skew is not None
+        for pair in motion.report.skew.pairs
+        for limit in pair.limits
+        if limit.limit is SkewLimit.END
+    ]
+
+
 @pytest.mark.slow
 def test_no_tool_is_off_beyond_its_tolerance_across_an_end(run: VerifiedRun) -> None:
-    """And three times the skew that is found takes one off."""
-    found = ends_allow(run, "holder", "pen")
+    """And three times the skew that is allowed takes one off."""
+    limits = limits_of_ends(run)
+    least = min((limit for _, limit in limits), key=lambda limit: limit.skew)
 
-    assert found is not None
-    assert 0.0 < found[0] < MOST_SKEW
-    assert worst_across(run, found[0]) <= 1.0
-    assert "end of " in found[1]
-    if found[1].startswith("tool"):
-        assert worst_across(run, 3.0 * found[0]) > 1.0
+    assert 0.0 < least.skew < MOST_SKEW
+    assert worst_across(run, least.skew) <= 1.0
+    if least.subject.startswith("tool"):
+        assert worst_across(run, 3.0 * least.skew) > 1.0
 
 
 @pytest.mark.slow
-def test_a_program_allows_no_more_than_the_ends_of_its_phases(run: VerifiedRun) -> None:
-    found, skew = ends_allow(run, "holder", "pen"), run_skew(run)
+def test_a_report_and_an_export_state_one_allowed_skew(run: VerifiedRun) -> None:
+    """It is the smallest of all phases and of all their ends."""
+    skew = run_skew(run)
+    record = json.loads((run.folder / "report.json").read_text(encoding="utf-8"))["skew"]
+    reports = [motion.report.skew for motion in run.motions if motion.report.skew is not None]
+    limits = [limit.skew for report in reports for pair in report.pairs for limit in pair.limits]
 
-    assert found is not None
     assert skew is not None
-    assert skew.least.allowed <= found[0]
-    assert ends_allow(run, "holder", "pen", most=0.5 * found[0]) is None
-    assert ends_allow(run, "holder", "pen", most=0.0) is None
+    assert skew.least.allowed == min(limits)
+    assert record["allowed_ms"] == pytest.approx(1e3 * min(limits), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_the_end_of_a_phase_counts_only_where_it_allows_less(run: VerifiedRun) -> None:
+    """And then it is the least of all limits of its phase, at the last instant of that."""
+    for name, end in limits_of_ends(run):
+        report = next(motion.report for motion in run.motions if motion.name == name)
+        assert report.skew is not None
+        assert report.skew.allowed <= end.skew
+        assert end.at_s == report.times[-1]
+    assert limits_of_ends(run)

@@ -8,7 +8,7 @@ its place at T by no more than its own way since T - s, and what it works on by 
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Final
@@ -17,100 +17,140 @@ import numpy as np
 
 from cellplan.certify.free_clocks import ClockRegion, certify_regions
 from cellplan.certify.lever_arms import LeverArms
+from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.skew import stands_still
 from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Relation
-from cellplan.model.skew import MOST_SKEW
+from cellplan.model.motion import Schedule
+from cellplan.model.report import Report
+from cellplan.model.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit
 from cellplan.model.task import Frame, Task
-from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
-from cellplan.pipeline.export.run_programs import RunPhase, RunProgram, run_programs, scenes_of
 from cellplan.scene.scene import Scene
 
 HALVINGS: Final = 14  # of a skew, from 200 ms to 12 us; below that none is proved
 PARTS: Final = 4  # stretches of each robot in which the places before and after an end are certified
-Allowed = tuple[float, str]
 Kept = Callable[[float], bool]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JudgedPhase:
+    """A phase of a program with what was judged of it."""
+
+    scene: Scene  # its scene, with all tools at work
+    schedule: Schedule  # desired tool poses
+    report: Report  # the checks of its rows, on its own time
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Placed:
+    """A phase on the clock of the program."""
+
+    place: int  # its number in the first cycle
+    scene: Scene  # its scene, in which the tools of idle robots keep away from the part
+    schedule: Schedule
+    report: Report
+    begin: float  # time of its first row in [s]
+
+    @property
+    def end(self) -> float:
+        """Time of its last row in [s]."""
+        return self.begin + float(self.report.times[-1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _End:
     """Where a phase ends and the next one begins."""
 
-    program: RunProgram
-    scenes: Sequence[Scene]  # scene of each motion of the run
-    before: RunPhase  # the phase that ends
-    after: RunPhase  # the one that begins
+    phases: Sequence[_Placed]  # all phases of the program
+    times: Array  # times of its rows in [s], shape (N,)
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    before: _Placed  # the phase that ends
+    after: _Placed  # the one that begins
 
     @property
     def at(self) -> float:
         """Its time in [s]."""
-        return float(self.program.times[self.before.last])
+        return self.after.begin
 
-    @property
-    def name(self) -> str:
-        """In words."""
-        return f"end of {self.before.name}, {self.at:.3f} s"
-
-    def phases(self, skew: float) -> list[RunPhase]:
+    def reached(self, skew: float) -> list[_Placed]:
         """Phases that reach into the time within a skew in [s] of it."""
-        times = self.program.times
-        return [
-            phase
-            for phase in self.program.phases
-            if times[phase.first] < self.at + skew and times[phase.last] > self.at - skew
-        ]
+        return [phase for phase in self.phases if phase.begin < self.at + skew and phase.end > self.at - skew]
 
     def positions(self, skew: float) -> tuple[Array, Array]:
         """Times within a skew of it in [s], and all joints there in [rad] or [m]; its own time is among them."""
-        times = self.program.times
+        times = self.times
         begin, end = max(times[0], self.at - skew), min(times[-1], self.at + skew)
         inner = times[(times > begin) & (times < end)]
         at = np.unique(np.concatenate([[begin], inner, [self.at], [end]]))
-        return at, np.stack([np.interp(at, times, column) for column in self.program.q.T], axis=1)
+        return at, np.stack([np.interp(at, times, column) for column in self.q.T], axis=1)
 
 
-def ends_allow(run: VerifiedRun, first: str, second: str, *, most: float = MOST_SKEW) -> Allowed | None:
-    """The largest skew in [s], up to one, that is proved across the ends of all phases, and the end that limits it.
+def with_phase_ends(cell: Cell, phases: Sequence[JudgedPhase]) -> list[Report]:
+    """The reports of a program from home to home, with what the end of each phase allows of the skew of its clocks.
+
+    It stands with the limits of the phase that ends, where it allows less than the phase itself.
 
     Args:
-        first: A robot.
-        second: One on another clock.
-        most: Largest skew in [s] that is asked for.
-
-    Returns:
-        None where that largest one is allowed, or no phase follows another without a wait.
+        cell: The cell of the whole program; reports of any other program stay as they are.
+        phases: Phases of one cycle in their order.
     """
-    if run.cell.program is None or most <= 0.0:
-        return None
-    found: Allowed | None = None
-    for end in _ends(run):
-        for reason, is_kept in _demands(run, end, (first, second)):
-            limit = most if found is None else found[0]
-            own = _largest(is_kept, limit)
-            if own < limit:
-                found = own, f"{reason}, {end.name}"
-    return found
+    reports = [phase.report for phase in phases]
+    if cell.program is None or any(report.skew is None for report in reports):
+        return reports
+    for end in _ends(cell, phases):
+        report = reports[end.before.place]
+        if report.skew is not None:
+            pairs = tuple(_across(end, pair) for pair in report.skew.pairs)
+            reports[end.before.place] = replace(report, skew=replace(report.skew, pairs=pairs))
+    return reports
 
 
-def _ends(run: VerifiedRun) -> Iterator[_End]:
-    """Ends of phases at which others begin; those of further cycles, which repeat the first, only once."""
-    scenes, known = scenes_of(run), set[tuple[bytes, int, int]]()
-    (program,) = run_programs(run)
-    phases = [phase for phase in program.phases if phase.last > phase.first]
-    for before, after in pairwise(phases):
-        rows = program.q[before.first : after.last + 1].tobytes()
-        steps = np.diff(program.times[before.first : after.last + 1]).round(9).tobytes()
-        if (rows + steps, before.place, after.place) not in known:
-            known.add((rows + steps, before.place, after.place))
-            yield _End(program=program, scenes=scenes, before=before, after=after)
+def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
+    """Ends of phases at which others begin; those of further cycles only if something else is played around them."""
+    placed, rows = list[_Placed](), list[tuple[Array, Array]]()
+    begin, cycles = 0.0, 1 if cell.program is None else min(cell.program.cycles, 3)
+    for place, phase in list(enumerate(phases)) * cycles:
+        report = phase.report
+        if len(report.times) > 1:
+            scene = scene_of_run(phase.scene, [scheduled.task.name for scheduled in phase.schedule.tasks])
+            placed.append(_Placed(place=place, scene=scene, schedule=phase.schedule, report=report, begin=begin))
+            rows.append((begin + report.times[:-1], _stacked(cell, report)[:-1]))
+            begin = placed[-1].end
+    last = _stacked(cell, placed[-1].report)[-1:]
+    times, q = (np.concatenate(parts) for parts in zip(*rows, (np.array([begin]), last), strict=True))
+    known = set[tuple[bytes, tuple[int, ...]]]()
+    for before, after in pairwise(placed):
+        end = _End(phases=placed, times=times, q=q, before=before, after=after)
+        at, around = end.positions(MOST_SKEW)
+        played = around.tobytes() + (at - end.at).round(9).tobytes()
+        key = (played, tuple(phase.place for phase in end.reached(MOST_SKEW)))
+        if key not in known:
+            known.add(key)
+            yield end
+
+
+def _stacked(cell: Cell, report: Report) -> Array:
+    """Positions of all robots side by side in [rad] or [m], shape (N, nq)."""
+    return np.concatenate([report.q[robot.name] for robot in cell.robots], axis=1)
+
+
+def _across(end: _End, pair: PairSkew) -> PairSkew:
+    """A pair with what an end allows, where that is less than what is known."""
+    for subject, is_kept in _demands(end, (pair.first, pair.second)):
+        skew = _largest(is_kept, pair.allowed)
+        if skew < pair.allowed:
+            time = float(end.before.report.times[-1])
+            limit = AllowedSkew(limit=SkewLimit.END, skew=skew, subject=subject, at_s=time)
+            pair = replace(pair, limits=(*pair.limits, limit))
+    return pair
 
 
 def _largest(is_kept: Kept, most: float) -> float:
-    """The largest skew in [s] of which it is kept: the most that is asked for, or else by halving."""
-    if is_kept(most):
+    """The largest skew in [s] up to the most of which it is kept, by halving."""
+    if most <= 0.0 or is_kept(most):
         return most
     low, high = 0.0, most
     for _ in range(HALVINGS):
@@ -124,18 +164,17 @@ def _largest(is_kept: Kept, most: float) -> float:
     return low
 
 
-def _demands(run: VerifiedRun, end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Kept]]:
+def _demands(end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Kept]]:
     """What is demanded of two robots across an end, and whether a skew keeps it."""
-    cell = run.cell
+    cell = end.before.scene.cell
     moves = [not stands_still(end.positions(MOST_SKEW)[1][:, cell.columns(name)]) for name in pair]
     if any(moves):
-        yield f"clearance of '{pair[0]}' and '{pair[1]}'", partial(_keeps_clearance, end, pair)
+        yield f"clearance of {pair[0]} and {pair[1]}", partial(_keeps_clearance, end, pair)
     for phase in (end.before, end.after):
-        motion, scene = run.motions[phase.place], end.scenes[phase.place]
-        for relation, limits, depth in _relations(motion, scene.cell):
-            tool = _Tool(end=end, scene=scene, motion=motion, relation=relation, is_before=phase is end.before)
+        for relation, limits, depth in _relations(phase):
+            tool = _Tool(end=end, phase=phase, relation=relation, is_before=phase is end.before)
             if {relation.robot, tool.carrier} == set(pair):
-                yield f"tool of '{relation.robot}'", partial(tool.is_kept, limits=limits, depth=depth)
+                yield f"tool of {relation.robot}", partial(tool.is_kept, limits=limits, depth=depth)
 
 
 def _keeps_clearance(end: _End, pair: tuple[str, str], skew: float) -> bool:
@@ -151,14 +190,14 @@ def _keeps_clearance(end: _End, pair: tuple[str, str], skew: float) -> bool:
     ]
     rectangles = [index(np.concatenate(each)) for span in spans for each in (span, span[::-1])]
     region = ClockRegion(first=pair[0], second=pair[1], rectangles=np.array(rectangles))
-    scenes = {phase.place: end.scenes[phase.place] for phase in end.phases(skew)}
+    scenes = {phase.place: phase.scene for phase in end.reached(skew)}
     return all(certify_regions(scene, q, [region])[0].is_kept for scene in scenes.values())
 
 
-def _relations(motion: VerifiedMotion, cell: Cell) -> Iterator[tuple[Relation, tuple[float, float], float | None]]:
+def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], float | None]]:
     """Tasks and grasps of a phase, what is allowed of their errors, and how much deeper a tool may be in [m]."""
-    depths = {depth.task: depth for depth in motion.report.depths}
-    for scheduled in motion.schedule.tasks:
+    depths = {depth.task: depth for depth in phase.report.depths}
+    for scheduled in phase.schedule.tasks:
         task = scheduled.task
         if task.relative_to is Frame.PART:
             own = depths.get(task.name)
@@ -167,6 +206,7 @@ def _relations(motion: VerifiedMotion, cell: Cell) -> Iterator[tuple[Relation, t
                 (task.tolerance.position, task.tolerance.orientation),
                 None if own is None else own.limit - own.depth,
             )
+    cell = phase.scene.cell
     for grasp in cell.closures:
         yield grasp, (cell.checks.closure_position, cell.checks.closure_orientation), None
 
@@ -176,15 +216,14 @@ class _Tool:
     """A tool that is on the part in a phase which ends, or begins, at an end of phases."""
 
     end: _End
-    scene: Scene  # scene of that phase
-    motion: VerifiedMotion
+    phase: _Placed  # that phase
     relation: Relation  # its task or grasp
     is_before: bool  # whether it is the phase that ends
 
     @property
     def carrier(self) -> str | None:
         """The robot that carries the part; None for none."""
-        cell = self.scene.cell
+        cell = self.phase.scene.cell
         return None if cell.carrier is None else cell.robots[cell.carrier].name
 
     def is_kept(self, skew: float, *, limits: tuple[float, float], depth: float | None) -> bool:
@@ -196,19 +235,19 @@ class _Tool:
             depth: By how much it may be deeper than on one clock in [m]; None for any depth.
         """
         position, orientation = self._error()
-        reach = 0.0 if depth is None else tool_reach(self.scene.cell, self.relation.robot)
+        reach = 0.0 if depth is None else tool_reach(self.phase.scene.cell, self.relation.robot)
         (moved, turned), (carried, swung) = self._ways(skew)
         is_deep = depth is not None and moved + carried + reach * (turned + swung) > depth
         return position + moved + carried <= limits[0] and orientation + turned + swung <= limits[1] and not is_deep
 
     def _error(self) -> tuple[float, float]:
         """Errors at the end itself, on one clock, in [m] and [rad]."""
-        cell, row = self.scene.cell, -1 if self.is_before else 0
-        q = {name: table.q[[row]] for name, table in self.motion.tables.items()}
-        X_WT = self.scene.chains[self.relation.robot].tool_poses(q[self.relation.robot])
-        X_WP = part_poses(cell, self.scene.chains, q)
+        cell, row = self.phase.scene.cell, -1 if self.is_before else 0
+        q = {name: rows[[row]] for name, rows in self.phase.report.q.items()}
+        X_WT = self.phase.scene.chains[self.relation.robot].tool_poses(q[self.relation.robot])
+        X_WP = part_poses(cell, self.phase.scene.chains, q)
         if isinstance(self.relation, Task):
-            schedule = next(each for each in self.motion.schedule.tasks if each.task.name == self.relation.name)
+            schedule = next(each for each in self.phase.schedule.tasks if each.task.name == self.relation.name)
             X_PT, desired = relative_to_task_frame(self.relation, X_WT, X_WP), schedule.X_PT[[row]]
         else:
             X_PT, desired = inverse(X_WP) @ X_WT, self.relation.X_PT[None]
@@ -222,9 +261,9 @@ class _Tool:
         step no way is longer than its chord and half of the largest second derivative. The part is seen from the tool
         as it stands at the end; by its own way the tool is elsewhere, which a turn of the part carries along.
         """
-        cell, chains = self.scene.cell, self.scene.chains
+        cell, chains = self.phase.scene.cell, self.phase.scene.chains
         times, q = self.end.positions(skew)
-        arms, at = LeverArms(self.scene, q), int(np.searchsorted(times, self.end.at))
+        arms, at = LeverArms(self.phase.scene, q), int(np.searchsorted(times, self.end.at))
         X_WT = chains[self.relation.robot].tool_poses(q[:, cell.columns(self.relation.robot)])
         only_part = q.copy()
         only_part[:, cell.columns(self.relation.robot)] = q[at, cell.columns(self.relation.robot)]
