@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from cellplan.pipeline.base_map.judged import base_map, write_base_map
     from cellplan.pipeline.base_map.prepared import MapRequest
     from cellplan.pipeline.base_map.study import map_study
-    from cellplan.pipeline.compare import CompareJob, compare
+    from cellplan.pipeline.compare.compare import CompareJob, compare
     from cellplan.pipeline.export.choice import Choice
     from cellplan.pipeline.export.program import export_program
     from cellplan.pipeline.export.several import Exported, export_programs
@@ -68,9 +68,9 @@ if TYPE_CHECKING:
     from cellplan.pipeline.recover.recover import Recovery, recover
     from cellplan.pipeline.recover.write import write_recovery
     from cellplan.pipeline.rehearsal.rehearse import rehearse
-    from cellplan.pipeline.rehearsal.write import write_rehearsal
+    from cellplan.pipeline.rehearsal.result import write_rehearsal
     from cellplan.pipeline.repair.repair import Repair, repair
-    from cellplan.pipeline.repair.write import write_repair
+    from cellplan.pipeline.repair.result import write_repair
     from cellplan.pipeline.screen import screen
     from cellplan.pipeline.solution import Solution
     from cellplan.pipeline.solve import solve
@@ -90,7 +90,7 @@ _HOME: Final = {
     "CellplanError": "errors",
     "Check": "model.report",
     "Choice": "pipeline.export.choice",
-    "CompareJob": "pipeline.compare",
+    "CompareJob": "pipeline.compare.compare",
     "Exported": "pipeline.export.several",
     "FloorPlanRequest": "pipeline.floor_plan_file",
     "LayoutRequest": "pipeline.layout.request",
@@ -113,7 +113,7 @@ _HOME: Final = {
     "VerifiedRun": "model.verified_run",
     "ViewRequest": "pipeline.view.write",
     "base_map": "pipeline.base_map.judged",
-    "compare": "pipeline.compare",
+    "compare": "pipeline.compare.compare",
     "export_program": "pipeline.export.program",
     "export_programs": "pipeline.export.several",
     "fastest": "pipeline.fastest.shortest",
@@ -137,9 +137,9 @@ _HOME: Final = {
     "write_base_map": "pipeline.base_map.judged",
     "write_fastest": "pipeline.fastest.result",
     "write_floor_plan": "pipeline.floor_plan_file",
-    "write_repair": "pipeline.repair.write",
+    "write_repair": "pipeline.repair.result",
     "write_recovery": "pipeline.recover.write",
-    "write_rehearsal": "pipeline.rehearsal.write",
+    "write_rehearsal": "pipeline.rehearsal.result",
     "write_run": "pipeline.write_run",
     "write_view": "pipeline.view.write",
 }

@@ -8,7 +8,9 @@ from typing import Any
 
 from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
 from cellplan.io.schema.json_schemas import entry_title
-from cellplan.report.record.schema import advice_schema, layout_schema, report_schema, series_schema
+from cellplan.pipeline.layout.record import layout_schema
+from cellplan.pipeline.repair.record import advice_schema
+from cellplan.report.record.schema import report_schema, series_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
 PAGE, ERRORS_PAGE, REPORT_PAGE = FOLDER / "cell-file.md", FOLDER / "errors-file.md", FOLDER / "report-json.md"

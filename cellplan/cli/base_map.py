@@ -117,7 +117,7 @@ def base_map(  # noqa: PLR0913, PLR0917 - the options of the command
 
 def _say(record: "Record", folder: Path, *, is_certified: bool, as_json: bool) -> NoReturn:
     """Say what came of a map, and leave with the exit status."""
-    from cellplan.report.text.base_map import map_lines
+    from cellplan.pipeline.base_map.result import map_lines
 
     outcomes = [each["certified"]["status"] == "passed" for each in record["best"] if each["certified"] is not None]
     passes = any(outcomes) if is_certified else record["counts"]["passes"]

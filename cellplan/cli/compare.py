@@ -51,9 +51,9 @@ def compare(  # noqa: PLR0913, PLR0917 - the options of the command
     """
     with json_failure(SCHEMA, desired=as_json):
         from cellplan.guard import processors
-        from cellplan.pipeline.compare import CompareJob, first_name
-        from cellplan.pipeline.compare import compare as run_comparison
-        from cellplan.report.text.comparison import comparison_lines
+        from cellplan.pipeline.compare.compare import CompareJob, first_name
+        from cellplan.pipeline.compare.compare import compare as run_comparison
+        from cellplan.pipeline.compare.result import comparison_lines
 
         job = CompareJob(
             subjects=tuple(subjects),

@@ -95,8 +95,8 @@ def search_and_say(
         InterruptedWorkError: The search was interrupted.
         Exit: Always, at the end.
     """
+    from cellplan.pipeline.layout.result import layout_lines
     from cellplan.pipeline.layout.search import refuse_search, search_layout
-    from cellplan.report.text.layout import layout_lines
 
     folder = output or default_folder(request.cell, request.allow_dirs, is_free=bool(request.free))
     refuse_search(request, folder, resume=work.resume)

@@ -12,10 +12,9 @@ from cellplan.guard import processors
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.folder import refuse_unless_replaceable
 from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.repair.record import SCHEMA
 from cellplan.pipeline.repair.repair import repair
-from cellplan.pipeline.repair.write import write_repair
-from cellplan.report.record.advice import SCHEMA
-from cellplan.report.text.advice import advice_lines
+from cellplan.pipeline.repair.result import advice_lines, write_repair
 
 STATUSES: Final = {
     "passes": ExitStatus.PASSED,

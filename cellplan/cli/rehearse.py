@@ -65,9 +65,8 @@ def rehearse(  # noqa: PLR0913, PLR0917 - the options of the command
         from cellplan.io.run.folder import REHEARSAL, refuse_unless_replaceable
         from cellplan.pipeline.overrides import with_draws, with_overrides
         from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
-        from cellplan.pipeline.rehearsal.write import write_rehearsal
+        from cellplan.pipeline.rehearsal.result import summary_lines, write_rehearsal
         from cellplan.report.plots.rendering import require_formats
-        from cellplan.report.text.rehearsal import summary_lines
 
         require_formats(plots or ())
         changed = with_overrides(load_cell(cell, allow_dirs=allow_dir or ()), settings or ())

@@ -26,7 +26,8 @@ def schema(
 
         say_json(robot_table_schema())
     elif report or series or layout:
-        from cellplan.report.record.schema import layout_schema, report_schema, series_schema
+        from cellplan.pipeline.layout.record import layout_schema
+        from cellplan.report.record.schema import report_schema, series_schema
 
         say_json(report_schema() if report else series_schema() if series else layout_schema())
     else:

@@ -7,6 +7,7 @@ import pytest
 
 from cellplan.model.cell import Mode
 from cellplan.model.verdict import verdict
+from cellplan.pipeline.compare.result import ROWS
 from cellplan.pipeline.still.instant import heading, worst_instant
 from cellplan.pipeline.view.run_scene import _facts
 from cellplan.report.page.figures import key_figures, phase_errors
@@ -15,7 +16,6 @@ from cellplan.report.record.columns import page_cells, terminal_table
 from cellplan.report.record.figures import SHOWN
 from cellplan.report.record.numbers import plain, seconds
 from cellplan.report.record.run import run_record
-from cellplan.report.text.comparison import ROWS
 from cellplan.report.text.run import figure_lines, motion_text
 
 

@@ -15,14 +15,13 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.base_map.grid import BaseGrid
 from cellplan.pipeline.base_map.prepared import PreparedMap, prepared
-from cellplan.pipeline.base_map.record import map_record
+from cellplan.pipeline.base_map.result import map_files, map_record
 from cellplan.pipeline.base_map.tiles import Tiles, judged
 from cellplan.pipeline.drawing import drawing
 from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.base_map import map_files
 from cellplan.report.record.common import Record, number
 from cellplan.report.record.figures import KEY, figures_of
 from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, best_first

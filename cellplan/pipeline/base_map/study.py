@@ -12,9 +12,9 @@ from cellplan.io.input.files import digest
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.base_map.judged import finished_record
 from cellplan.pipeline.base_map.prepared import MapRequest, prepared_request, refuse_map, requested_cell
+from cellplan.pipeline.base_map.result import map_files
 from cellplan.pipeline.base_map.tiles import Tiles, evaluate
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.base_map import map_files
 from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Record, as_json
 from cellplan.study.folder import RESULT, SCHEMA, write_results

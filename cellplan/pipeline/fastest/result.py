@@ -388,6 +388,9 @@ def write_fastest(found: ShortestCycles, folder: Path, *, progress: Progress = s
 FASTEST: Final = Kind(
     name="fastest",
     title="Shortest cycles",
+    file="fastest.json",
+    made_of=ShortestCycles,
+    record=fastest_record,
     tables=fastest_tables,
     shown={"cycles": ("name", "status", "cycle_s", "share_of_written", "smallest_clearance_mm")},
     pictures=lambda record: {key: it for key, it in curve_figures(record).items() if key == "max_velocity_ratio"},

@@ -22,8 +22,8 @@ from cellplan.pipeline.fastest.timed_program import TimedProgram
 from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded_at, margins_missed_at
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
+from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
 from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared, values_of
-from cellplan.report.record.misplacement import MisplacementRecord
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem

@@ -1,6 +1,6 @@
 """The given layout of a search, as the record has it and its page draws it."""
 
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple, TypedDict
 
 import numpy as np
 
@@ -11,13 +11,24 @@ from cellplan.model.progress import silent
 from cellplan.pipeline.drawing import drawing
 from cellplan.pipeline.layout.cycles import draft, is_scaled, shortest
 from cellplan.pipeline.layout.finish import clearance_of, margin_of, rejection_of, too_singular
-from cellplan.pipeline.layout.limits import Standing, standing_of
+from cellplan.pipeline.layout.limits import LimitRecord, Standing, standing_of
 from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT
 from cellplan.report.record.common import Number, number
-from cellplan.report.record.layout import GivenRecord, LimitRecord
 from cellplan.search.programs.objective import Objective
+
+
+class GivenRecord(TypedDict):
+    """The layout as it was given."""
+
+    status: Annotated[str, "`conforming` or `violating`, as `solve` has it"]
+    reason: Annotated[str, "why it has no motion; empty where it has one"]
+    cycle_s: Annotated[Number, "shortest verified cycle of the same motion; null where another objective is sought"]
+    margin_deg: Annotated[Number, "smallest distance of a turning joint from its limits; negative beyond them"]
+    clearance_mm: Annotated[Number, "smallest certified distance of bodies"]
+    violations: Annotated[list[LimitRecord], "what it breaks, worst first"]
+
 
 NOT_SOLVED: Final[GivenRecord] = {
     "status": "violating",

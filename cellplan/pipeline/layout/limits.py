@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.timed_program import BINDS
 from cellplan.report.record.common import number
-from cellplan.report.record.layout import LimitRecord
 from cellplan.search.kernel.figures import Crests
 from cellplan.search.programs.explain import explain
 from cellplan.search.programs.measures import Measures
@@ -21,6 +20,16 @@ NEAR_ANGLE: Final = np.radians(0.5)  # [rad] above the demand at which a margin 
 TOUCHING: Final = 1e-9  # [m] bodies of which less is demanded may touch
 NEAR_SHARE: Final = 0.05  # [-] likewise of a singular value
 NEAR_LENGTH: Final = 0.004  # [m] likewise of a distance or a sliding joint
+
+
+class LimitRecord(TypedDict):
+    """A limit that a layout breaks or that holds it back."""
+
+    kind: Annotated[
+        str, "`position`, `velocity`, `acceleration`, `distance`, `singular`, `bound`, `start`, `path` or `check`"
+    ]
+    subject: Annotated[str, "robot and joint, pair of bodies, or variable"]
+    text: Annotated[str, "one line of text"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -32,11 +32,11 @@ from cellplan.pipeline.layout.finish import (
     too_singular,
 )
 from cellplan.pipeline.layout.limits import standing_of
+from cellplan.pipeline.layout.misplacement_record import CornerRecord, MisplacementRecord, ToleranceRecord
 from cellplan.pipeline.layout.prepared import NODES as FEW_NODES
 from cellplan.pipeline.layout.prepared import NOT_FOLLOWED
 from cellplan.pipeline.layout.proposals import BESTS, SAME
 from cellplan.report.record.common import number
-from cellplan.report.record.misplacement import CornerRecord, MisplacementRecord, ToleranceRecord
 from cellplan.search.misplacement.corners import Corner
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem

@@ -1,9 +1,9 @@
-"""The record of a layout search: what JSON, page and console show."""
+"""``study.json`` of a layout search: the best layout, what it was chosen from, and what decides."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict
 
 import numpy as np
 
@@ -12,33 +12,119 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.fastest.timed_program import Law
 from cellplan.pipeline.layout.finish import Certified, certified_cell
-from cellplan.pipeline.layout.given_layout import Given, standing_of_given
+from cellplan.pipeline.layout.given_layout import Given, GivenRecord, standing_of_given
+from cellplan.pipeline.layout.limits import LimitRecord
+from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
 from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
-from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import change_of
-from cellplan.pipeline.layout.variable_records import path_record, variable_records
+from cellplan.pipeline.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
 from cellplan.pipeline.write_run import versions
-from cellplan.report.record.common import number
-from cellplan.report.record.layout import (
-    SCHEMA,
-    CandidateRecord,
-    ChoiceRecord,
-    DroppedRecord,
-    LayoutRecord,
-    ProgressRecord,
-)
-from cellplan.report.text.layout import verdict_line
+from cellplan.report.record.common import Number, number
+from cellplan.report.record.schema import record_schema
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
 from cellplan.study.trial import TrialStatus
 
+SCHEMA: Final = "cellplan.layout/1"
 TOP: Final = 10  # [-] layouts that are listed
 SAME: Final = 1e-4  # [-] share by which figures of two layouts differ that are not one
 SLOWED: Final = 1.02  # [-] times the cycle that the joints allow, from which on it is said what else counts
 SWEPT: Final = 33  # [-] configurations that the swept area is made of
 FINE: Final = 6  # decimals of figures of the search: far above rounding
+
+
+class CandidateRecord(TypedDict):
+    """A layout that the search ended at."""
+
+    trial: Annotated[int, "number of the trial, from 0"]
+    origin: Annotated[str, "where the trial started from"]
+    status: Annotated[str, "`certified`, `rejected` by solve, `conforming` by the search, or `violating`"]
+    reason: Annotated[str, "why solve rejected it; empty otherwise"]
+    cycle_s: Annotated[Number, "shortest cycle; of a certified one as `solve` has it"]
+    margin_deg: Annotated[Number, "smallest distance of a turning joint from its limits"]
+    clearance_mm: Annotated[Number, "smallest distance of bodies; certified, or that at the keys of the search"]
+    change: Annotated[Number, "cost of the change from the given layout: 1 for 100 mm or 10 deg unless weighted"]
+    settings: Annotated[dict[str, Any], "by address: values of the cell file that make it"]
+
+
+class ChoiceRecord(TypedDict):
+    """A combination of discrete choices, and what came of it."""
+
+    choice: Annotated[str, "what differs from the given cell"]
+    status: Annotated[str, "`certified`, `conforming` by the search, `dropped`, or `not_tried`"]
+    trials: Annotated[int, "number of its trials"]
+    conforming: Annotated[int, "number of these that ended at a conforming layout"]
+    cycle_s: Annotated[Number, "shortest cycle of these, by the search; null without one"]
+    reason: Annotated[str, "why there is none, or why solve rejected it: the most frequent reason; else empty"]
+
+
+class DroppedRecord(TypedDict):
+    """Trials that led to no conforming layout, for one reason."""
+
+    reason: Annotated[str, "the reason"]
+    count: Annotated[int, "number of trials"]
+    trial: Annotated[int, "the first of them"]
+
+
+class ProgressRecord(TypedDict):
+    """The search after a trial."""
+
+    trial: Annotated[int, "number of the trial"]
+    cycle_s: Annotated[Number, "cycle of what this trial ended at; null where it does not conform"]
+    best_s: Annotated[Number, "best cycle so far; null before the first conforming layout"]
+
+
+class FileRecord(TypedDict):
+    """A file beside the result."""
+
+    name: Annotated[str, "name in the folder"]
+    sha256: Annotated[str, "its digest"]
+
+
+class LayoutRecord(TypedDict):
+    """A layout search."""
+
+    schema: Annotated[str, "name and version of the format"]
+    kind: Annotated[str, "`layout`"]
+    cell: Annotated[str, "name of the cell"]
+    file: Annotated[str, "the cell file"]
+    status: Annotated[str, "`certified`, `none_certified` or `no_start`"]
+    objective: Annotated[str, "`conforming`, `cycle`, `clearance` or `change`"]
+    timing: Annotated[str, "`laws` or `retimed`"]
+    duration_s: Annotated[Number, "duration that was demanded; null where the cycle is to be as short as possible"]
+    required_clearance_mm: Annotated[Number, "demanded distance of bodies"]
+    required_margin_deg: Annotated[Number, "demanded distance of turning joints from their limits"]
+    has_accelerations: Annotated[bool, "whether limits of acceleration are among the demands"]
+    seed: Annotated[int, "seed of the starts and perturbations"]
+    trials: Annotated[int, "number of finished trials: `--trials` with this number repeats the study"]
+    rounds: Annotated[int, "number of finished rounds"]
+    solves: Annotated[int, "number of layouts that were solved and verified in full"]
+    given: Annotated[GivenRecord, "the layout as it was given"]
+    best: Annotated[CandidateRecord | None, "the best certified layout; null without one"]
+    velocity_only_s: Annotated[Number, "cycle of the best layout without its limits of acceleration; null without any"]
+    top: Annotated[list[CandidateRecord], "the best ten layouts, best first"]
+    front: Annotated[list[CandidateRecord], "those that no other one beats in both cycle and clearance"]
+    binding: Annotated[list[LimitRecord], "what holds the best layout back"]
+    variables: Annotated[list[VariableRecord], "the variables with what they do at the best layout"]
+    path: Annotated[PathRecord | None, "the joint path that was searched; null where none may change"]
+    convergence: Annotated[list[ProgressRecord], "the search, trial after trial"]
+    choices: Annotated[list[ChoiceRecord], "every combination of discrete choices; empty without any"]
+    dropped: Annotated[list[DroppedRecord], "trials without a conforming layout, by reason"]
+    misplacement: Annotated[
+        MisplacementRecord | None, "the layout with every base off its place; null where it was not asked for"
+    ]
+    remarks: Annotated[list[str], "what else the user should know, as pedestals that move with their robots"]
+    drawing: Annotated[dict[str, Any], "floor plan in mm: the given and the best layout from above"]
+    files: Annotated[list[FileRecord], "`best.yaml` and the files that it names"]
+    inputs: Annotated[dict[str, str], "SHA-256 of every input file, by name"]
+    versions: Annotated[dict[str, str], "versions of cellplan and of the packages that the numbers depend on"]
+
+
+def layout_schema() -> dict[str, Any]:
+    """The JSON Schema of ``study.json`` of a layout search."""
+    return record_schema(LayoutRecord, SCHEMA, "study.json of a layout search")
 
 
 def layout_record(
@@ -113,15 +199,6 @@ def _slowed(best: Certified | None) -> Iterator[str]:
             f"{cycle:.4g} s: errors of the tools between rows (a shorter motion.step_s makes them less), demanded "
             "feeds, jerk, or limits of tool speed and of the part's acceleration"
         )
-
-
-def head_of(record: LayoutRecord, request: LayoutRequest) -> str:
-    """Comment above a resulting cell file."""
-    return (
-        f"Layout of {request.cell.name} found by cellplan layout, objective {request.objective}, seed {request.seed}, "
-        f"{record['trials']} trials.\n{verdict_line(record)}.\nChanged values say what they were; solve this file as "
-        "any other."
-    )
 
 
 def _candidates(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> Iterator[CandidateRecord]:

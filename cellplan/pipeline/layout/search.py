@@ -15,16 +15,14 @@ from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.given_layout import Given, given_layout
 from cellplan.pipeline.layout.prepared import Prepared, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
-from cellplan.pipeline.layout.record import head_of, layout_record
+from cellplan.pipeline.layout.record import LayoutRecord, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.result import head_of, layout_files, verdict_line
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.layout.searched import read_attempts, searched_cell
 from cellplan.pipeline.layout.trial import evaluate
 from cellplan.pipeline.layout.workers import layout_workers
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.layout import layout_files
-from cellplan.report.record.layout import LayoutRecord
-from cellplan.report.text.layout import verdict_line
 from cellplan.search.programs.objective import Objective
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study

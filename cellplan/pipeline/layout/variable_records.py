@@ -1,6 +1,6 @@
 """What each variable of a layout search is and does, and the joint path, as the record has them."""
 
-from typing import Final
+from typing import Annotated, Final, TypedDict
 
 import numpy as np
 
@@ -9,12 +9,37 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.layout.finish import Certified
 from cellplan.pipeline.layout.limits import Standing, effects
 from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.report.record.common import number
-from cellplan.report.record.layout import PathRecord, VariableRecord
+from cellplan.report.record.common import Number, number
 
 FINE: Final = 6  # decimals: far above rounding
 LENGTH_STEP: Final = 0.1  # [m] that effects are stated for
 ANGLE_STEP: Final = float(np.radians(10.0))  # [rad] likewise
+
+
+class VariableRecord(TypedDict):
+    """A variable of the search."""
+
+    name: Annotated[str, "its address in the cell file"]
+    unit: Annotated[str, "`mm`, `deg` or empty"]
+    lower: Annotated[Number, "lower bound"]
+    upper: Annotated[Number, "upper bound"]
+    given: Annotated[Number, "value in the given cell"]
+    best: Annotated[Number, "value in the best layout; null without one"]
+    step: Annotated[Number, "step that the effects are stated for"]
+    cycle_s: Annotated[Number, "effect of a step on the cycle, by the joint that decides it"]
+    margin_deg: Annotated[Number, "effect on the smallest margin of a turning joint"]
+    clearance_mm: Annotated[Number, "effect on the smallest distance of bodies"]
+
+
+class PathRecord(TypedDict):
+    """The joint path of the best layout."""
+
+    robot: Annotated[str, "whose joints follow it"]
+    coefficients: Annotated[int, "number of coefficients of each joint"]
+    degree: Annotated[int, "degree of the spline"]
+    is_given: Annotated[bool, "whether the given cell has a path; else the given motion is that without one"]
+    departure_deg: Annotated[Number, "by how much a turning joint leaves the given motion at most; null without one"]
+    departure_mm: Annotated[Number, "by how much a sliding joint does; null without one"]
 
 
 def variable_records(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.report import Report
 from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.present.kinds import KINDS as RESULT_KINDS
+from cellplan.pipeline.present.kinds import KINDS, RUN, TASK_COLUMNS, record_of
 from cellplan.pipeline.present.pictures import record_pictures, run_pictures
-from cellplan.pipeline.present.result_tables import NOWHERE, record_at, record_of, run_records, tables_of
+from cellplan.pipeline.present.result_tables import NOWHERE, record_at, run_records, tables_of
 from cellplan.pipeline.solution import Solution
 from cellplan.planning.layout_screening import Screening
 from cellplan.report.page.figures import figure, key_figures
@@ -24,38 +24,6 @@ from cellplan.report.record.common import Record
 from cellplan.report.record.numbers import seconds, small
 from cellplan.report.record.rows import format_of, run_tables
 from cellplan.report.record.summary import summary_record
-
-TASK_COLUMNS: Final = (
-    "task",
-    "robot",
-    "max_position_error_mm",
-    "tolerance.position_mm",
-    "max_orientation_error_deg",
-    "tolerance.orientation_deg",
-    "path_length_mm",
-    "start_s",
-    "end_s",
-)
-SHOWN: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
-    "comparison": {"variants": ("name", "status", "cycle_time_s", "min_margin_deg", "min_clearance_mm", "load_s")},
-    "layout": {
-        "top": ("trial", "status", "cycle_s", "margin_deg", "clearance_mm", "change"),
-        "variables": ("name", "unit", "given", "best", "lower", "upper"),
-    },
-    "advice": {"remedies": ("text", "kind", "cost", "cycle_s", "smallest_margin_deg", "smallest_clearance_mm")},
-    "map": {"places": ("x_mm", "y_mm", "yaw_deg", "verdict", "cycle_s", "reason")},
-    "rehearsal": {"tasks": ("task", "robot", "before.max_position_error_mm", "after.max_position_error_mm")},
-    "report": {"tasks": TASK_COLUMNS},
-}  # by kind of record: tables and their columns
-KINDS: Final[Mapping[str, str]] = {
-    "comparison": "Comparison",
-    "layout": "Layout search",
-    "advice": "Repair",
-    "map": "Map of a base",
-    "rehearsal": "Rehearsal",
-    "report": "Run",
-}
-GOOD: Final = frozenset({"passed", "certified", "passes", "repaired"})  # statuses
 
 
 @singledispatch
@@ -194,12 +162,10 @@ def _smallest_clearance(phase: tuple[Report, Cell]) -> float:
 
 def _record_card(record: Record) -> Card:
     """A record: its verdict, its pictures and the tables that are shown of its kind."""
-    tables = tables_of(record)
-    kind = format_of(record)
-    known = RESULT_KINDS.get(kind)
-    shown = SHOWN.get(kind, {}) if known is None else known.shown
+    tables, kind = tables_of(record), KINDS[format_of(record)]
+    varied = record.get("vary", ())  # addresses of a sweep
     grids = [
-        _grid(name.capitalize(), tables[name](), (*_varied(record), *columns), name) for name, columns in shown.items()
+        _grid(name.capitalize(), tables[name](), (*varied, *columns), name) for name, columns in kind.shown.items()
     ]
     status = str(record.get("status", ""))
     counts = {name: count for name, count in record.get("counts", {}).items() if count}
@@ -207,20 +173,15 @@ def _record_card(record: Record) -> Card:
         f"{count} {name.replace('_', ' ')}" for name, count in counts.items()
     )
     return Card(
-        kind=KINDS.get(kind, kind) if known is None else known.title,
+        kind=kind.title,
         name=record["cell"],
         verdict=verdict,
-        passed=status in GOOD if status else None,
+        passed=status in kind.good if status else None,
         findings=[check["message"] for check in record.get("checks", ()) if not check["passed"]],
-        figures=key_figures(record) if kind == "report" else [],
+        figures=key_figures(record) if kind is RUN else [],
         pictures=record_pictures(record),
         grids=grids,
     )
-
-
-def _varied(record: Record) -> tuple[str, ...]:
-    """Addresses that a sweep varies."""
-    return tuple(record.get("vary", ()))
 
 
 def _grid(caption: str, columns: Mapping[str, Any], names: Sequence[str], table: str) -> Grid:

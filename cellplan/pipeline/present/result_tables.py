@@ -15,52 +15,24 @@ from cellplan.io.run.folder import MANIFEST
 from cellplan.io.run.stored import read_stored_run
 from cellplan.model.cell import Cell
 from cellplan.model.phase import ALL_TASKS
-from cellplan.model.rehearsal import Rehearsal
 from cellplan.model.report import Report
 from cellplan.model.units import DEG, MM
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.fastest.result import fastest_record
-from cellplan.pipeline.fastest.shortest import ShortestCycles
 from cellplan.pipeline.present.cell_tables import cell_tables
-from cellplan.pipeline.present.kinds import record_tables
+from cellplan.pipeline.present.kinds import OF_JOBS, record_of, record_tables
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.wide_table import solution_rows, verified_rows
 from cellplan.planning.layout_screening import Screening
-from cellplan.report.record.clearance import (
-    clearance_record,
-    closest_pairs_record,
-    contacts_record,
-    left_out_record,
-)
+from cellplan.report.record.clearance import clearance_record, closest_pairs_record, contacts_record, left_out_record
 from cellplan.report.record.common import Provenance, Record, check_record, number
 from cellplan.report.record.joints import joints_record
-from cellplan.report.record.rehearsal import rehearsal_record
 from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series
 from cellplan.report.record.world_motion import speed_record
-from cellplan.study.folder import RESULT
 
-RECORDS: Final = ("map.json", "fastest.json", "advice.json", "rehearsal.json", RESULT)  # of folders, first ones first
 LARGEST: Final = 500_000_000  # [bytes] of a file with a record
 NOWHERE: Final = Provenance(versions={}, digests={})
-
-
-@singledispatch
-def record_of(result: object) -> Record | None:
-    """The record of a result whose tables and card are those of its JSON file; None for others."""
-    record = getattr(result, "record", None)  # of a layout search, or a repair
-    return record if isinstance(record, Mapping) else None
-
-
-@record_of.register
-def _(result: ShortestCycles) -> Record:
-    return fastest_record(result)
-
-
-@record_of.register
-def _(result: Rehearsal) -> Record:
-    return rehearsal_record(result, provenance=NOWHERE)
 
 
 @singledispatch
@@ -146,7 +118,8 @@ def record_at(path: Path) -> Record:
     """
     if _is_run(path):
         return read_stored_run(path).record
-    file = next((path / name for name in RECORDS if (path / name).exists()), path) if path.is_dir() else path
+    names = [kind.file for kind in OF_JOBS]
+    file = next((path / name for name in names if (path / name).exists()), path) if path.is_dir() else path
     return parse_json(read_regular_file(file, file=str(file), limit=LARGEST), str(file))
 
 

@@ -9,7 +9,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_STEP, PASSED_BY_TIME
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.layout.limits import standing_of
+from cellplan.pipeline.layout.limits import LimitRecord, standing_of
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
@@ -25,11 +25,9 @@ from cellplan.pipeline.repair.attempts import (
     owners,
 )
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture
-from cellplan.pipeline.repair.record import Case, Tried, advice_record, remedy_values
+from cellplan.pipeline.repair.record import AdviceRecord, Case, Tried, advice_record, remedy_values
 from cellplan.pipeline.repair.solved import step_asked, time_asked
 from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
-from cellplan.report.record.advice import AdviceRecord
-from cellplan.report.record.layout import LimitRecord
 from cellplan.search.programs.objective import Objective
 from cellplan.search.programs.problem import Point
 from cellplan.study.run import outcomes

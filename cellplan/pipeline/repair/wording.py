@@ -1,19 +1,29 @@
 """A remedy and what it does, in words."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import PASSED_BY_TIME
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind, listed_names
 from cellplan.pipeline.repair.neat import written_at
 from cellplan.pipeline.repair.solved import MARGIN
-from cellplan.report.record.advice import EffectRecord
-from cellplan.report.record.common import number
+from cellplan.report.record.common import Number, number
 
 AXES: Final = {"x_mm": ("+x", "-x"), "y_mm": ("+y", "-y"), "z_mm": ("up", "down")}
 TURNS: Final = ("roll_deg", "pitch_deg", "yaw_deg")
 SHOWN: Final = 0.005  # [deg] below which a joint of a start posture counts as unchanged
+
+
+class EffectRecord(TypedDict):
+    """What a remedy does to a check that fails as the cell is given."""
+
+    check: Annotated[str, "name of the check"]
+    subject: Annotated[str, "robot and joint, task, or pair of bodies"]
+    before: Annotated[Number, "figure in the given cell: a margin, a share of a limit, a distance or an error"]
+    after: Annotated[Number, "figure with the remedy"]
+    unit: Annotated[str, "unit of both"]
+    text: Annotated[str, "one line of text"]
 
 
 def change_text(cell: Cell, attempt: Attempt, values: Mapping[str, Any]) -> str:

@@ -15,6 +15,7 @@ from cellplan.io.input.json_reader import parse_json, required
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress
+from cellplan.pipeline.layout.record import SCHEMA
 from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.view.cell_scene import standing_scene
@@ -25,7 +26,6 @@ from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.report.record.common import Record
-from cellplan.report.record.layout import SCHEMA
 from cellplan.report.record.view import SceneViewRecord
 from cellplan.scene.bodies import is_ground, scene_bodies
 from cellplan.scene.scene import Scene

@@ -31,17 +31,6 @@ MODES: Final = {
     "part_at_rest": "the positioner is at rest",
     "semi_coordinated": "the positioner moves between tasks and is at rest during them",
 }
-EXECUTION_TITLES: Final = {
-    "before": "as solved",
-    "after": "corrected from pass to pass",
-    "in_pass": "corrected within the pass",
-}
-OUTCOMES: Final = {
-    "converged": "converged",
-    "stalled": "does not converge: the error stopped decreasing above the tolerance",
-    "diverged": "does not converge: the error grew, or the corrected references cannot be followed",
-    "unfinished": "has not converged within the allowed rounds",
-}
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
 NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
@@ -74,11 +63,11 @@ def report_page(
         "shares": _shares(record),
         "of_links": _by_reason(_of_links(record)),
         "method": list(method_lines(record["solver"], record["step_s"])),
-        "plots": _inline_plots(plots),
+        "plots": inline_plots(plots),
         "task_times": task_times(record, cell),
         "links": _links(record, drawings, beside),
     }
-    return _render("report.html", record, cell, parts | _shared_parts(record, cell, beside))
+    return cell_page("report.html", record, cell, parts | _shared_parts(record, cell, beside))
 
 
 def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> str:
@@ -89,7 +78,7 @@ def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> st
         **beside: What lies beside it, and its pictures.
     """
     parts = {"links": _links(record, (), beside), "errors": phase_errors(record)}
-    return _render("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
+    return cell_page("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
 
 
 def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Links]:
@@ -121,13 +110,15 @@ def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, objec
     }
 
 
-def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
-    """The page of a rehearsal; ``plots`` as ``pictures`` returns them."""
-    parts = {"plots": _inline_plots(plots), "executions": EXECUTION_TITLES, "outcomes": OUTCOMES}
-    return _render("rehearsal.html", record, cell, parts)
+def cell_page(name: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
+    """The page of something that was done with a cell.
 
-
-def _render(name: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:
+    Args:
+        name: File name of its template.
+        record: What the template shows.
+        cell: The cell.
+        parts: What else it shows, by the names in the template.
+    """
     texts = {
         "modes": MODES,
         "classes": {"whole": "whole cell", **CLASSES},
@@ -199,7 +190,7 @@ def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:
     return groups
 
 
-def _inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
+def inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
     """SVG pictures as page content, by file name without its suffix."""
     drawings = {name.removesuffix(".svg"): data for name, data in plots.items() if name.endswith(".svg")}
     return {name: inline_svg(data.decode()) for name, data in drawings.items()}

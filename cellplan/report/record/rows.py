@@ -11,15 +11,6 @@ from typing import Any, Final, get_type_hints
 from cellplan.model.phase import ALL_TASKS
 from cellplan.report.record.clearance import ClosestPair, Contact, LeftOutRecord
 from cellplan.report.record.common import CheckRecord, Record
-from cellplan.report.record.figures import KEY
-from cellplan.report.record.layout import (
-    CandidateRecord,
-    ChoiceRecord,
-    DroppedRecord,
-    LimitRecord,
-    ProgressRecord,
-    VariableRecord,
-)
 
 Row = dict[str, Any]
 Table = Callable[[], dict[str, Any]]  # values of each column by its name
@@ -46,17 +37,6 @@ def columns_of(rows: Iterable[Row], names: Iterable[str] = ()) -> dict[str, Any]
     return {name: [row.get(name) for row in found] for name in every}
 
 
-def tables_of_record(record: Record) -> Tables:
-    """The tables of a record by its format; nothing for a format without tables.
-
-    Args:
-        record: Content of ``report.json``, ``series.json``, ``study.json``, ``map.json``, ``fastest.json``,
-            ``advice.json`` or ``rehearsal.json``.
-    """
-    make = FORMATS.get(format_of(record))
-    return {} if make is None else make(record)
-
-
 def format_of(record: Record) -> str:
     """What kind of record it is: ``report``, ``series``, ``study`` of a sweep, ``comparison``, ``layout`` and so on."""
     name = str(record.get("schema", "")).partition("/")[0].removeprefix("cellplan.")
@@ -78,13 +58,13 @@ def run_tables(records: Sequence[Record]) -> Tables:
         return lambda: columns_of(rows(), ["phase", *names] if names else ())
 
     return {
-        "checks": each(lambda record: map(flat, record["checks"]), _names(CheckRecord)),
+        "checks": each(lambda record: map(flat, record["checks"]), columns_named(CheckRecord)),
         "joints": each(_joints),
         "tasks": each(lambda record: by_name(record["tasks"], "task")),
         "clearance": each(lambda record: by_name(record["clearance"], "class")),
-        "closest_pairs": each(lambda record: map(flat, record.get("closest_pairs", ())), _names(ClosestPair)),
-        "contacts": each(lambda record: map(flat, record.get("contacts", ())), _names(Contact)),
-        "left_out": each(lambda record: map(flat, record["left_out"]), _names(LeftOutRecord)),
+        "closest_pairs": each(lambda record: map(flat, record.get("closest_pairs", ())), columns_named(ClosestPair)),
+        "contacts": each(lambda record: map(flat, record.get("contacts", ())), columns_named(Contact)),
+        "left_out": each(lambda record: map(flat, record["left_out"]), columns_named(LeftOutRecord)),
         "speeds": each(lambda record: by_name(record.get("speeds", {}), "robot")),
         "motion_share": each(lambda record: by_name(record.get("motion_share", {}), "robot")),
     }
@@ -146,82 +126,13 @@ def _phase(record: Record) -> str:
     return str(record.get("phase") or ALL_TASKS)
 
 
-def _names(form: Any) -> list[str]:
+def columns_named(form: Any) -> list[str]:
     """Columns of the rows of a record type, in the order of its keys."""
     keys = get_type_hints(form)
     return [name for key in keys for name in (("first", "second") if key == PAIR else [key])]
 
 
-def _listed(record: Record, key: str, form: Any = None, names: Iterable[str] = ()) -> Table:
+def listed_table(record: Record, key: str, form: Any = None, names: Iterable[str] = ()) -> Table:
     """Table of a list of records."""
-    known = [*names, *(name for name in (_names(form) if form else ()) if name not in LIFTED)]
+    known = [*names, *(name for name in (columns_named(form) if form else ()) if name not in LIFTED)]
     return lambda: columns_of(map(flat, record.get(key) or ()), known)
-
-
-def _comparison_tables(record: Record) -> Tables:
-    """The tables of a comparison: a row for each mode, cell or run."""
-    names = ["name", "trial", "status", *KEY]
-    return {
-        "variants": _listed(record, "variants", names=names),
-        "differences": _listed(record, "differences", names=("key", "values")),
-    }
-
-
-def _layout_tables(record: Record) -> Tables:
-    """The tables of a layout search."""
-    return {
-        "top": _listed(record, "top", CandidateRecord),
-        "front": _listed(record, "front", CandidateRecord),
-        "variables": _listed(record, "variables", VariableRecord),
-        "binding": _listed(record, "binding", LimitRecord),
-        "convergence": _listed(record, "convergence", ProgressRecord),
-        "choices": _listed(record, "choices", ChoiceRecord),
-        "dropped": _listed(record, "dropped", DroppedRecord),
-    }
-
-
-def _advice_tables(record: Record) -> Tables:
-    """The tables of a repair; what a remedy does to each check is a table of its own."""
-
-    def effects() -> dict[str, Any]:
-        return columns_of(
-            {"remedy": number, **flat(effect)}
-            for number, remedy in enumerate(record["remedies"], start=1)
-            for effect in remedy["effects"]
-        )
-
-    def remedies() -> dict[str, Any]:
-        return columns_of(
-            flat({key: value for key, value in each.items() if key != "effects"}) for each in record["remedies"]
-        )
-
-    return {
-        "remedies": remedies,
-        "effects": effects,
-        "failed": _listed(record, "failed", CheckRecord),
-        "tried": _listed(record, "tried"),
-    }
-
-
-def _map_tables(record: Record) -> Tables:
-    """The tables of a map: a row for each place."""
-    return {"places": _listed(record, "places"), "best": _listed(record, "best")}
-
-
-def _rehearsal_tables(record: Record) -> Tables:
-    """The tables of a rehearsal: true errors of each task, and the checks of them."""
-    return {
-        "tasks": lambda: columns_of(by_name(record["tasks"], "task")),
-        "checks": _listed(record, "checks", CheckRecord),
-    }
-
-
-FORMATS: Final[Mapping[str, Callable[[Record], Tables]]] = {
-    "report": lambda record: run_tables([record]),
-    "series": lambda record: {"curves": lambda: curve_columns(record)},
-    "comparison": _comparison_tables,
-    "layout": _layout_tables,
-    "advice": _advice_tables,
-    "map": _map_tables,
-    "rehearsal": _rehearsal_tables,
-}

@@ -4,8 +4,6 @@ import types
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints, is_typeddict
 
-from cellplan.report.record.advice import AdviceRecord
-from cellplan.report.record.layout import LayoutRecord
 from cellplan.report.record.phases import AT, phase_key
 from cellplan.report.record.run import RunRecord
 from cellplan.report.record.series import SeriesRecord
@@ -51,27 +49,24 @@ def _with_phases(properties: dict[str, Any]) -> dict[str, Any]:
     return named
 
 
-def layout_schema() -> dict[str, Any]:
-    """The JSON Schema of ``study.json`` of a layout search."""
-    return _whole(LayoutRecord, "cellplan.layout/1", "study.json of a layout search")
-
-
 def series_schema(*, closed: bool = False) -> dict[str, Any]:
     """The JSON Schema of ``series.json``.
 
     Args:
         closed: Refuse keys that the schema does not name, as for ``report_schema``.
     """
-    return _whole(SeriesRecord, "cellplan.series/1", "series.json of a run", closed=closed)
+    return record_schema(SeriesRecord, "cellplan.series/1", "series.json of a run", closed=closed)
 
 
-def advice_schema() -> dict[str, Any]:
-    """The JSON Schema of ``advice.json``."""
-    return _whole(AdviceRecord, "cellplan.advice/1", "advice.json of a repair")
+def record_schema(form: Any, title: str, description: str, *, closed: bool = False) -> dict[str, Any]:
+    """The JSON Schema of a file with one record.
 
-
-def _whole(form: Any, title: str, description: str, *, closed: bool = False) -> dict[str, Any]:
-    """The schema of a file with one record."""
+    Args:
+        form: Its type.
+        title: Name and version of its format.
+        description: What the file is.
+        closed: Refuse keys that the schema does not name, as for ``report_schema``.
+    """
     definitions: dict[str, dict[str, Any]] = {}
     top = _schema(form, definitions, closed=closed)
     return {"$schema": DIALECT, "title": title, "description": description, **top, "$defs": definitions}

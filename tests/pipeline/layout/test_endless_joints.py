@@ -8,7 +8,7 @@ from builders.layout_search import CELL, searched_pair
 from builders.study_trials import InThisProcess
 
 from cellplan import BaseGrid, LayoutResult, MapRequest, map_study
-from cellplan.report.text.base_map import map_lines
+from cellplan.pipeline.base_map.result import map_lines
 
 
 def searched(folder: Path, **endless: tuple[str, ...]) -> LayoutResult:

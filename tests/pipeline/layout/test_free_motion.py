@@ -13,10 +13,10 @@ from cellplan.model.seeds import generator
 from cellplan.pipeline.layout import trial
 from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.result import path_text
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.layout.trial import Begin, _Begin
 from cellplan.pipeline.layout.variable_records import path_record
-from cellplan.report.text.layout import path_text
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
 

@@ -11,7 +11,7 @@ from cellplan import LayoutRequest, Stop, load_cell, search_layout, solve
 from cellplan.errors import InputError
 from cellplan.pipeline.layout.given_layout import given_record
 from cellplan.pipeline.layout.prepared import NODES, prepared
-from cellplan.report.text.layout import layout_lines
+from cellplan.pipeline.layout.result import layout_lines
 from cellplan.search.kernel.job import MOST, enough_nodes
 
 CELLS = CELL.parent

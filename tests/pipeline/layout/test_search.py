@@ -10,8 +10,8 @@ from builders.layout_search import CELL, SETTINGS, searched_pair
 from jsonschema import Draft202012Validator
 
 from cellplan import CellplanError, LayoutRequest, LayoutResult, Stop, load_cell, search_layout, solve
-from cellplan.report.record.schema import layout_schema
-from cellplan.report.text.layout import layout_lines
+from cellplan.pipeline.layout.record import layout_schema
+from cellplan.pipeline.layout.result import layout_lines
 from cellplan.study.folder import prepare_folder
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")

@@ -11,7 +11,7 @@ from cellplan import load_cell, solve
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.repair.repair import Repair, repair
-from cellplan.pipeline.repair.write import write_repair
+from cellplan.pipeline.repair.result import write_repair
 from cellplan.search.programs.objective import Objective
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")

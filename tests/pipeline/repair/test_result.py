@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from cellplan.report.page.advice import advice_page
-from cellplan.report.text.advice import advice_lines
+from cellplan.pipeline.repair.result import advice_lines, advice_page
 
 CHECK = {
     "name": "joint_velocity",

@@ -23,15 +23,14 @@ from cellplan.io.yaml.reader import parse_yaml
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
+from cellplan.pipeline.compare.result import comparison_files, comparison_record
 from cellplan.pipeline.gate.open_gate import open_gate
 from cellplan.pipeline.outcome import solved_outcome
 from cellplan.pipeline.overrides import require_task, with_overrides
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.comparison import comparison_files
 from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.comparison import ComparisonRecord, comparison_record
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series
 from cellplan.report.record.summary import summary_record
@@ -73,7 +72,7 @@ def compare(
     workers: int | Executor = 1,
     resume: bool = False,
     progress: Progress = silent,
-) -> ComparisonRecord:
+) -> Record:
     """Compare one cell in every mode, or several cells and runs, and write the study into a folder.
 
     Cells are solved; runs are read, and verified again where they passed. A mode that cannot be planned is a variant

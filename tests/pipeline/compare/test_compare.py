@@ -20,11 +20,10 @@ from cellplan.cli.main import run
 from cellplan.io.cell.changes import read_setting
 from cellplan.io.input.files import digest
 from cellplan.model.cell import Mode
-from cellplan.pipeline.compare import evaluate_subject
-from cellplan.report.page.comparison import comparison_files
-from cellplan.report.record.comparison import STATUSES
+from cellplan.pipeline.compare.compare import evaluate_subject
+from cellplan.pipeline.compare.result import comparison_files
 from cellplan.report.record.figures import KEY, figures_of
-from cellplan.study.trial import Variant
+from cellplan.study.trial import TrialStatus, Variant
 
 pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
 
@@ -280,4 +279,4 @@ def test_the_command_prints_verdicts_first_and_its_status_is_that_of_a_study(
     [((1, 2, 0, 0, 0), 0), ((0, 2, 1, 1, 0), 1), ((0, 0, 1, 2, 0), 1), ((0, 0, 0, 3, 0), 2), ((0, 0, 0, 2, 1), 1)],
 )
 def test_the_exit_status_is_that_of_the_best_variant(counts: tuple[int, ...], expected: int) -> None:
-    assert exit_status(dict(zip(STATUSES, counts, strict=True))) == expected
+    assert exit_status(dict(zip(TrialStatus, counts, strict=True))) == expected

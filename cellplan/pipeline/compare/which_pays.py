@@ -30,7 +30,7 @@ def sentences(variants: Sequence[Record]) -> list[str]:
     """What the figures of the variants say together.
 
     Args:
-        variants: Entries with ``name``, ``status``, ``reason`` and ``figures`` each; see ``ComparisonRecord``.
+        variants: Entries with ``name``, ``status``, ``reason`` and ``figures`` each; see ``comparison_record``.
     """
     passed = sorted(
         (each for each in variants if each["status"] == "passed"), key=lambda each: each["figures"]["cycle_time_s"]

@@ -22,11 +22,10 @@ from cellplan.model.rehearsal import (
     Trial,
 )
 from cellplan.model.report import TaskAccuracy
-from cellplan.report.page.render import rehearsal_page
-from cellplan.report.plots.rehearsal import rehearsal_figures
+from cellplan.pipeline.rehearsal.record import rehearsal_record
+from cellplan.pipeline.rehearsal.result import rehearsal_figures, rehearsal_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import Provenance, as_json
-from cellplan.report.record.rehearsal import rehearsal_record
 
 N = 5
 TIMES = 0.1 * np.arange(N)

@@ -1,17 +1,33 @@
-"""Advice as text: the verdict, remedies with the lines to type, and what was tried besides."""
+"""A repair as text, page, tables and files: what is shown, and in which order."""
 
 import shlex
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from cellplan.report.record.common import Record
+from cellplan.io.run.folder import MANIFEST, RunFolder
+from cellplan.io.run.manifest import render_manifest
+from cellplan.model.report import CAUTION
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.result import solve_best_line
+from cellplan.pipeline.layout.result_file import file_records, result_files
+from cellplan.pipeline.repair.record import AdviceRecord
+from cellplan.pipeline.repair.repair import Repair
+from cellplan.pipeline.write_run import versions
+from cellplan.report.page.kind import Kind
+from cellplan.report.page.render import template
+from cellplan.report.record.common import CheckRecord, Record, as_json
 from cellplan.report.record.numbers import floored, plain, seconds
-from cellplan.report.text.layout import solve_best_line
+from cellplan.report.record.rows import Tables, columns_of, flat, listed_table
 
 MOST_FAILED: Final = 4  # [-] failed checks that are shown
 MOST_EFFECTS: Final = 3  # [-] effects of a remedy that are shown
+RECORD: Final = "advice.json"
+PAGE: Final = "advice.html"
+
+
+# Text
 
 
 def advice_lines(record: Record, folder: Path, cell: Path) -> list[str]:
@@ -111,3 +127,99 @@ def _remedy(number: int, remedy: Record, cell: Path) -> Iterator[str]:
         yield f"       {effects_text(remedy)}"
     yield f"       {figures_text(remedy)}"
     yield f"       {command_line(remedy, cell)}"
+
+
+# Page
+
+
+def advice_page(record: Record) -> str:
+    """The page of a repair.
+
+    Args:
+        record: As ``advice_record`` returns it.
+    """
+    return template("advice.html").render(
+        r=record,
+        verdict=verdict_line(record),
+        demands=demands_text(record),
+        commands=[command_line(each, Path(record["file"])) for each in record["remedies"]],
+        tried=tried_groups(record),
+        caution=CAUTION,
+    )
+
+
+# Tables and files
+
+
+def advice_tables(record: Record) -> Tables:
+    """The tables of frames and notebooks; what a remedy does to each check is a table of its own."""
+
+    def effects() -> dict[str, Any]:
+        return columns_of(
+            {"remedy": number, **flat(effect)}
+            for number, remedy in enumerate(record["remedies"], start=1)
+            for effect in remedy["effects"]
+        )
+
+    def remedies() -> dict[str, Any]:
+        return columns_of(
+            flat({key: value for key, value in each.items() if key != "effects"}) for each in record["remedies"]
+        )
+
+    return {
+        "remedies": remedies,
+        "effects": effects,
+        "failed": listed_table(record, "failed", CheckRecord),
+        "tried": listed_table(record, "tried"),
+    }
+
+
+def write_repair(found: Repair, request: LayoutRequest, folder: Path) -> AdviceRecord:
+    """Write a repair into a folder, which appears whole or not at all.
+
+    It holds ``advice.json``, ``advice.html`` and, with a remedy, ``best.yaml``: the given cell file with the values of
+    the first remedy, and the files beside it that it names.
+
+    Args:
+        found: As ``repair`` returns it.
+        request: What was repaired.
+        folder: The folder; an earlier one is replaced.
+
+    Returns:
+        The record in ``advice.json``.
+
+    Raises:
+        InputError: The folder cannot be written, or holds something that cellplan did not write.
+    """
+    record = found.record
+    with RunFolder(folder) as target:
+        if found.best is not None:
+            beside = result_files(found.best, request.cell, folder, head=_head(record))
+            record["files"] = {each["name"]: each["sha256"] for each in file_records(beside)}
+            for name, content in beside.items():
+                target.write_bytes(name, content)
+        target.write_text(RECORD, as_json(record))
+        target.write_text(PAGE, advice_page(record))
+        passed = record["status"] in {"passes", "repaired"}
+        manifest = render_manifest(found.given, passed=passed, versions=versions(), files=target.written)
+        target.write_text(MANIFEST, manifest)
+    return record
+
+
+def _head(record: AdviceRecord) -> str:
+    """Comment above the repaired cell."""
+    remedy = record["remedies"][0]
+    return (
+        f"{record['file']} repaired by cellplan layout --repair ({demands_text(record)}): {remedy['text']}.\n"
+        f"Verified: {figures_text(remedy)}. Changed values say what they were."
+    )
+
+
+ADVICE: Final = Kind(
+    name="advice",
+    title="Repair",
+    file=RECORD,
+    tables=advice_tables,
+    shown={"remedies": ("text", "kind", "cost", "cycle_s", "smallest_margin_deg", "smallest_clearance_mm")},
+    good=("passes", "repaired"),
+)

@@ -21,22 +21,11 @@ ABC = ("a", "b", "c")
 Pick = Callable[[Trial], tuple[TaskAccuracy, ...] | None]
 
 
-def before(trial: Trial) -> tuple[TaskAccuracy, ...] | None:
-    """True errors of the program as it was solved."""
-    return trial.before
-
-
-def after(trial: Trial) -> tuple[TaskAccuracy, ...] | None:
-    """True errors after correcting from pass to pass."""
-    return None if trial.correction is None else trial.correction.accuracy
-
-
-def in_pass(trial: Trial) -> tuple[TaskAccuracy, ...] | None:
-    """True errors with correction within the pass."""
-    return trial.in_pass
-
-
-EXECUTIONS: Mapping[str, Pick] = {"before": before, "after": after, "in_pass": in_pass}
+EXECUTIONS: Mapping[str, Pick] = {
+    "before": lambda trial: trial.before,
+    "after": lambda trial: None if trial.correction is None else trial.correction.accuracy,
+    "in_pass": lambda trial: trial.in_pass,
+}  # true errors of the program as solved, corrected from pass to pass, and corrected within the pass
 
 
 def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:

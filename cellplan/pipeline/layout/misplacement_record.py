@@ -1,4 +1,4 @@
-"""The part of ``study.json`` about bases that are off their places."""
+"""The part of ``study.json`` of a layout search about bases that are off their places."""
 
 from typing import Annotated, TypedDict
 

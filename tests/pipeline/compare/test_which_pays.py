@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cellplan.report.record.which_pays import sentences
+from cellplan.pipeline.compare.which_pays import sentences
 
 EVEN = {
     "cycle_time_s": 4.0,

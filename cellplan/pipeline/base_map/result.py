@@ -1,0 +1,355 @@
+"""The map of a base as record, text, picture and page: what is shown, and in which order."""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.io.cell.changes import plain_values
+from cellplan.io.yaml.writer import flow_text
+from cellplan.model.report import CAUTION
+from cellplan.model.units import DEG, MM, joint_unit
+from cellplan.report.page.kind import Kind
+from cellplan.report.page.render import template
+from cellplan.report.plots.figure import Axis, Box, Figure, Item, Key, Mark, Note, Panel, line, outline
+from cellplan.report.plots.palette import INK, LIMIT, PAPER, ROBOTS
+from cellplan.report.plots.rendering import pictures
+from cellplan.report.plots.svg import inline_svg
+from cellplan.report.record.common import Record, as_json, number
+from cellplan.report.record.rows import Tables, listed_table
+from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, Verdict, counts
+
+SCHEMA: Final = "cellplan.map/1"
+FINE: Final = 6  # decimals of figures: far below what 65 nodes are good for, far above rounding
+START: Final = 9  # decimals of start postures: far below the tolerance of any task
+COLOURS: Final = {
+    "collision": "#e6a7a0",
+    "speed": "#eccb85",
+    "limit": "#b9c0ca",
+    "out_of_reach": "#f1f3f6",
+    "not_judged": "#8a6fb0",
+}
+SHADES: Final = ("#12492f", "#1e6b45", "#2f8d5d", "#55ad7c", "#86c9a1", "#b6e0c5")  # of places that pass, fastest first
+TITLES: Final = {
+    "passes": "passes",
+    "collision": "collision or too near",
+    "speed": "too fast",
+    "limit": "beyond a joint limit",
+    "out_of_reach": "out of reach",
+    "not_judged": "not judged",
+}
+
+
+# The record: map.json
+
+
+def map_record(
+    asked: MapJob,
+    found: Sequence[PlaceVerdict],
+    *,
+    best: Sequence[tuple[int, Mapping[str, Any]]],
+    certified: Sequence[Mapping[str, Any]],
+    drawn: Mapping[str, Any],
+    versions: Mapping[str, str],
+) -> Record:
+    """The map in printed units.
+
+    Args:
+        asked: The job and the places.
+        found: The verdict of every place.
+        best: The best places with their settings, best first.
+        certified: What came of the first of them when they were solved.
+        drawn: Outlines and paths.
+        versions: Version by package.
+    """
+    cell, places = asked.scene.cell, asked.places
+    base = cell.robot(asked.robot).X_WB
+    listed = []
+    for rank, (place, settings) in enumerate(best):
+        options = [f"{address}={flow_text(value)}" for address, value in plain_values(settings).items()]
+        outcome = certified[rank] if rank < len(certified) else None
+        listed.append({"place": place, "settings": plain_values(settings), "options": options, "certified": outcome})
+    return {
+        "schema": SCHEMA,
+        "cell": cell.name,
+        "robot": asked.robot,
+        "duration_s": number(float(asked.job.times[-1])),
+        "present": {
+            "x_mm": number(MM * base[0, 3]),
+            "y_mm": number(MM * base[1, 3]),
+            "z_mm": number(MM * base[2, 3]),
+            "yaw_deg": number(DEG * float(np.arctan2(base[1, 0], base[0, 0]))),
+        },
+        "x_mm": [number(x) for x in places.x.tolist()],
+        "y_mm": [number(y) for y in places.y.tolist()],
+        "counts": {str(verdict): count for verdict, count in counts(found).items()},
+        "best": listed,
+        "places": [_place(asked, each, place) for place, each in enumerate(found)],
+        "drawing": dict(drawn),
+        "inputs": dict(cell.inputs),
+        "versions": dict(versions),
+    }
+
+
+def _place(asked: MapJob, found: PlaceVerdict, place: int) -> dict[str, Any]:
+    """One place."""
+    places = asked.places
+    return {
+        "x_mm": number(MM * places.X_WB[place, 0, 3]),
+        "y_mm": number(MM * places.X_WB[place, 1, 3]),
+        "yaw_deg": number(round(DEG * places.yaw[place], FINE)),
+        "verdict": str(found.verdict),
+        "reason": _reason(asked, found),
+        "start": _start(asked, found),
+        "figures": _figures(asked, found),
+    }
+
+
+def _start(asked: MapJob, found: PlaceVerdict) -> list[float] | None:
+    """Start posture of the robot in [deg], of sliding joints in [mm]; None where there is none."""
+    if found.start is None:
+        return None
+    joints = asked.scene.cell.robot(asked.robot).model.joints
+    scales = [joint_unit(is_revolute=joint.is_revolute).scale for joint in joints]
+    return [round(scale * value, START) + 0.0 for scale, value in zip(scales, found.start.tolist(), strict=True)]
+
+
+def _figures(asked: MapJob, found: PlaceVerdict) -> dict[str, Any]:
+    """Figures of a place; none where there is no motion."""
+    if found.cycle is None or found.speed is None or found.acceleration is None or found.fast is None:
+        return {}
+    value, unit = (None, "") if found.joint is None else _margin(asked, found)
+    return {
+        "cycle_s": round(found.cycle, FINE),
+        "margin": None if value is None else round(value, FINE),
+        "margin_unit": unit,
+        "margin_joint": "/".join(found.joint or ()),
+        "max_velocity_ratio": round(found.speed, FINE),
+        "max_acceleration_ratio": round(found.acceleration, FINE),
+        "fastest_joint": "/".join(found.fast),
+    }
+
+
+def _margin(asked: MapJob, found: PlaceVerdict) -> tuple[float, str]:
+    """Smallest distance of the joint that leaves least from its limits, and its unit."""
+    robot, name = found.joint or ("", "")
+    joint = next(each for each in asked.scene.cell.robot(robot).model.joints if each.name == name)
+    unit = joint_unit(is_revolute=joint.is_revolute)
+    return unit.scale * (found.margin or 0.0), unit.name
+
+
+def _reason(asked: MapJob, found: PlaceVerdict) -> str:
+    """Why a place does not pass; empty where it does."""
+    if found.verdict is Verdict.OUT_OF_REACH:
+        if found.start is None:
+            return "no start posture reaches the path"
+        return f"a tool loses its path at {found.lost_at:.3g} s"
+    if found.verdict is Verdict.LIMIT:
+        value, unit = _margin(asked, found)
+        where = " at the start" if found.cycle is None else ""
+        return f"{'/'.join(found.joint or ())} is {-value:.3g} {unit} beyond its limit{where}"
+    if found.verdict is Verdict.SPEED:
+        speed, rate = found.speed or 0.0, found.acceleration or 0.0
+        what = "speed" if speed >= np.sqrt(rate) else "acceleration"
+        share = 100.0 * (speed if what == "speed" else rate)
+        return f"{'/'.join(found.fast or ())} at {share:.4g} % of its {what} limit"
+    if found.verdict is Verdict.COLLISION and found.pair is not None:
+        distance = MM * (found.distance or 0.0)
+        how = f"{distance:.3g} mm apart" if distance > 0.0 else f"{-distance:.3g} mm into each other"
+        return f"{found.pair[0]} and {found.pair[1]} {how} at {found.at or 0.0:.3g} s"
+    return found.reason
+
+
+# Text
+
+
+def map_lines(record: Record, folder: Path) -> list[str]:
+    """All lines about a map.
+
+    Args:
+        record: As ``base_map`` returns it.
+    """
+    counts = record["counts"]
+    others = ", ".join(
+        f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items() if verdict != "passes"
+    )
+    lines = [
+        f"{record['cell']}, {record['robot']}: {counts['passes']} of {len(record['places'])} places pass; {others}"
+    ]
+    for each in record["best"][:1]:
+        place = record["places"][each["place"]]
+        figures, options = place["figures"], " ".join(f"--set '{option}'" for option in each["options"])
+        margin = "no joint with limits"
+        if figures["margin"] is not None:
+            margin = f"margin {figures['margin']:.1f} {figures['margin_unit']} ({figures['margin_joint']})"
+        lines += [
+            f"  best: x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: cycle {figures['cycle_s']:.3f} s, {margin}",
+            f"  to solve it: {options}",
+        ]
+    outcomes = [each["certified"] for each in record["best"] if each["certified"] is not None]
+    for each, outcome in zip(record["best"], outcomes, strict=False):
+        place = record["places"][each["place"]]
+        why = f": {outcome['reason']}" if outcome["reason"] else ""
+        lines.append(f"  solved at x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: {outcome['status']}{why}")
+    return [*lines, f"map: {folder / 'map.html'}"]
+
+
+# Picture and page
+
+
+def map_figure(record: Record) -> Figure:
+    """The figure of a map.
+
+    Args:
+        record: As ``base_map`` returns it.
+    """
+    half = 0.5 * _step(record)
+    x, y = record["x_mm"], record["y_mm"]
+    panel = Panel(
+        title="",
+        y=Axis(low=y[0] - half, high=y[-1] + half, label="y in mm, upward", unit="mm"),
+        items=[*_places(record, half), *_things(record), *_best(record)],
+    )
+    return Figure(
+        title=f"{record['cell']}: base of {record['robot']} from above",
+        x=Axis(low=x[0] - half, high=x[-1] + half, label="x in mm", unit="mm"),
+        panels=[panel],
+        is_plane=True,
+        is_exact=True,
+        legend=list(_legend(record)),
+    )
+
+
+def cycle_classes(record: Record) -> list[tuple[str, float, float]]:
+    """Colour, shortest and longest cycle in [s] of each class of places that pass, fastest first."""
+    cycles = [place["figures"]["cycle_s"] for place in record["places"] if place["verdict"] == "passes"]
+    if not cycles:
+        return []
+    edges = np.linspace(min(cycles), max(cycles), len(SHADES) + 1).tolist()
+    if edges[0] == edges[-1]:
+        return [(SHADES[0], edges[0], edges[0])]
+    return [(colour, edges[i], edges[i + 1]) for i, colour in enumerate(SHADES)]
+
+
+def colours_of(record: Record) -> dict[str, str]:
+    """Colours of the verdicts that a map has, but for places that pass."""
+    return {verdict: colour for verdict, colour in COLOURS.items() if verdict in record["counts"]}
+
+
+def _step(record: Record) -> float:
+    """Distance of neighbouring places in [mm]."""
+    gaps = [values[1] - values[0] for values in (record["x_mm"], record["y_mm"]) if len(values) > 1]
+    return float(gaps[0]) if gaps else 100.0
+
+
+def _colour(place: Record, classes: list[tuple[str, float, float]]) -> str:
+    """Colour of a place."""
+    if place["verdict"] != "passes":
+        return COLOURS[place["verdict"]]
+    return next((c for c, _, last in classes if place["figures"]["cycle_s"] <= last), classes[-1][0])
+
+
+def _places(record: Record, half: float) -> Iterator[Item]:
+    """Every place as a square; neighbours of one colour in a row as one rectangle."""
+    classes, columns, x = cycle_classes(record), len(record["x_mm"]), record["x_mm"]
+    for row, y in enumerate(record["y_mm"]):
+        colours = [_colour(each, classes) for each in record["places"][row * columns : (row + 1) * columns]]
+        first = 0
+        for colour, places in groupby(colours):
+            last = first + len(list(places)) - 1
+            yield Box((x[first] - half, x[last] + half), (y - half, y + half), colour)
+            first = last + 1
+
+
+def _things(record: Record) -> Iterator[Item]:
+    """Robots at the start, part, surroundings, paths and the present base."""
+    drawn, robot = record["drawing"], record["robot"]
+    for each in drawn["outlines"]:
+        colour = LIMIT if each["robot"] == robot else INK
+        width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.45
+        yield outline(each["outline_mm"], colour=colour, width=width)
+    for index, each in enumerate(drawn["paths"]):
+        yield line(each["points_mm"], colour=ROBOTS[index % len(ROBOTS)], width=1.6)
+    for each in drawn["robots"]:
+        colour = LIMIT if each["name"] == robot else INK
+        yield Note(each["x_mm"], each["y_mm"], each["name"], colour, size=8.5, is_bold=True)
+
+
+def _best(record: Record) -> Iterator[Item]:
+    """The best places: a star and dots, white where they were verified, red where they failed."""
+    for rank, each in enumerate(record["best"]):
+        place = record["places"][each["place"]]
+        colour = {"passed": PAPER, None: INK}.get((each["certified"] or {}).get("status"), LIMIT)
+        size, edge = 6.5 if rank == 0 else 3.5, INK if colour == PAPER else PAPER
+        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
+
+
+def _legend(record: Record) -> Iterator[Key]:
+    """What the colours mean, with the number of places of each."""
+    yield Key(f"passes: {record['counts']['passes']}", is_bold=True)
+    for colour, first, last in cycle_classes(record):
+        yield Key(f"cycle {first:.2f} to {last:.2f} s", colour)
+    for verdict, colour in colours_of(record).items():
+        yield Key(f"{TITLES[verdict]}: {record['counts'][verdict]}", colour)
+    yield Key(f"red: {record['robot']} as it stands", ink=LIMIT)
+    yield Key("star: best place, dots: next best")
+
+
+def map_page(record: Record, plot: bytes) -> str:
+    """The page of a map.
+
+    Args:
+        record: As ``base_map`` returns it.
+        plot: Its picture as SVG.
+    """
+    colours = colours_of(record)
+    best: list[dict[str, Any]] = [{**each, **record["places"][each["place"]]} for each in record["best"]]
+    examples = {
+        verdict: next((place["reason"] for place in record["places"] if place["verdict"] == verdict), "")
+        for verdict in colours
+    }
+    return template("base_map.html").render(
+        r=record,
+        best=best,
+        plot=inline_svg(plot.decode()),
+        classes=cycle_classes(record),
+        colours=colours,
+        titles=TITLES,
+        examples=examples,
+        caution=CAUTION,
+    )
+
+
+# Files and tables
+
+
+def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
+    """Content of the files of a map by name.
+
+    Args:
+        record: As ``base_map`` returns it.
+        formats: Formats of the picture beside SVG.
+    """
+    plots = pictures({"map": map_figure(record)}, formats)
+    return {
+        "map.json": as_json(record).encode(),
+        **plots,
+        "map.html": map_page(record, plots["map.svg"]).encode(),
+    }
+
+
+def map_tables(record: Record) -> Tables:
+    """The tables of frames and notebooks: a row for each place, and for each of the best."""
+    return {"places": listed_table(record, "places"), "best": listed_table(record, "best")}
+
+
+MAP: Final = Kind(
+    name="map",
+    title="Map of a base",
+    file="map.json",
+    tables=map_tables,
+    shown={"places": ("x_mm", "y_mm", "yaw_deg", "verdict", "cycle_s", "reason")},
+    pictures=lambda record: {"map": map_figure(record)},
+)

@@ -1,0 +1,400 @@
+"""A layout search as text, plots, page, tables and files: what is shown, and in which order."""
+
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.model.report import CAUTION
+from cellplan.pipeline.layout.limits import LimitRecord
+from cellplan.pipeline.layout.record import CandidateRecord, ChoiceRecord, DroppedRecord, LayoutRecord, ProgressRecord
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.variable_records import VariableRecord
+from cellplan.report.page.kind import Kind
+from cellplan.report.page.render import template
+from cellplan.report.plots.figure import (
+    Axis,
+    Box,
+    Curve,
+    Figure,
+    Item,
+    Key,
+    Limit,
+    Mark,
+    Note,
+    Panel,
+    line,
+    outline,
+    value_axis,
+)
+from cellplan.report.plots.palette import GREY, INK, LIMIT, PAPER, ROBOTS
+from cellplan.report.plots.svg import inline_svg, svg_text
+from cellplan.report.record.common import Entries, Record, as_json
+from cellplan.report.record.numbers import floored, plain, seconds
+from cellplan.report.record.rows import Tables, listed_table
+
+MOST: Final = 6  # [-] lines of what binds, of what the given layout breaks, and of reasons
+SAME: Final = 1e-3  # [mm] or [deg] by which a variable may differ and count as unchanged
+BORDER: Final = 150.0  # [mm] about what is drawn
+CIRCLE: Final = np.linspace(0.0, 2.0 * np.pi, 73)
+HALF, ROW = 6.2, 3.0  # [inch] width and height of a figure with one curve
+CYCLE: Final = "shortest cycle in s"
+
+
+# Text
+
+
+def layout_lines(record: Record, folder: Path) -> list[str]:
+    """All lines about a layout search.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
+    lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]
+    if record["best"] is not None:
+        changes = list(_changes(record))
+        lines.append("  what changed" if changes else "  nothing changed")
+        lines += [f"    {line}" for line in changes]
+        if record["binding"]:
+            lines.append("  what holds it back")
+            lines += [f"    {each['text']}" for each in record["binding"][:MOST]]
+    else:
+        rejected = [each for each in record["top"] if each["status"] == "rejected"]
+        lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
+        lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
+    lines += [f"  {line}" for line in map(_choice, record["choices"])]
+    lines += [f"  {line}" for line in _misplaced(record)]
+    lines += [f"  {remark}" for remark in record["remarks"]]
+    rounds = "1 round" if record["rounds"] == 1 else f"{record['rounds']} rounds"
+    lines.append(f"  {_trials(record['trials'])} in {rounds}, {record['solves']} solved in full")
+    if record["best"] is not None:
+        lines.append(solve_best_line(folder))
+    return [*lines, f"report: {folder / 'study.html'}"]
+
+
+def solve_best_line(folder: Path) -> str:
+    """The line to type for the best cell of a folder; its run does not replace that of the given cell."""
+    words = ["cellplan", "solve", str(folder / "best.yaml"), "-o", f"{folder}-run"]
+    return f"next: {shlex.join(words)}"
+
+
+def verdict_line(record: Record) -> str:
+    """What came of the search, in one line."""
+    best = record["best"]
+    if best is None and record["status"] == "no_start":
+        return "NO START: no layout was found in which all tools reach the starts of their paths"
+    if best is None:
+        return "NO LAYOUT CERTIFIED"
+    figures = [f"cycle {seconds(best['cycle_s'])} s"]
+    if best["margin_deg"] is not None:
+        figures.append(f"smallest margin {plain(floored(best['margin_deg']))} deg")
+    if best["clearance_mm"] is not None:
+        figures.append(f"smallest clearance {floored(best['clearance_mm'])} mm")
+    return f"CERTIFIED: {', '.join(figures)}"
+
+
+def changed_variables(record: Record) -> Entries:
+    """Variables whose value in the best layout is another one than in the given one."""
+    return [
+        dict(each)
+        for each in record["variables"]
+        if None not in (each["given"], each["best"]) and abs(each["best"] - each["given"]) > SAME
+    ]
+
+
+def _misplaced(record: Record) -> Iterator[str]:
+    """What was sampled with displaced bases."""
+    found = record["misplacement"]
+    if found is None:
+        return
+    by = f"{found['position_mm']:g} mm and {found['orientation_deg']:g} deg"
+    yield f"with every base off by {by}, sampled, motion planned anew, in this one cycle:"
+    yield (
+        f"  {found['seeded_kept']} of {found['seeded']} seeded corners, {found['by_derivatives_kept']} of "
+        f"{found['by_derivatives']} worst corners by derivatives, {found['ends_kept']} of {found['ends']} single "
+        f"displacements passed every check"
+    )
+
+
+def head_of(record: LayoutRecord, request: LayoutRequest) -> str:
+    """Comment above a resulting cell file."""
+    return (
+        f"Layout of {request.cell.name} found by cellplan layout, objective {request.objective}, seed {request.seed}, "
+        f"{record['trials']} trials.\n{verdict_line(record)}.\nChanged values say what they were; solve this file as "
+        "any other."
+    )
+
+
+def _given(record: Record) -> str:
+    """The given layout in one line."""
+    given = record["given"]
+    if given["reason"]:
+        return f"as given: no motion: {given['reason']}"
+    state = "conforms" if given["status"] == "conforming" else "does not conform"
+    cycle = "" if given["cycle_s"] is None else f"; shortest cycle of its motion {seconds(given['cycle_s'])} s"
+    return f"as given: {state}{cycle}"
+
+
+def _changes(record: Record) -> Iterator[str]:
+    """Changed variables, those of one entry of the cell file on one line."""
+    groups: dict[str, list[str]] = {}
+    for each in changed_variables(record):
+        entry, _, name = each["name"].removeprefix("robots.").rpartition(".")
+        unit = f" {each['unit']}" if each["unit"] else ""
+        groups.setdefault(entry, []).append(
+            f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
+        )
+    yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
+    if record["path"] is not None:
+        yield path_text(record["path"])
+
+
+def path_text(path: Record) -> str:
+    """A joint path in one line, and how far it is from the given motion."""
+    parts = ((path["departure_deg"], "deg"), (path["departure_mm"], "mm"))
+    departures = " and ".join(f"{value:.3g} {unit}" for value, unit in parts if value is not None)
+    given = "path" if path["is_given"] else "motion"
+    return (
+        f"{path['robot']}.path: {path['coefficients']} coefficients a joint, largest departure {departures} from the "
+        f"given {given}"
+    )
+
+
+def _choice(each: Record) -> str:
+    """A combination of discrete choices in one line."""
+    cycle = "" if each["cycle_s"] is None else f", cycle {seconds(each['cycle_s'])} s"
+    reason = f": {each['reason']}" if each["reason"] else ""
+    return f"{each['choice']}: {each['status'].replace('_', ' ')} ({_trials(each['trials'])}{cycle}){reason}"
+
+
+def _trials(count: int) -> str:
+    """A number of trials in words."""
+    return f"{count} trial" if count == 1 else f"{count} trials"
+
+
+# Plots and page
+
+
+def floor_plan(record: Record) -> Figure | None:
+    """The given and the best layout from above, to scale; None where nothing is drawn.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    drawn = record["drawing"]
+    if not drawn:
+        return None
+    low, high = _extent(drawn)
+    panel = Panel(
+        title="",
+        y=Axis(low=float(low[1]), high=float(high[1]), label="y in mm, upward", unit="mm"),
+        items=[*_sweep(drawn), *_reach(drawn), *_outlines(drawn), *_bases(drawn)],
+    )
+    return Figure(
+        title=f"{record['cell']} from above",
+        x=Axis(low=float(low[0]), high=float(high[0]), label="x in mm", unit="mm"),
+        panels=[panel],
+        is_plane=True,
+        legend=list(_legend(drawn)),
+    )
+
+
+def front_figure(record: Record) -> Figure | None:
+    """Cycle against clearance of all conforming layouts, those that no other one beats joined; None without any."""
+    found = [each for each in _shown(record) if each["cycle_s"] is not None and each["clearance_mm"] is not None]
+    if not found:
+        return None
+    demanded = float(record["required_clearance_mm"] or 0.0)
+    clearances = [demanded, *(float(each["clearance_mm"]) for each in found)]
+    spread = max(clearances) - min(clearances) or 1.0
+    low, high = min(clearances) - 0.08 * spread, max(clearances) + 0.08 * spread
+    items: list[Item] = [Limit(demanded, "demanded", is_vertical=True)]
+    front = sorted((float(each["clearance_mm"]), float(each["cycle_s"])) for each in record["front"])
+    if len(front) > 1:
+        items.append(line(front, colour=ROBOTS[0], width=1.2))
+    for each in found:
+        colour = {"certified": ROBOTS[2], "rejected": LIMIT}.get(each["status"], GREY)
+        items.append(Mark(float(each["clearance_mm"]), float(each["cycle_s"]), colour))
+    axis = _cycle_axis([float(each["cycle_s"]) for each in found])
+    return Figure(
+        title="cycle against clearance",
+        x=Axis(low=low, high=high, label="clearance in mm", unit="mm"),
+        panels=[Panel(title=CYCLE, y=axis, items=items)],
+        width=HALF,
+        row=ROW,
+    )
+
+
+def convergence_figure(record: Record) -> Figure | None:
+    """Cycle of every conforming trial and the best so far, trial after trial; None without any."""
+    steps = [each for each in record["convergence"] if each["best_s"] is not None]
+    if not steps:
+        return None
+    last = max(each["trial"] for each in record["convergence"])
+    shown = [float(each[key]) for each in steps for key in ("cycle_s", "best_s") if each[key] is not None]
+    tried = [each for each in steps if each["cycle_s"] is not None]
+    items: list[Item] = [Mark(float(each["trial"]), float(each["cycle_s"]), GREY) for each in tried]
+    at = np.array([value for each in steps for value in (each["trial"] - 0.5, each["trial"] + 0.5)], dtype=float)
+    items.append(Curve("best so far", at, np.repeat([float(each["best_s"]) for each in steps], 2), ROBOTS[0]))
+    return Figure(
+        title="each trial (dots) and the best so far (line)",
+        x=Axis(low=-0.5, high=max(last, 1) + 0.5, label="trial"),
+        panels=[Panel(title=CYCLE, y=_cycle_axis(shown), items=items)],
+        width=HALF,
+        row=ROW,
+    )
+
+
+def _cycle_axis(cycles: list[float]) -> Axis:
+    """The axis of cycles; one cycle alone has room about it too."""
+    if min(cycles) < max(cycles):
+        return value_axis(min(cycles), max(cycles), unit="s")
+    return Axis(low=0.9 * cycles[0], high=1.1 * cycles[0], unit="s")
+
+
+def _shown(record: Record) -> Entries:
+    """Layouts of the figure, each once."""
+    listed: dict[int, Any] = {}
+    for each in (*record["front"], *record["top"]):
+        listed.setdefault(each["trial"], each)
+    return [each for each in listed.values() if each["status"] != "violating"]
+
+
+def _extent(drawn: Record) -> tuple[Any, Any]:
+    """Lowest and highest corner of the plan in [mm]."""
+    points = [
+        point for each in (*drawn["given"]["outlines"], *drawn["best"]["outlines"]) for point in each["outline_mm"]
+    ]
+    points += [[each["x_mm"], each["y_mm"]] for each in (*drawn["given"]["robots"], *drawn["best"]["robots"])]
+    swept = drawn["swept"]
+    points += [[x, row[0]] for rows in swept["robots"].values() for row in rows for x in (row[1], row[2])]
+    found = np.array(points, dtype=float)
+    return found.min(axis=0) - BORDER, found.max(axis=0) + BORDER
+
+
+def _sweep(drawn: Record) -> Iterator[Item]:
+    """What the links of each robot cover, in its colour."""
+    half = 0.5 * drawn["swept"]["square_mm"]
+    for index, rows in enumerate(drawn["swept"]["robots"].values()):
+        for y, first, last in rows:
+            yield Box((first - half, last + half), (y - half, y + half), _colour(index), opacity=0.16)
+
+
+def _reach(drawn: Record) -> Iterator[Item]:
+    """The reach of each robot from its new base."""
+    for index, each in enumerate(drawn["best"]["robots"]):
+        reach = drawn["reach_mm"][each["name"]]
+        circle = np.stack([each["x_mm"] + reach * np.cos(CIRCLE), each["y_mm"] + reach * np.sin(CIRCLE)], axis=1)
+        yield line(circle, colour=_colour(index), width=0.6, is_dashed=True)
+
+
+def _outlines(drawn: Record) -> Iterator[Item]:
+    """Bodies of the best layout at the start, what stands of the given one, and the paths."""
+    names = list(drawn["swept"]["robots"])
+    for name, box in drawn["keep_out"].items():
+        yield outline(box, colour=LIMIT, width=0.8, is_dashed=True)
+        x, y = np.mean(box, axis=0).tolist()
+        yield Note(x, y, name, LIMIT, size=7.0)
+    for each in drawn["given"]["outlines"]:
+        if each["is_at_rest"] and each["robot"]:
+            yield outline(each["outline_mm"], colour=GREY, width=0.9, is_dashed=True)
+    for each in drawn["best"]["outlines"]:
+        colour = _colour(names.index(each["robot"])) if each["robot"] in names else INK
+        width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.5
+        yield outline(each["outline_mm"], colour=colour, width=width)
+    for each in drawn["best"]["paths"]:
+        yield line(each["points_mm"], colour=LIMIT, width=1.2)
+
+
+def _bases(drawn: Record) -> Iterator[Item]:
+    """Old and new bases with the move between them."""
+    old = {each["name"]: each for each in drawn["given"]["robots"]}
+    for index, each in enumerate(drawn["best"]["robots"]):
+        colour, x, y, was = _colour(index), each["x_mm"], each["y_mm"], old[each["name"]]
+        yield line([[was["x_mm"], was["y_mm"]], [x, y]], colour=colour, width=1.4)
+        yield Mark(was["x_mm"], was["y_mm"], PAPER, size=6.5, edge=colour)
+        yield Mark(x, y, colour, size=6.5, edge=colour)
+        yield Note(x, y, each["name"], colour, size=8.5, is_bold=True, anchor="start", moved=(6.5, 9.0))
+
+
+def _legend(drawn: Record) -> Iterator[Key]:
+    """What the colours and lines mean."""
+    for index, each in enumerate(drawn["best"]["robots"]):
+        yield Key(each["name"], _colour(index))
+    for text in (
+        "filled dot: base of the best layout",
+        "open dot: base as given",
+        "shaded: swept by links and tools",
+        "dashed circle: reach of the arm",
+        "grey dashes: feet as given",
+        "red: paths on the part at the start",
+    ):
+        yield Key(text, ink=GREY)
+
+
+def _colour(index: int) -> str:
+    """Colour of a robot by its place in the cell."""
+    return ROBOTS[index % len(ROBOTS)]
+
+
+def layout_page(record: Record) -> str:
+    """The page of a layout search.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    drawn = {"plan": floor_plan(record), "front": front_figure(record), "convergence": convergence_figure(record)}
+    plots = {name: inline_svg(svg_text(figure)) for name, figure in drawn.items() if figure is not None}
+    return template("layout.html").render(
+        r=record,
+        plots=plots,
+        verdict=verdict_line(record),
+        changed=changed_variables(record),
+        path="" if record["path"] is None else path_text(record["path"]),
+        caution=CAUTION,
+    )
+
+
+# Tables and files
+
+
+def layout_files(record: Record) -> dict[str, bytes]:
+    """Content of the files of a layout search by name.
+
+    Args:
+        record: As ``layout_record`` returns it.
+    """
+    return {"study.json": as_json(record).encode(), "study.html": layout_page(record).encode()}
+
+
+def layout_tables(record: Record) -> Tables:
+    """The tables of frames and notebooks."""
+    forms = {
+        "top": CandidateRecord,
+        "front": CandidateRecord,
+        "variables": VariableRecord,
+        "binding": LimitRecord,
+        "convergence": ProgressRecord,
+        "choices": ChoiceRecord,
+        "dropped": DroppedRecord,
+    }
+    return {name: listed_table(record, name, form) for name, form in forms.items()}
+
+
+LAYOUT: Final = Kind(
+    name="layout",
+    title="Layout search",
+    tables=layout_tables,
+    shown={
+        "top": ("trial", "status", "cycle_s", "margin_deg", "clearance_mm", "change"),
+        "variables": ("name", "unit", "given", "best", "lower", "upper"),
+    },
+    pictures=lambda record: {
+        "floor plan": floor_plan(record),
+        "front": front_figure(record) if len(record["front"]) > 1 else None,
+    },
+    good=("certified",),
+)
