@@ -93,12 +93,12 @@ def keep(key: Key | None, arrays: Sequence[NDArray[np.generic]]) -> None:
     """Keep arrays under a key, in this process and in the folder; where that is not possible, they are not kept."""
     if key is None or any(array.dtype.hasobject for array in arrays):
         return
-    own = tuple(np.array(array, order="C") for array in arrays)
-    for array in own:
+    copies = tuple(np.array(array, order="C") for array in arrays)
+    for array in copies:
         array.setflags(write=False)
-    _remember(key, Held(own, is_own=True))
+    _remember(key, Held(copies, is_own=True))
     folder = cache_folder() if is_cache_used() else None
-    packed = b"" if folder is None else _packed(own)
+    packed = b"" if folder is None else _packed(copies)
     if folder is not None and len(packed) <= MAX_ENTRY:
         with suppress(OSError):
             _write(_path(folder, key), packed)
@@ -113,7 +113,7 @@ def forget() -> None:
 def _remember(key: Key, held: Held) -> None:
     """Hold arrays for the rest of this process, up to a limit of memory."""
     _recent[key] = held
-    while sum(array.nbytes for each in _recent.values() for array in each.arrays) > MAX_RECENT:
+    while sum(array.nbytes for entry in _recent.values() for array in entry.arrays) > MAX_RECENT:
         _recent.popitem(last=False)
 
 
@@ -180,12 +180,12 @@ def _write(path: Path, content: bytes) -> None:
 def _make_room(folder: Path) -> None:
     """Remove the entries that were not used for longest, until the others fit."""
     entries = []
-    with os.scandir(folder) as found:
-        for each in found:
-            if each.name.endswith((SUFFIX, ".part")):
+    with os.scandir(folder) as listing:
+        for entry in listing:
+            if entry.name.endswith((SUFFIX, ".part")):
                 with suppress(OSError):
-                    status = each.stat(follow_symlinks=False)
-                    entries.append((status.st_mtime, each.name, status.st_size))
+                    status = entry.stat(follow_symlinks=False)
+                    entries.append((status.st_mtime, entry.name, status.st_size))
     total = sum(size for _, _, size in entries)
     for _, name, size in sorted(entries):
         if total <= MAX_FOLDER:

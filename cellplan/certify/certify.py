@@ -46,8 +46,8 @@ def certify(
         progress: Called with the fraction done.
     """
     if demand is not None:
-        kept = (replace(pair, demand=demand) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs)
-        scene = replace(scene, pairs=tuple(kept))
+        pairs = (replace(pair, demand=demand) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs)
+        scene = replace(scene, pairs=tuple(pairs))
     survey, arms = Survey(scene, q), LeverArms(scene, q)
     for first, last in _stretches(survey):
         motion = StraightMotion.of_cell(scene, arms, q[survey.edges[first] : survey.edges[last] + 1])

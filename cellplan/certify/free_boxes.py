@@ -85,16 +85,16 @@ class BoxBounds:
         lower, upper, middles = boxes.rows.copy(), boxes.rows.copy(), boxes.middles
         for side, mine in enumerate((~second, second)):
             lower[mine, 2 * side + 1] = upper[mine, 2 * side] = middles[mine, side]
-        pair, low, n = (np.concatenate([each, each]) for each in (boxes.pair, boxes.low, boxes.n))
+        pair, low, n = (np.concatenate([column, column]) for column in (boxes.pair, boxes.low, boxes.n))
         return self._bounded(pair, np.concatenate([lower, upper]), low=low, n=n)
 
     def sharpened(self, boxes: Boxes) -> Boxes:
         """The boxes with what the direction of each proves between the farthest places of both bodies along it."""
         reach = np.zeros(len(boxes))
         for side, sign in ((0, 1.0), (1, -1.0)):
-            bodies, own, n = self.ends[boxes.pair, side], boxes.rows[:, 2 * side : 2 * side + 2], sign * boxes.n
-            ends = [self._along(bodies, *self._motion.poses(bodies, own[:, end]), n) for end in (0, 1)]
-            reach += np.maximum(*ends) + self._motion.stray(bodies, own[:, 0], own[:, 1]) + self._looseness[bodies]
+            bodies, spans, n = self.ends[boxes.pair, side], boxes.rows[:, 2 * side : 2 * side + 2], sign * boxes.n
+            ends = [self._along(bodies, *self._motion.poses(bodies, spans[:, end]), n) for end in (0, 1)]
+            reach += np.maximum(*ends) + self._motion.stray(bodies, spans[:, 0], spans[:, 1]) + self._looseness[bodies]
         proved = np.where(boxes.n.any(axis=1), -reach - ROUNDING_TOL, -np.inf)
         return replace(boxes, low=np.maximum(boxes.low, proved))
 
@@ -106,19 +106,19 @@ class BoxBounds:
     def read(self, boxes: Boxes, goals: Array) -> tuple[Boxes, list[Reading]]:
         """Ask the engine in the middle of each box; exactly, where the hulls do not reach a goal in [m], shape (M,)."""
         poses = self._placed(boxes)
-        found = [
+        readings = [
             self._reading(int(u), int(v), poses, sample=place, goal=float(goals[place]))
             for place, (u, v) in enumerate(self.ends[boxes.pair])
         ]
-        self.readings += len(found)
-        gap = np.maximum(boxes.gap, [reading.bound for reading in found])
-        gap[[reading.touches for reading in found]] = 0.0
-        n = np.array([np.zeros(3) if each.direction is None else _unit(each.direction) for each in found]).reshape(
-            -1, 3
-        )
+        self.readings += len(readings)
+        gap = np.maximum(boxes.gap, [reading.bound for reading in readings])
+        gap[[reading.touches for reading in readings]] = 0.0
+        n = np.array(
+            [np.zeros(3) if reading.direction is None else _unit(reading.direction) for reading in readings]
+        ).reshape(-1, 3)
         low = np.maximum(boxes.low, gap - boxes.reach.sum(axis=1) - ROUNDING_TOL)
         read = np.ones(len(boxes), dtype=bool)
-        return Boxes(boxes.pair, boxes.rows, low, gap, boxes.reach, n, read), found
+        return Boxes(boxes.pair, boxes.rows, low, gap, boxes.reach, n, read), readings
 
     def _reading(self, u: int, v: int, poses: BodyPoses, *, sample: int, goal: float) -> Reading:
         """Reading at one sample; a body inside another one counts as a touch."""
@@ -165,9 +165,9 @@ class BoxBounds:
         middles, reach = 0.5 * (rows[:, 0::2] + rows[:, 1::2]), np.empty((len(pair), 2))
         placed = []
         for side in (0, 1):
-            bodies, own = self.ends[pair, side], rows[:, 2 * side : 2 * side + 2]
+            bodies, spans = self.ends[pair, side], rows[:, 2 * side : 2 * side + 2]
             at = self._motion.way(bodies, middles[:, side])
-            ends = [self._motion.way(bodies, own[:, end]) for end in (0, 1)]
+            ends = [self._motion.way(bodies, spans[:, end]) for end in (0, 1)]
             reach[:, side] = np.maximum(ends[1] - at, at - ends[0])
             placed.append((bodies, *self._motion.poses(bodies, middles[:, side])))
         gap, n = self._gaps(placed, n)
@@ -199,8 +199,8 @@ def is_below(reading: Reading, goal: float) -> bool:
 
 def _turned(R: Array, vectors: Array) -> Array:
     """Each vector turned by its own rotation, shape (M, 3)."""
-    found: Array = (R @ vectors[..., None])[..., 0]
-    return found
+    rotated: Array = (R @ vectors[..., None])[..., 0]
+    return rotated
 
 
 def _unit(direction: Array) -> Array:

@@ -96,12 +96,12 @@ def certify_regions(
     motion = FreeMotion(scene, q)
     for region in regions:
         _refuse(motion, region)
-    found = []
+    bounds = []
     for count, region in enumerate(regions, start=1):
-        found.append(_RegionSearch(motion, region).run(with_minimum=with_minimum))
+        bounds.append(_RegionSearch(motion, region).run(with_minimum=with_minimum))
         if progress is not None:
             progress(count / len(regions))
-    return tuple(found)
+    return tuple(bounds)
 
 
 def band(
@@ -242,17 +242,17 @@ class _RegionSearch:
         is_hopeful = boxes.gap - HOPE * (boxes.gap - boxes.low) >= goals
         is_large = boxes.reach.sum(axis=1) > RESOLUTION  # in smaller ones rounding is what the bound is too low by
         is_cut = ~is_closed & (boxes.is_read | (is_hopeful & is_large))
-        asked = np.flatnonzero(~is_cut & ~is_closed)
-        asked, waiting = asked[:READ_AT_ONCE], asked[READ_AT_ONCE:]
-        read, readings = self._bounds.read(boxes.some(asked), goals[asked])
+        queried = np.flatnonzero(~is_cut & ~is_closed)
+        queried, waiting = queried[:READ_AT_ONCE], queried[READ_AT_ONCE:]
+        read, readings = self._bounds.read(boxes.some(queried), goals[queried])
         for place, reading in enumerate(readings):
             self._note(read, place, reading)
         read = self._bounds.sharpened(read)
         is_open = read.low < levels[read.pair]
         is_fine = is_open & (read.reach.sum(axis=1) <= RESOLUTION)
-        own = read.some(is_fine)
-        self._is_broken[own.pair[own.low < self._pairs.demands[own.pair]]] = True
-        self._given_up = min(self._given_up, float(own.low[self._pairs.keeps[own.pair]].min(initial=np.inf)))
+        fine = read.some(is_fine)
+        self._is_broken[fine.pair[fine.low < self._pairs.demands[fine.pair]]] = True
+        self._given_up = min(self._given_up, float(fine.low[self._pairs.keeps[fine.pair]].min(initial=np.inf)))
         cut = Boxes.joined(boxes.some(is_cut), read.some(is_open & ~is_fine))
         return boxes.some(waiting), boxes.some(is_closed), read.some(~is_open), self._bounds.halves(cut)
 
@@ -271,8 +271,8 @@ class _RegionSearch:
         if np.isfinite(self._nearest) or not len(self._rectangles):
             return
         boxes = Boxes.joined(self._boxes, self._groups)
-        own = np.flatnonzero(self._pairs.keeps[boxes.pair])
-        pair = boxes.pair[own[[int(np.argmin(boxes.low[own]))]]]
+        measured = np.flatnonzero(self._pairs.keeps[boxes.pair])
+        pair = boxes.pair[measured[[int(np.argmin(boxes.low[measured]))]]]
         some = self._rectangles[:: max(1, len(self._rectangles) // READ_AT_ONCE)]
         box = self._bounds.start(np.repeat(pair, len(some)), some)
         read, readings = self._bounds.read(box.some([int(np.argmin(box.low))]), np.full(1, np.inf))

@@ -58,14 +58,14 @@ class FreeMotion:
         """Way in [m] of some bodies from the first row to some places of their programs, shape (M,)."""
         before = np.clip(rows.astype(np.intp), 0, self._ways.shape[1] - 2)
         begin = self._ways[bodies, before]
-        found: Array = begin + (rows - before) * (self._ways[bodies, before + 1] - begin)
-        return found
+        travelled: Array = begin + (rows - before) * (self._ways[bodies, before + 1] - begin)
+        return travelled
 
     def stray(self, bodies: Indices, first: Array, last: Array) -> Array:
         """How far in [m] a point of some bodies is at most from its chord between two places, shape (M,)."""
         begin, end = np.floor(first).astype(np.intp), np.ceil(last).astype(np.intp)
-        found: Array = 0.25 * (last - first) * (self._swerves[bodies, end] - self._swerves[bodies, begin])
-        return found
+        deviation: Array = 0.25 * (last - first) * (self._swerves[bodies, end] - self._swerves[bodies, begin])
+        return deviation
 
     def poses(self, bodies: Indices, rows: Array) -> tuple[Array, Array]:
         """Rotations, shape (M, 3, 3), and positions in the world in [m], shape (M, 3), of some bodies.
@@ -76,15 +76,15 @@ class FreeMotion:
         """
         R, p = np.empty((len(bodies), 3, 3)), np.empty((len(bodies), 3))
         for index, robot in enumerate(self.scene.cell.robots):
-            own = np.flatnonzero(self._robot[bodies] == index)
-            if not len(own):
+            carried = np.flatnonzero(self._robot[bodies] == index)
+            if not len(carried):
                 continue
-            places, place = np.unique(rows[own], return_inverse=True)
+            places, place = np.unique(rows[carried], return_inverse=True)
             D = self.scene.chains[robot.name].link_displacements(self.positions(robot.name, places))
             require_rigid(D[..., :3, :3], D[..., :3, 3])
-            X, held = D[place, self._link[bodies[own]] + 1], self._X_BS[bodies[own]]
-            R[own] = X[:, :3, :3] @ held[:, :3, :3]
-            p[own] = (X[:, :3, :3] @ held[:, :3, 3:])[..., 0] + X[:, :3, 3]
+            X, held = D[place, self._link[bodies[carried]] + 1], self._X_BS[bodies[carried]]
+            R[carried] = X[:, :3, :3] @ held[:, :3, :3]
+            p[carried] = (X[:, :3, :3] @ held[:, :3, 3:])[..., 0] + X[:, :3, 3]
         return R, p
 
     def positions(self, robot: str, rows: Array) -> Array:
@@ -92,8 +92,8 @@ class FreeMotion:
         q = self._q[robot]
         before = np.clip(rows.astype(np.intp), 0, len(q) - 2)
         share = (rows - before)[:, None]
-        found: Array = (1.0 - share) * q[before] + share * q[before + 1]
-        return found
+        interpolated: Array = (1.0 - share) * q[before] + share * q[before + 1]
+        return interpolated
 
     def _worked_out(self) -> tuple[Array, Array]:
         """Ways and swerves of all bodies at the rows of the longest program; nothing moves after its last row.

@@ -113,8 +113,8 @@ class _ShiftSearch:
         count, places = len(self._pairs.rows), np.linspace(0.0, len(self._times) - 1, ON_ONE_CLOCK)
         rows = np.repeat(places[:, None], 4, axis=1)
         boxes = self._bounds.start(np.repeat(np.arange(count), len(rows)), np.tile(rows, (count, 1)))
-        own = np.flatnonzero(boxes.low < self._pairs.demands[boxes.pair])
-        boxes = boxes.some(own[np.argsort(boxes.low[own], kind="stable")[:FIRST_READINGS]])
+        failing = np.flatnonzero(boxes.low < self._pairs.demands[boxes.pair])
+        boxes = boxes.some(failing[np.argsort(boxes.low[failing], kind="stable")[:FIRST_READINGS]])
         read, readings = self._bounds.read(boxes, self._pairs.demands[boxes.pair])
         for place, reading in enumerate(readings):
             if is_below(reading, float(self._pairs.demands[read.pair[place]])):
@@ -128,11 +128,11 @@ class _ShiftSearch:
         for place in pairs.tolist():
             alone = scene_of_rows(scene, [int(self._pairs.rows[place])])
             demand = float(self._pairs.demands[place])
-            kept = replace(alone.pairs[0], rule=Rule.CLEARANCE, demand=demand)
-            found = certify(replace(alone, pairs=(kept,)), q, with_curves=False)
+            pair = replace(alone.pairs[0], rule=Rule.CLEARANCE, demand=demand)
+            bound = certify(replace(alone, pairs=(pair,)), q, with_curves=False)
             self._has_floor[place] = True
             self._floors[place] = _shift_within(
-                motion, self._times, self._pairs.ends[place], (found.pairs[0].lowest - demand, self._most)
+                motion, self._times, self._pairs.ends[place], (bound.pairs[0].lowest - demand, self._most)
             )
 
     def _advanced(self, boxes: Boxes, smallest: Array) -> tuple[Boxes, ...]:
@@ -143,15 +143,15 @@ class _ShiftSearch:
         boxes, smallest, goals = boxes.some(is_open), smallest[is_open], goals[is_open]
         is_cut = boxes.is_read | (boxes.gap - HOPE * (boxes.gap - boxes.low) >= goals)
         is_cut |= self._cut_widths(boxes) > 0.5 * WIDE_SHARE * self._shift
-        asked = np.flatnonzero(~is_cut)
-        asked, waiting = asked[:READ_AT_ONCE], asked[READ_AT_ONCE:]
-        read, readings = self._bounds.read(boxes.some(asked), goals[asked])
+        queried = np.flatnonzero(~is_cut)
+        queried, waiting = queried[:READ_AT_ONCE], queried[READ_AT_ONCE:]
+        read, readings = self._bounds.read(boxes.some(queried), goals[queried])
         for place, reading in enumerate(readings):
-            if is_below(reading, float(goals[asked[place]])):
+            if is_below(reading, float(goals[queried[place]])):
                 t_first, t_second = np.interp(read.middles[place], np.arange(len(self._times)), self._times)
                 self._limit(read.some([place]), float(abs(t_second - t_first)))
         read = self._bounds.sharpened(read)
-        cut = Boxes.joined(boxes.some(is_cut), read.some(read.low < goals[asked]))
+        cut = Boxes.joined(boxes.some(is_cut), read.some(read.low < goals[queried]))
         return boxes.some(waiting), self._bounds.halves(self._without_fine(cut))
 
     def _without_fine(self, boxes: Boxes) -> Boxes:
@@ -231,7 +231,7 @@ def _displaced(motion: FreeMotion, times: Array, bodies: Indices, shift: float) 
     rows = [np.interp(t, times, np.arange(len(times))) for t in (begin, np.minimum(begin + shift, times[-1]))]
     ways = []
     for body in bodies.tolist():
-        at_begin, at_end = (motion.way(np.full(len(each), body), each) for each in rows)
+        at_begin, at_end = (motion.way(np.full(len(end_rows), body), end_rows) for end_rows in rows)
         way = at_end - at_begin
         ways.append(np.maximum(way[:-1], way[1:]))
     return float(np.minimum(*ways).max(initial=0.0))

@@ -74,11 +74,11 @@ class Growth:
     faults: tuple[tuple[tuple[str, str], str], ...]
 
     @classmethod
-    def of(cls, kept: Bound, separations: "Sequence[_Separation]") -> "Growth":
+    def of(cls, bound: Bound, separations: "Sequence[_Separation]") -> "Growth":
         """What is found of the pairs that begin too near, beside what is proved of the others."""
-        judged = [each.judged() for each in separations]
+        judged = [separation.judged() for separation in separations]
         faults = tuple((pair.names, fault) for pair, fault in judged if fault)
-        return cls(kept=kept, apart=tuple(pair for pair, _ in judged), faults=faults)
+        return cls(kept=bound, apart=tuple(pair for pair, _ in judged), faults=faults)
 
     @property
     def is_proved(self) -> bool:
@@ -111,7 +111,7 @@ def scene_at_stop(scene: Scene) -> Scene:
 def rows_too_near(scene: Scene, q: Array) -> list[int]:
     """Pairs that do not keep their demand at one configuration, shape (nq,), by their places in the scene."""
     poses, engine = scene.body_poses(q[None]), scene.engine
-    centres, found = engine.sphere_centres(poses, sample=0), []
+    centres, near_rows = engine.sphere_centres(poses, sample=0), []
     for row, pair in enumerate(scene.pairs):
         demand = _demand(pair)
         if pair.is_ground:
@@ -128,8 +128,8 @@ def rows_too_near(scene: Scene, q: Array) -> list[int]:
                 reading = exact_reading(engine, pair.solids, poses, sample=0, reading=reading)
             is_near = reading.touches or reading.bound < demand or is_inside(engine, pair.solids, poses, sample=0)
         if is_near:
-            found.append(row)
-    return found
+            near_rows.append(row)
+    return near_rows
 
 
 def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Growth:
@@ -142,8 +142,8 @@ def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Gro
     """
     near = rows_too_near(scene, q[0])
     others = scene_of_rows(scene, [row for row in range(len(scene.pairs)) if row not in set(near)])
-    kept = certify(others, q, with_minimum=with_minimum, with_curves=False)
-    return Growth.of(kept, [_Separation(scene, row, q) for row in near] if with_minimum or kept.is_kept else [])
+    bound = certify(others, q, with_minimum=with_minimum, with_curves=False)
+    return Growth.of(bound, [_Separation(scene, row, q) for row in near] if with_minimum or bound.is_kept else [])
 
 
 def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collection[int]) -> Growth:
@@ -155,8 +155,8 @@ def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collec
         near: Pairs that do not keep their demand in the first row.
         moved: Pairs that the motion changes; the others are not asked.
     """
-    kept = certify(scene_of_rows(scene, sorted({*moved} - {*near})), q, with_minimum=False)
-    return Growth.of(kept, [_Separation(scene, row, q, is_sampled=True) for row in near] if kept.is_kept else [])
+    bound = certify(scene_of_rows(scene, sorted({*moved} - {*near})), q, with_minimum=False)
+    return Growth.of(bound, [_Separation(scene, row, q, is_sampled=True) for row in near] if bound.is_kept else [])
 
 
 def signed_distances(scene: Scene, pair: ScenePair, q: Array, *, tolerance: float = SUNK_TOL) -> Array:
@@ -166,15 +166,15 @@ def signed_distances(scene: Scene, pair: ScenePair, q: Array, *, tolerance: floa
     """
     if pair.solids is None:
         return scene.ground_heights(pair, scene.pair_poses((pair.first, pair.first), q))
-    poses, found = scene.pair_poses(pair.solids, q), np.empty(len(q))
+    poses, distances = scene.pair_poses(pair.solids, q), np.empty(len(q))
     for sample in range(len(q)):
         depth = 0.0
         reading = measure(scene.engine, pair.solids, poses, sample=sample)
         is_apart = not (reading.touches or is_inside(scene.engine, pair.solids, poses, sample=sample))
         if not is_apart:
             depth = overlap_depth(scene.engine, pair.solids, poses, sample=sample, tolerance=tolerance)
-        found[sample] = reading.bound if is_apart else -depth
-    return found
+        distances[sample] = reading.bound if is_apart else -depth
+    return distances
 
 
 class _Separation:
@@ -210,7 +210,7 @@ class _Separation:
             if not fault and row < len(self._q) - 1:
                 reached, fault = self._beyond(row, largest)
             end = float(self._distances(self._q[-1:])[0])
-        found = ComingApart(
+        coming_apart = ComingApart(
             names=self._scene.names(self._pair),
             begin=self._begin,
             end=end,
@@ -218,7 +218,7 @@ class _Separation:
             row=reached,
             room=self._tolerance + 0.5 * self._travel,
         )
-        return found, fault
+        return coming_apart, fault
 
     def _through_contact(self) -> tuple[int, float, str]:
         """The first row from which on the certificate of distances is used, and the largest distance so far in [m]."""

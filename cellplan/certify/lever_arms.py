@@ -127,10 +127,10 @@ class LeverArms:
             length += float(np.linalg.norm(point - foot))
             if place == len(axes) - 1:
                 length = min(length, float(np.linalg.norm(held.ends - foot, axis=1).max()) + held.girth)
-                beside = float(np.linalg.norm(held.ends - axis.foot(held.ends), axis=1).max()) + held.girth
+                reach = float(np.linalg.norm(held.ends - axis.foot(held.ends), axis=1).max()) + held.girth
             length += float(self._slides[axes[place]])
             if axis.is_revolute:
-                levers[place] = min(length, beside) if place == len(axes) - 1 else length
+                levers[place] = min(length, reach) if place == len(axes) - 1 else length
             point = foot
         return Chain(np.array(axes, dtype=np.intp), levers, self._turns[axes])
 

@@ -62,7 +62,7 @@ class StretchSearch:
     def search_all(self) -> None:
         """Search every pair as far as it may be the nearest of its class or among the nearest of the cell."""
         lowest = self._low().min(axis=1, initial=np.inf)
-        readings = {row: each for kind in ClearanceClass for row, each in self._first_readings(kind, lowest)}
+        readings = {row: reading for kind in ClearanceClass for row, reading in self._first_readings(kind, lowest)}
         for row in np.argsort(lowest, kind="stable").tolist():
             if lowest[row] >= self._survey.largest_cutoff():
                 break  # and so are all that follow

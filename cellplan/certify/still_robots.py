@@ -56,11 +56,11 @@ class HomeTrials:
             q: The configuration in [rad] or [m], shape (n,).
             extra: Distance in [m] beyond the demanded one that is required from the part and from other robots.
         """
-        own = self._tables[0].placed(q)
-        pair = self._tables[0].too_near_alone(own, extra)  # what stands still is the same in every run
+        robot_poses = self._tables[0].placed(q)
+        pair = self._tables[0].too_near_alone(robot_poses, extra)  # what stands still is the same in every run
         for table in self._tables:
             if pair is None:
-                pair = table.too_near_others(own, extra)
+                pair = table.too_near_others(robot_poses, extra)
         if pair is not None:
             self.refused[pair] += 1
         return pair is not None
@@ -94,18 +94,18 @@ class _Table:
         stacked[0, self._scene.cell.columns(self._robot)] = q
         return self._scene.body_poses(stacked)
 
-    def too_near_alone(self, own: BodyPoses, extra: float) -> tuple[str, str] | None:
+    def too_near_alone(self, robot_poses: BodyPoses, extra: float) -> tuple[str, str] | None:
         """Names of the first pair nearer than it may be, of those that no other robot changes, or None."""
         self._limits = self._demanded + extra * self._has_extra
-        row = self._on_ground(own)
+        row = self._on_ground(robot_poses)
         if row is None:
-            row = self._among(self._alone, own, sample=0)
+            row = self._among(self._alone, robot_poses, sample=0)
         return None if row is None else self._scene.names(self._scene.pairs[row])
 
-    def too_near_others(self, own: BodyPoses, extra: float) -> tuple[str, str] | None:
+    def too_near_others(self, robot_poses: BodyPoses, extra: float) -> tuple[str, str] | None:
         """The same of the other pairs, at all samples."""
         self._limits = self._demanded + extra * self._has_extra
-        self._poses.R[self._own], self._poses.p[self._own] = own.R[self._own], own.p[self._own]
+        self._poses.R[self._own], self._poses.p[self._own] = robot_poses.R[self._own], robot_poses.p[self._own]
         for place, sample in enumerate(self._order):
             row = self._among(self._others, self._poses, sample=sample)
             if row is not None:

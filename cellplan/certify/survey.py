@@ -96,9 +96,9 @@ class Survey:
     def largest_cutoff(self) -> float:
         """No pair has a larger cutoff in [m], now or later: distances that are found only become smaller."""
         ranks = self._ranked()
-        kept = [ranks.best[kind] for kind in ClearanceClass if self._keeps[kind].any()]
+        best = [ranks.best[kind] for kind in ClearanceClass if self._keeps[kind].any()]
         raised = float(self._raised.max(initial=0.0))
-        return max(APART_TOL, max([ranks.closest[CLOSEST_COUNT], *kept]) - SEARCH_TOL, raised)
+        return max(APART_TOL, max([ranks.closest[CLOSEST_COUNT], *best]) - SEARCH_TOL, raised)
 
     def note_distance(self, row: int, distance: float, at: float) -> None:
         """Record a measured distance of a pair in [m] and its time in samples."""
@@ -137,8 +137,8 @@ class Survey:
     def _ranked(self) -> "_Ranks":
         """The smallest distances found so far."""
         if self._ranks is None:
-            kept = self._nearest[self._keeps_any]
-            few = np.partition(kept, CLOSEST_COUNT)[: CLOSEST_COUNT + 1] if len(kept) > CLOSEST_COUNT else kept
+            nearest = self._nearest[self._keeps_any]
+            few = np.partition(nearest, CLOSEST_COUNT)[: CLOSEST_COUNT + 1] if len(nearest) > CLOSEST_COUNT else nearest
             closest = np.append(np.sort(few), np.full(CLOSEST_COUNT + 1 - len(few), np.inf))
             best = {kind: float(self._nearest[self._watched[kind]].min(initial=np.inf)) for kind in ClearanceClass}
             self._ranks = _Ranks(closest=closest.tolist(), best=best)

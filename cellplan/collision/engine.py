@@ -69,10 +69,10 @@ class Engine:
     def with_bodies(self, changed: Mapping[int, CollisionBody]) -> "Engine":
         """The engine with some bodies in place of others; what FCL has built of all the rest is shared."""
         other = Engine([changed.get(index, body) for index, body in enumerate(self.bodies)])
-        kept = {id(body) for body in other.bodies if body not in changed.values()}
+        unchanged = {id(body) for body in other.bodies if body not in changed.values()}
         other.signed = self.signed
-        other._objects = {key: value for key, value in self._objects.items() if key[1] in kept}
-        other._pieces = {key: value for key, value in self._pieces.items() if key in kept}
+        other._objects = {key: value for key, value in self._objects.items() if key[1] in unchanged}
+        other._pieces = {key: value for key, value in self._pieces.items() if key in unchanged}
         return other
 
     def sphere_centres(self, poses: BodyPoses, *, sample: int) -> Array:

@@ -20,13 +20,13 @@ def hull_of(mesh: Mesh) -> Mesh:
         InputError: The mesh is flat.
         OverrunError: The search crashed, or took too long or too much memory.
     """
-    kept = _kept(mesh)
-    if kept is not None:
-        return kept
+    cached = _kept(mesh)
+    if cached is not None:
+        return cached
     guard = Guard(file=mesh.source, worker="the search for the hull")
-    found: Mesh = in_child(convex_hull, mesh, guard=guard)
-    keep_mesh(_key(mesh), found)
-    return found
+    hull: Mesh = in_child(convex_hull, mesh, guard=guard)
+    keep_mesh(_key(mesh), hull)
+    return hull
 
 
 def keep_hulls(meshes: Sequence[Mesh]) -> None:
@@ -46,8 +46,8 @@ def without_hull(meshes: Iterable[Mesh]) -> list[Mesh]:
 
 def _kept(mesh: Mesh) -> Mesh | None:
     """The hull that was kept of a mesh, proved anew; None where there is none."""
-    kept = recall_mesh(_key(mesh), source=mesh.source)
-    return kept if kept is not None and is_hull(kept, mesh.vertices) else None
+    cached = recall_mesh(_key(mesh), source=mesh.source)
+    return cached if cached is not None and is_hull(cached, mesh.vertices) else None
 
 
 def _key(mesh: Mesh) -> Key | None:

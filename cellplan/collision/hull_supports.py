@@ -30,8 +30,8 @@ class HullSupports:
         other._sizes = self._sizes.copy()
         other._sizes[list(changed)] = [_sizes(body.hull) for body in changed.values()]
         meshes = {index: body.hull for index, body in changed.items() if isinstance(body.hull, Mesh)}
-        kept = {index: hull for index, hull in self._meshes.items() if index not in changed}
-        other._meshes = {**kept, **meshes}
+        unchanged = {index: hull for index, hull in self._meshes.items() if index not in changed}
+        other._meshes = {**unchanged, **meshes}
         return other
 
     def reach(self, bodies: Indices, n: Array) -> Array:
@@ -42,13 +42,13 @@ class HullSupports:
             n: Directions in their frames, shape (M, 3).
         """
         sizes = self._sizes[bodies]
-        found = np.einsum("mi,mi->m", np.abs(n), sizes[:, :3])
-        found += sizes[:, 3] * np.hypot(n[:, 0], n[:, 1]) + sizes[:, 4]
+        extent = np.einsum("mi,mi->m", np.abs(n), sizes[:, :3])
+        extent += sizes[:, 3] * np.hypot(n[:, 0], n[:, 1]) + sizes[:, 4]
         for index, hull in self._meshes.items():
             rows = np.flatnonzero(bodies == index)
             if len(rows):
-                found[rows] = supports(hull, n[rows])
-        return found
+                extent[rows] = supports(hull, n[rows])
+        return extent
 
     def points(self, bodies: Indices, n: Array) -> Array:
         """The farthest point of each body along a unit direction, in its own frame in [m]; see ``support_point``.
@@ -61,14 +61,14 @@ class HullSupports:
             Shape (M, 3).
         """
         sizes, toward = self._sizes[bodies], np.where(np.abs(n) > FACING_TOL, np.sign(n), 0.0)
-        found = toward * sizes[:, :3] + sizes[:, 4:] * n
+        points = toward * sizes[:, :3] + sizes[:, 4:] * n
         across = np.hypot(n[:, 0], n[:, 1])
         round_about = np.where(across > FACING_TOL, sizes[:, 3] / np.where(across > FACING_TOL, across, 1.0), 0.0)
-        found[:, :2] += round_about[:, None] * n[:, :2]
+        points[:, :2] += round_about[:, None] * n[:, :2]
         for index, hull in self._meshes.items():
             for place in np.flatnonzero(bodies == index).tolist():
-                found[place] = support_point(hull, n[place])
-        return found
+                points[place] = support_point(hull, n[place])
+        return points
 
 
 def _sizes(hull: Solid) -> tuple[float, ...]:

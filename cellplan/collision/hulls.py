@@ -94,12 +94,12 @@ def _hull(points: Array, source: str) -> Mesh | None:
     given = coal.StdVec_Vec3s()
     given.extend(list(points))
     try:
-        found = coal.Convex.convexHull(given, True, "Qt")
+        hull = coal.Convex.convexHull(given, True, "Qt")
     except RuntimeError:
         return None
-    polygons = [found.polygons(k) for k in range(found.num_polygons)]
+    polygons = [hull.polygons(k) for k in range(hull.num_polygons)]
     faces = np.array([[polygon[0], polygon[1], polygon[2]] for polygon in polygons], dtype=np.int64)
-    return make_mesh(np.array(found.points()), faces, source=source) if count_edges(faces).is_closed else None
+    return make_mesh(np.array(hull.points()), faces, source=source) if count_edges(faces).is_closed else None
 
 
 def _blown_up(hull: Mesh, points: Array) -> Mesh | None:

@@ -57,8 +57,8 @@ class SignedDistances:
         body, at = np.divmod(spots, count)
         placed = self._poses(poses.R[body, at], poses.p[body, at])
         places, distances, points = list[int](), list[float](), np.empty((len(ends), 2, 3))
-        asked = zip(kind.tolist(), spot.reshape(-1, 2).tolist(), strict=True)
-        for place, (query, (a, b)) in enumerate(asked):
+        sought = zip(kind.tolist(), spot.reshape(-1, 2).tolist(), strict=True)
+        for place, (query, (a, b)) in enumerate(sought):
             result.clear()
             distance = queries[query](placed[a], placed[b], request, result)
             if distance < within:

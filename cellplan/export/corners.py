@@ -26,7 +26,7 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
         promise: Whether robots move in step.
     """
     switches = _switch_times(program)
-    found = {}
+    flags = {}
     for name, rows in program.robots.items():
         free = np.ones(len(rows), dtype=bool)
         free[[0, -1, *rows.marks, *rows.stops]] = False
@@ -34,16 +34,18 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
             free &= ~_switches(rows)
         else:
             free &= ~_is_near(rows.times, switches)
-        found[name] = free
+        flags[name] = free
     if promise is Promise.SYNCHRONISED:
         moving = {name: moves(rows) for name, rows in program.robots.items()}
-        kept = [
-            found[name] & (~np.any(moving[name], axis=0) | _runs(rows, moving[name]))
+        allowed = [
+            flags[name] & (~np.any(moving[name], axis=0) | _runs(rows, moving[name]))
             for name, rows in program.robots.items()
         ]
-        shared: Flags = np.logical_and.reduce(kept) & np.logical_or.reduce([np.any(m, axis=0) for m in moving.values()])
-        return dict.fromkeys(found, shared)
-    return {name: found[name] & _runs(rows, moves(rows)) for name, rows in program.robots.items()}
+        shared: Flags = np.logical_and.reduce(allowed) & np.logical_or.reduce(
+            [np.any(m, axis=0) for m in moving.values()]
+        )
+        return dict.fromkeys(flags, shared)
+    return {name: flags[name] & _runs(rows, moves(rows)) for name, rows in program.robots.items()}
 
 
 def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
@@ -55,13 +57,13 @@ def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
     beyond which no controller goes.
     """
     chosen = {name: chosen_shares(job, rows) for name, rows in program.robots.items()}
-    if not any(np.any(own > 0.0) for own in chosen.values()):
+    if not any(np.any(shares > 0.0) for shares in chosen.values()):
         return chosen
     free = may_round(program, job.frame.promise)
     has_arm = {name: bool(Axes.of(job.frame.robot(name)).arm) for name in free}
     return {
-        name: np.where(free[name] & (own > 0.0), own if has_arm[name] else LARGEST_SHARE, 0.0)
-        for name, own in chosen.items()
+        name: np.where(free[name] & (share > 0.0), share if has_arm[name] else LARGEST_SHARE, 0.0)
+        for name, share in chosen.items()
     }
 
 
@@ -84,10 +86,10 @@ def _runs(rows: RobotRows, moving: Flags) -> Flags:
 
 def _switches(rows: RobotRows) -> Flags:
     """Rows at which the process of a robot goes on or off, shape (N,)."""
-    found = np.zeros(len(rows), dtype=bool)
+    switches = np.zeros(len(rows), dtype=bool)
     if rows.process is not None:
-        found[1:] = rows.process[1:] != rows.process[:-1]
-    return found
+        switches[1:] = rows.process[1:] != rows.process[:-1]
+    return switches
 
 
 def _switch_times(program: ProgramRows) -> Array:

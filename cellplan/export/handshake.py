@@ -32,17 +32,17 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
     Raises:
         InputError: A signal is not stated in the cell.
     """
-    names = [each.name for each in frame.cell.robots]
+    names = [robot.name for robot in frame.cell.robots]
     if len(names) == 1:
         return ()
     leader, others = names[0], names[1:]
-    own = _signals(frame, robot)
+    signals = _signals(frame, robot)
     if robot != leader:
-        output, go = own.output, _input(own, robot, leader)
+        output, go = signals.output, _input(signals, robot, leader)
         return (Step(False, output, True), Step(True, go, True), Step(False, output, False), Step(True, go, False))
-    inputs = [_input(own, robot, other) for other in others]
+    inputs = [_input(signals, robot, other) for other in others]
     up, down = ([Step(True, signal, is_on) for signal in inputs] for is_on in (True, False))
-    return (*up, Step(False, own.output, True), *down, Step(False, own.output, False))
+    return (*up, Step(False, signals.output, True), *down, Step(False, signals.output, False))
 
 
 def lowering_step(frame: ExportFrame, robot: str) -> Step:
@@ -76,7 +76,7 @@ def require_signals(frame: ExportFrame, robot: str) -> None:
     Raises:
         InputError: Signals are not stated in the cell: all of these.
     """
-    names = [each.name for each in frame.cell.robots]
+    names = [robot.name for robot in frame.cell.robots]
     others = names[1:] if robot == names[0] else names[:1]
     if others:
         stated = _signals(frame, robot)
@@ -94,10 +94,10 @@ def _signals(frame: ExportFrame, robot: str) -> Handshake:
     return control.handshake
 
 
-def _input(own: Handshake, robot: str, other: str) -> str:
+def _input(handshake: Handshake, robot: str, other: str) -> str:
     """The input at which a robot reads the output of another one."""
-    if other not in own.inputs:
+    if other not in handshake.inputs:
         raise InputError(
             f"robots.{robot}.controller.handshake.inputs: expected the input that '{other}' sets, got none"
         )
-    return own.inputs[other]
+    return handshake.inputs[other]

@@ -139,35 +139,35 @@ def _program(frame: ExportFrame, name: str | None, text: str, file: str) -> Prog
         raise line_error(file, 1 + text.count("\n", 0, bad), "ASCII characters", text[bad : bad + 20])
     root = parsed(text, file)
     head = _head(frame, name, count=0)
-    own = root.members(tuple(head))
-    own["notes"].require_texts()
-    times = own["times"].numbers(_FIXED, f"times with {DECIMALS} decimals")
+    members = root.members(tuple(head))
+    members["notes"].require_texts()
+    times = members["times"].numbers(_FIXED, f"times with {DECIMALS} decimals")
     root.require({**head, "rows": Raw(len(times))}, free=FREE)
     clock = np.array([float(time) for time in times])
     if len(clock) < 2 or clock[0] != 0.0 or not np.all(np.diff(clock) > 0.0):
-        raise own["times"].refused("two times or more that rise from 0")
+        raise members["times"].refused("two times or more that rise from 0")
     robots = {}
-    for robot, entry in zip(frame.robots, own["robots"].items(), strict=True):
+    for robot, entry in zip(frame.robots, members["robots"].items(), strict=True):
         robots[robot] = _robot_rows(frame.robot(robot), entry, clock)
     return ProgramRows(name=name, robots=robots)
 
 
 def _robot_rows(robot: Robot, entry: Value, times: Array) -> RobotRows:
     """Read the tables of a robot."""
-    own, joints = entry.members(tuple(_robot_head(robot))), robot.model.joints
+    members, joints = entry.members(tuple(_robot_head(robot))), robot.model.joints
     what = f"{len(joints)} numbers with {DECIMALS} decimals"
-    found = own["positions"].items()
-    if len(found) != len(times):
-        raise own["positions"].refused(f"an array of {len(times)} rows")
+    listed = members["positions"].items()
+    if len(listed) != len(times):
+        raise members["positions"].refused(f"an array of {len(times)} rows")
     rows = []
-    for value in found:
+    for value in listed:
         numbers = value.numbers(_FIXED, what)
         if len(numbers) != len(joints):
             raise value.refused(f"an array of {what}")
         rows.append([float(number) for number in numbers])
     table = np.array(rows)
     q = np.stack([from_file_unit(joint, table[:, place]) for place, joint in enumerate(joints)], axis=1)
-    return RobotRows(robot=robot.name, q=q, times=times, process=_process(own["process"], len(times)))
+    return RobotRows(robot=robot.name, q=q, times=times, process=_process(members["process"], len(times)))
 
 
 def _process(value: Value, count: int) -> Flags | None:

@@ -119,10 +119,10 @@ class Value:
                 if key not in free:
                     value.require(expected[key], free=free)
         elif isinstance(expected, Sequence) and not isinstance(expected, str):
-            own = self.items()
-            if len(own) != len(expected):
+            members = self.items()
+            if len(members) != len(expected):
                 raise self.refused(f"an array of {len(expected)} values")
-            for value, other in zip(own, expected, strict=True):
+            for value, other in zip(members, expected, strict=True):
                 value.require(other, free=free)
         elif type(self.content) is not type(expected) or self.content != expected:
             raise self.refused(expected if isinstance(expected, Raw) else json.dumps(expected))
@@ -156,11 +156,11 @@ def dumped(value: Written, indent: str = "") -> str:
     if isinstance(value, str) or value is None or isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, Mapping):
-        parts = [f"{json.dumps(key)}: {dumped(each, inner)}" for key, each in value.items()]
+        parts = [f"{json.dumps(key)}: {dumped(item, inner)}" for key, item in value.items()]
         return _block("{}", parts, indent)
-    if all(isinstance(each, Raw) for each in value):
-        return "[" + ", ".join(str(each) for each in value) + "]"
-    return _block("[]", [dumped(each, inner) for each in value], indent)
+    if all(isinstance(item, Raw) for item in value):
+        return "[" + ", ".join(str(item) for item in value) + "]"
+    return _block("[]", [dumped(item, inner) for item in value], indent)
 
 
 def _block(brackets: str, parts: Sequence[str], indent: str) -> str:
@@ -196,45 +196,45 @@ def _value(file: str, text: str, at: int, depth: int) -> tuple[Value, int]:
 def _string(file: str, text: str, at: int, quoted: str) -> str:
     """A text without its quotes."""
     try:
-        found: str = json.loads(quoted)
+        string: str = json.loads(quoted)
     except ValueError as error:
         raise _refused(file, text, at, "a text") from error
-    return found
+    return string
 
 
 def _array(file: str, text: str, at: int, depth: int) -> tuple[Value, int]:
     """An array of any values."""
-    begin, found = at, list[Value]()
+    begin, items = at, list[Value]()
     at = _skip(text, at + 1)
     if text[at : at + 1] == "]":
-        return Value(file, text, begin, found), at + 1
+        return Value(file, text, begin, items), at + 1
     while True:
         value, at = _value(file, text, at, depth + 1)
-        found.append(value)
+        items.append(value)
         at = _skip(text, at)
         if text[at : at + 1] == "]":
-            return Value(file, text, begin, found), at + 1
+            return Value(file, text, begin, items), at + 1
         at = _after(file, text, at, ",")
 
 
 def _object(file: str, text: str, at: int, depth: int) -> tuple[Value, int]:
     """An object, whose keys differ."""
-    begin, found = at, dict[str, Value]()
+    begin, members = at, dict[str, Value]()
     at = _skip(text, at + 1)
     if text[at : at + 1] == "}":
-        return Value(file, text, begin, found), at + 1
+        return Value(file, text, begin, members), at + 1
     while True:
         match = _SCALAR.match(text, at)
         if match is None or match["string"] is None:
             raise _refused(file, text, at, "a key")
         key = _string(file, text, at, match["string"])
-        if key in found:
+        if key in members:
             raise InputError(f"{file}:{_line(text, at)}: expected each key once, got {key!r} twice")
         at = _after(file, text, _skip(text, match.end()), ":")
-        found[key], at = _value(file, text, at, depth + 1)
+        members[key], at = _value(file, text, at, depth + 1)
         at = _skip(text, at)
         if text[at : at + 1] == "}":
-            return Value(file, text, begin, found), at + 1
+            return Value(file, text, begin, members), at + 1
         at = _after(file, text, at, ",")
 
 

@@ -29,14 +29,14 @@ def robots_of(frame: ExportFrame, dialect: Dialect) -> tuple[str, ...]:
         InputError: A robot has no controller, or none of the robots has one that plays the format.
     """
     kinds = {name: _kind(frame, name, dialect) for name in frame.robots}
-    found = tuple(name for name, kind in kinds.items() if kind in dialect.kinds)
-    if not found:
+    robots = tuple(name for name, kind in kinds.items() if kind in dialect.kinds)
+    if not robots:
         name, kind = next(iter(kinds.items()))
         allowed = " or ".join(sorted(dialect.kinds))
         raise InputError(
             f"robots.{name}.controller: expected a controller that plays {dialect.name} ({allowed}), got '{kind}'"
         )
-    return found
+    return robots
 
 
 def _kind(frame: ExportFrame, robot: str, dialect: Dialect) -> str:
@@ -129,12 +129,12 @@ def pages_of(count: int, frame: ExportFrame, dialect: Dialect) -> list[range]:
         InputError: There are too many pages for three digits.
     """
     size = frame.split or dialect.split or max(count, 1)
-    found = [range(first, min(first + size, count)) for first in range(0, count, size)]
-    if len(found) > MOST_PAGES:
+    pages = [range(first, min(first + size, count)) for first in range(0, count, size)]
+    if len(pages) > MOST_PAGES:
         raise InputError(
-            f"--split: expected at most {MOST_PAGES} pages, got {len(found)} of {size} of {count} rows; use larger ones"
+            f"--split: expected at most {MOST_PAGES} pages, got {len(pages)} of {size} of {count} rows; use larger ones"
         )
-    return found
+    return pages
 
 
 def program_rows(job: ExportJob, robots: Iterable[str], program: ProgramRows) -> dict[str, RobotRows]:
@@ -143,11 +143,11 @@ def program_rows(job: ExportJob, robots: Iterable[str], program: ProgramRows) ->
     Raises:
         InputError: They do not, or one of them has no row.
     """
-    found = {name: program.robots[name] for name in robots}
-    if len({len(rows.marks) for rows in found.values()}) > 1 or not all(map(len, found.values())):
-        got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in found.items())
+    robot_rows = {name: program.robots[name] for name in robots}
+    if len({len(rows.marks) for rows in robot_rows.values()}) > 1 or not all(map(len, robot_rows.values())):
+        got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in robot_rows.items())
         raise InputError(f"program '{program.name or job.frame.cell.name}': expected rows, and equal marks, got {got}")
-    return found
+    return robot_rows
 
 
 def is_rounded(
@@ -163,12 +163,12 @@ def is_rounded(
         numbers: Its positions as they are written, shape (N, n).
         pages: Rows of each page.
     """
-    found: NDArray[np.bool_] = row_shares(job, program)[robot] > 0.0
-    found[[page[-1] for page in pages]] = False
+    flags: NDArray[np.bool_] = row_shares(job, program)[robot] > 0.0
+    flags[[page[-1] for page in pages]] = False
     moves = np.any(np.diff(numbers, axis=0) != 0.0, axis=1)
-    found[1:] &= moves
-    found[:-1] &= moves
-    return found
+    flags[1:] &= moves
+    flags[:-1] &= moves
+    return flags
 
 
 def percentages(robot: Robot, rows: RobotRows) -> list[int]:
@@ -183,7 +183,7 @@ def percentages(robot: Robot, rows: RobotRows) -> list[int]:
     shares = np.max(
         np.abs(np.diff(rows.q, axis=0)) / (np.maximum(np.diff(rows.times), SHORTEST)[:, None] * top), axis=1
     )
-    found = [SLOW]
+    percentages = [SLOW]
     for share in np.clip(np.rint(100.0 * shares), 1, 100) * (shares > 0.0):
-        found.append(int(share) or found[-1])
-    return found
+        percentages.append(int(share) or percentages[-1])
+    return percentages

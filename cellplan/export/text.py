@@ -19,8 +19,8 @@ def ascii_text(text: str) -> str:
     """Printable ASCII nearest to a text: letters without accents, everything else unknown as a question mark."""
     spelled = "".join(MADE_OF.get(letter, letter) for letter in unicodedata.normalize("NFC", text))
     plain = unicodedata.normalize("NFKD", spelled)
-    kept = (letter for letter in plain if not unicodedata.combining(letter))
-    return "".join(letter if " " <= letter <= "~" else "?" for letter in kept)
+    letters = (letter for letter in plain if not unicodedata.combining(letter))
+    return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
 
 
 def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
@@ -49,18 +49,18 @@ def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] 
         reserved: Words of the language, in any case.
     """
     taken = {word.lower() for word in reserved}
-    found: dict[str, str] = {}
+    chosen: dict[str, str] = {}
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_]", "_", ascii_text(name)).strip("_") or "x"
         plain = plain if plain[0].isalpha() else f"p_{plain}"
-        own, number = plain[:longest], 1
-        while own.lower() in taken:
+        safe_name, number = plain[:longest], 1
+        while safe_name.lower() in taken:
             number += 1
             ending = f"_{number}"
-            own = plain[: longest - len(ending)] + ending
-        taken.add(own.lower())
-        found[name] = own
-    return found
+            safe_name = plain[: longest - len(ending)] + ending
+        taken.add(safe_name.lower())
+        chosen[name] = safe_name
+    return chosen
 
 
 def joined(lines: Iterable[str], *, line_end: str = "\n") -> str:

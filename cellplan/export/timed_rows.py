@@ -100,7 +100,7 @@ def line_error(file: str, line: int, expected: str, got: str) -> InputError:
     return found_error(file, line, expected, repr(got[:60]))
 
 
-def found_error(file: str, line: int, expected: str, found: str) -> InputError:
+def found_error(file: str, line: int, expected: str, actual: str) -> InputError:
     """The error that something else was found at a line of a file.
 
     Args:
@@ -109,7 +109,7 @@ def found_error(file: str, line: int, expected: str, found: str) -> InputError:
         expected: What should be there.
         found: What is there, in words.
     """
-    return InputError(f"{file}:{line}: expected {expected}, got {found}")
+    return InputError(f"{file}:{line}: expected {expected}, got {actual}")
 
 
 def truncated_error(file: str, line: int, expected: str) -> InputError:

@@ -26,11 +26,11 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
         q: Its rows in [rad] or [m], shape (N, n).
         shares: Of the segments, 0 to 0.5, shape (N,).
     """
-    found = np.zeros(len(q))
+    zones = np.zeros(len(q))
     if len(q) > 2:
         inner, share = q[1:-1], shares[1:-1, None]
-        found[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
-    return found
+        zones[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
+    return zones
 
 
 def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
@@ -40,7 +40,7 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
         q: Its rows in [rad] or [m], shape (N, n).
         zones: Sizes in [m], 0 for a stop, shape (N,).
     """
-    found = np.zeros(len(q))
+    shares = np.zeros(len(q))
     rows = np.flatnonzero(zones > 0.0)
     rows = rows[(rows > 0) & (rows < len(q) - 1)]
     for other in (rows - 1, rows + 1):
@@ -50,8 +50,8 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
             middle = 0.5 * (low + high)
             near = _away(robot, q[rows], q[other], middle[:, None]) <= zones[rows]
             low, high = np.where(near, middle, low), np.where(near, high, middle)
-        found[rows] = np.maximum(found[rows], np.where(inside, LARGEST_SHARE, high))
-    return found
+        shares[rows] = np.maximum(shares[rows], np.where(inside, LARGEST_SHARE, high))
+    return shares
 
 
 def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:

@@ -107,8 +107,8 @@ def _mesh_spans(mesh: Mesh, points: Array, directions: Array) -> Spans:
     is_last = np.append(~follows[1:], True)[: len(line)]
     enters = entering & (~follows | after_exit)
     leaves = ~entering & (is_last | before_entry)
-    kept = np.flatnonzero(enters | leaves)
-    opens, closes = kept[:-1], kept[1:]
+    switches = np.flatnonzero(enters | leaves)
+    opens, closes = switches[:-1], switches[1:]
     paired = enters[opens] & leaves[closes] & (line[opens] == line[closes])
     opens, closes = opens[paired], closes[paired]
     return Spans(line=line[opens].astype(np.intp), enter=way[opens], leave=way[closes])

@@ -58,7 +58,7 @@ def contours(squares: Indices) -> list[Array]:
         return []
     corner, mask = _mask(squares)
     follow = _borders(mask)
-    found = []
+    loops = []
     while follow:
         at = start = next(iter(follow))
         step, places = follow[at][0], []
@@ -75,8 +75,8 @@ def contours(squares: Indices) -> list[Array]:
                 break
             left = (-step[1], step[0])
             step = left if left in choices else choices[0]
-        found.append(_simplified(np.array(places, dtype=np.float64) - 1.5 + corner[::-1]))
-    return found
+        loops.append(_simplified(np.array(places, dtype=np.float64) - 1.5 + corner[::-1]))
+    return loops
 
 
 def _mask(squares: Indices) -> tuple[Indices, Flags]:
@@ -91,7 +91,7 @@ def _mask(squares: Indices) -> tuple[Indices, Flags]:
 
 def _borders(mask: Flags) -> dict[tuple[int, int], list[tuple[int, int]]]:
     """Edges between covered and free squares by their first corner, as steps with the covered square on the left."""
-    found: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    borders: dict[tuple[int, int], list[tuple[int, int]]] = {}
     sides = (
         (mask[1:-1, 1:-1] & ~mask[:-2, 1:-1], (0, 0), (1, 0)),
         (mask[1:-1, 1:-1] & ~mask[1:-1, 2:], (1, 0), (0, 1)),
@@ -100,16 +100,16 @@ def _borders(mask: Flags) -> dict[tuple[int, int], list[tuple[int, int]]]:
     )
     for is_border, (right, up), step in sides:
         for row, column in np.argwhere(is_border).tolist():
-            found.setdefault((column + 1 + right, row + 1 + up), []).append(step)
-    return found
+            borders.setdefault((column + 1 + right, row + 1 + up), []).append(step)
+    return borders
 
 
 def _simplified(line: Array) -> Array:
     """A closed line with as few of its corners as stay near to all of them."""
     far = int(np.argmax(np.sum((line - line[0]) ** 2, axis=1)))
     closed = np.concatenate([line, line[:1]])
-    kept = np.zeros(len(closed), dtype=bool)
-    kept[[0, far, -1]] = True
+    is_corner = np.zeros(len(closed), dtype=bool)
+    is_corner[[0, far, -1]] = True
     waiting = [(0, far), (far, len(line))]
     while waiting:
         first, last = waiting.pop()
@@ -120,6 +120,6 @@ def _simplified(line: Array) -> Array:
         away = np.abs(inner[:, 0] * chord[1] - inner[:, 1] * chord[0]) / length if length else np.hypot(*inner.T)
         worst = int(np.argmax(np.round(away, 6)))
         if away[worst] > SMOOTHED:
-            kept[first + 1 + worst] = True
+            is_corner[first + 1 + worst] = True
             waiting += [(first, first + 1 + worst), (first + 1 + worst, last)]
-    return closed[:-1][kept[:-1]] if kept[:-1].sum() > 2 else line
+    return closed[:-1][is_corner[:-1]] if is_corner[:-1].sum() > 2 else line

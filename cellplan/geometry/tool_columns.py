@@ -68,12 +68,12 @@ def axis_depths(length: float, shape: Solid, X_ST: Array) -> Array:
         X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
     """
     axis = np.array([[0.0, 0.0]])
-    found = depths(_along_axis(axis, length), shape, X_ST)
-    deep = found > GRAZE_TOL
+    depth = depths(_along_axis(axis, length), shape, X_ST)
+    deep = depth > GRAZE_TOL
     if np.any(deep):
-        beside = GRAZE_TOL * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
-        found[deep] = depths(_along_axis(np.concatenate([axis, beside]), length), shape, X_ST[deep])
-    return found
+        offsets = GRAZE_TOL * np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+        depth[deep] = depths(_along_axis(np.concatenate([axis, offsets]), length), shape, X_ST[deep])
+    return depth
 
 
 def _along_axis(points: Array, length: float) -> Columns:
@@ -110,12 +110,12 @@ def body_columns(shape: Solid, X_TS: Array, zone: float) -> Columns:
     if np.linalg.norm(rim, axis=1).max() > zone:
         others += [zone * share * _directions()[:, :2] for share in (1.0, *RING_FRACTIONS)]
     points = np.concatenate([on_rim, within, *others])
-    own = np.arange(len(points))
-    own[: len(rim)] += len(rim)
+    guards = np.arange(len(points))
+    guards[: len(rim)] += len(rim)
     R, p = X_TS[:3, :3], X_TS[:3, 3]
     starts = (np.column_stack([points, np.zeros(len(points))]) - p) @ R
     spans = line_spans(shape, starts, np.broadcast_to(R[2], starts.shape))
-    return Columns(points=points, guards=own[:, None], line=spans.line, back=spans.enter, front=spans.leave)
+    return Columns(points=points, guards=guards[:, None], line=spans.line, back=spans.enter, front=spans.leave)
 
 
 def depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
@@ -127,8 +127,8 @@ def depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
         X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
     """
     step = max(1, LINES_AT_ONCE // max(1, len(columns.line)))
-    found = [_depths(columns, shape, X_ST[k : k + step]) for k in range(0, len(X_ST), step)]
-    return np.concatenate(found) if found else np.zeros(0)
+    batches = [_depths(columns, shape, X_ST[k : k + step]) for k in range(0, len(X_ST), step)]
+    return np.concatenate(batches) if batches else np.zeros(0)
 
 
 def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
@@ -145,8 +145,8 @@ def _depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     place = pose * lines + columns.line[column]
     np.maximum.at(depth, place[entered], (columns.front[column] - spans.enter)[entered])
     by_line = depth.reshape(poses, lines)
-    beside = by_line[:, columns.guards].min(axis=2)
-    counted = np.where(beside < HALF_FRACTION * by_line, beside, by_line)
+    at_guards = by_line[:, columns.guards].min(axis=2)
+    counted = np.where(at_guards < HALF_FRACTION * by_line, at_guards, by_line)
     return counted.max(axis=1)
 
 
@@ -191,8 +191,8 @@ def line_depths(X_FT: Array, shape: Solid, X_ST: Array, *, zone: float, is_all: 
         is_all: Whether this line is all that is known of the tool.
     """
     along = float(X_FT[:3, 3] @ X_FT[:3, 2])
-    found = axis_depths(max(along, zone), shape, X_ST)
+    depth = axis_depths(max(along, zone), shape, X_ST)
     if is_all and along < -EDGE_TOL:
         turned = X_ST * np.array([1.0, -1.0, -1.0, 1.0])  # half a turn about x: the columns of y and z
-        found = np.maximum(found, axis_depths(-along, shape, turned))
-    return found
+        depth = np.maximum(depth, axis_depths(-along, shape, turned))
+    return depth

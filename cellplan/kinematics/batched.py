@@ -92,8 +92,8 @@ class BatchChains:
         self._X_BF = np.stack([robot.model.X_BF for robot in cell.robots])
         self._last_point = np.array([_last_point(robot) for robot in cell.robots])
         self.is_all_turning = not self.is_sliding.any()
-        own = np.arange(self.joints)[:, None] < [len(robot.model.joints) for robot in cell.robots]
-        plain = np.eye(self.levels, self.joints)[:, :, None] * own
+        has_joint = np.arange(self.joints)[:, None] < [len(robot.model.joints) for robot in cell.robots]
+        plain = np.eye(self.levels, self.joints)[:, :, None] * has_joint
         self.is_plain = bool(self.levels == self.joints and np.array_equal(self.to_joints, plain))
 
     def placement(self, cell: Cell) -> Placement:

@@ -27,27 +27,27 @@ class LinkForest:
         """
         self._first: dict[str, int] = {}
         parents, order = list[int](), list[int]()
-        own: list[tuple[int, int, RobotModel, int]] = []
+        model_links: list[tuple[int, int, RobotModel, int]] = []
         columns, count = 0, 1
         for robot in robots:
             self._first[robot.name] = count
             parents += [count + 1 + axis.parent for axis in robot.model.axes]
-            first = len(own)
-            own += [(count + 1 + link, columns, robot.model, link) for link in range(len(robot.model.axes))]
+            first = len(model_links)
+            model_links += [(count + 1 + link, columns, robot.model, link) for link in range(len(robot.model.axes))]
             order += [first + link for link in robot.model.carried_order]
             columns += len(robot.model.joints)
             count += 1 + len(robot.model.axes)
-        axes = [model.axes[link] for _, _, model, link in own]
-        self._places = np.array([place for place, *_ in own], dtype=np.intp)
+        axes = [model.axes[link] for _, _, model, link in model_links]
+        self._places = np.array([place for place, *_ in model_links], dtype=np.intp)
         self._parents, self._bases = np.array(parents, dtype=np.intp), list(self._first.values())
         self._directions = np.array([axis.axis_B for axis in axes]).reshape(-1, 3)
         self._points = np.array([axis.point_B for axis in axes]).reshape(-1, 3)
         self._turning = np.array([axis.is_revolute for axis in axes], dtype=bool)
-        self._offsets = np.array([model.drive(link).offset for _, _, model, link in own])
+        self._offsets = np.array([model.drive(link).offset for _, _, model, link in model_links])
         self._skew = np.cross(self._directions[:, None], -np.eye(3)).reshape(-1, 3, 3)
         self._skew2 = self._skew @ self._skew
         self.shares, self.carries = np.zeros((len(axes), columns)), np.zeros((count, len(axes)))
-        for axis, (_, first, model, link) in enumerate(own):
+        for axis, (_, first, model, link) in enumerate(model_links):
             self.shares[axis, first + model.drive(link).joint] = model.drive(link).ratio
         for axis in order:
             place = self._places[axis]

@@ -79,10 +79,10 @@ def _draw_pose(amounts: PoseAmounts, rng: np.random.Generator) -> Array:
 
 def _perturbed_robot(robot: Robot, draw: RobotDraw) -> Robot:
     """The robot with other links, joint zeros, base and tool tip; what is mounted on a link goes with it."""
-    own = len(robot.model.bodies)
+    body_count = len(robot.model.bodies)
     whole = replace(robot.model, bodies=(*robot.model.bodies, *robot.attachments))
     moved = _with_offsets(_with_link_lengths(whole, draw.link_lengths), draw.joint_offsets)
-    model, attachments = replace(moved, bodies=moved.bodies[:own]), moved.bodies[own:]
+    model, attachments = replace(moved, bodies=moved.bodies[:body_count]), moved.bodies[body_count:]
     tool = replace(robot.tool, X_FT=robot.tool.X_FT @ draw.X_tool)
     return replace(robot, model=model, X_WB=robot.X_WB @ draw.X_base, tool=tool, attachments=attachments)
 

@@ -104,7 +104,7 @@ def _best(distances: Callable[[Array], Array], model: RobotModel, rounds: int) -
             tried = np.repeat(best[:, None], GRID_COUNT, axis=1)
             offsets = np.linspace(-width[joint], width[joint], GRID_COUNT)
             tried[:, :, joint] = np.clip(tried[:, :, joint] + offsets, lower[joint], upper[joint])
-            found = distances(tried.reshape(-1, tried.shape[2])).reshape(len(rows), GRID_COUNT)
-            best = tried[rows, np.argmax(found, axis=1)]
+            tried_distances = distances(tried.reshape(-1, tried.shape[2])).reshape(len(rows), GRID_COUNT)
+            best = tried[rows, np.argmax(tried_distances, axis=1)]
         width = 0.5 * width
     return best

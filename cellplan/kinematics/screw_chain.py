@@ -99,7 +99,7 @@ class ScrewChain:
             return np.zeros((len(D), 0, 6))
         carriers = D[:, [axis.parent + 1 for axis in self._axes]]
         axes, points = (
-            np.array(part) for part in zip(*((each.axis_B, each.point_B) for each in self._axes), strict=True)
+            np.array(part) for part in zip(*((axis.axis_B, axis.point_B) for axis in self._axes), strict=True)
         )
         s = (carriers[..., :3, :3] @ axes[..., None])[..., 0]
         s0 = (carriers[..., :3, :3] @ points[..., None])[..., 0] + carriers[..., :3, 3]

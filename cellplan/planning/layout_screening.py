@@ -95,7 +95,7 @@ class Screening(Presented):
     def joined(self, others: Sequence["Screening"]) -> "Screening":
         """These figures, then those of others."""
         names = [field.name for field in fields(self) if field.name != "cell"]
-        joined = {name: np.concatenate([getattr(each, name) for each in (self, *others)]) for name in names}
+        joined = {name: np.concatenate([getattr(screening, name) for screening in (self, *others)]) for name in names}
         return Screening(**joined, cell=self.cell)
 
     def worst(self, other: "Screening") -> "Screening":
@@ -121,7 +121,7 @@ class Screening(Presented):
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        followed, feasible = (int(np.count_nonzero(each)) for each in (self.is_followed, self.is_feasible))
+        followed, feasible = (int(np.count_nonzero(flags)) for flags in (self.is_followed, self.is_feasible))
         return f"<Screening of {len(self.start)} layouts: {followed} follow the paths, {feasible} within all limits>"
 
 
@@ -179,20 +179,20 @@ class _Screen:
             start = start.copy()
             start[:, self._given.columns] = self._given.spline.start
         q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
-        found = Screening.unknown(q.T.copy())
-        found.lost_at[arrived] = 0.0
-        beside = None if self._given is None else NullSpaceMotion(drift=self._given.speeds)
-        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, null_space=beside)
+        screening = Screening.unknown(q.T.copy())
+        screening.lost_at[arrived] = 0.0
+        null_space = None if self._given is None else NullSpaceMotion(drift=self._given.speeds)
+        collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, null_space=null_space)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
             everywhere = np.concatenate([nodes, nodes @ window.between.T], axis=2)
             speeds = np.abs(nodes @ window.rates.T).max(axis=2).T
             lowest, highest = everywhere.min(axis=2).T, everywhere.max(axis=2).T
-            room = np.minimum(lowest - self._limits.lower, self._limits.upper - highest)
-            found.margins[cells] = np.minimum(found.margins[cells], room)
-            found.speed_ratios[cells] = np.maximum(found.speed_ratios[cells], speeds / self._limits.velocity)
-            found.error[cells] = np.maximum(found.error[cells], errors)
-            found.lost_at[cells] = window.panels[-1].end
+            margin = np.minimum(lowest - self._limits.lower, self._limits.upper - highest)
+            screening.margins[cells] = np.minimum(screening.margins[cells], margin)
+            screening.speed_ratios[cells] = np.maximum(screening.speed_ratios[cells], speeds / self._limits.velocity)
+            screening.error[cells] = np.maximum(screening.error[cells], errors)
+            screening.lost_at[cells] = window.panels[-1].end
 
-        found.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = ALL_WAY
-        return found
+        screening.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = ALL_WAY
+        return screening

@@ -79,11 +79,11 @@ def _phase(cell: Cell, name: str, tasks: Sequence[Task], *, is_carried: bool = T
 
 def _with_transfers(phases: Sequence[Phase]) -> tuple[Phase, ...]:
     """Phases with what leads from each to the next one: motion that no program has yet."""
-    found = list(phases[:1])
+    extended = list(phases[:1])
     for one, other in pairwise(phases):
         roles: dict[str, Role] = {robot: Transfer(other.name) for robot in one.roles}
-        found += [Phase(name=f"{one.name} to {other.name}", roles=roles, in_program=False), other]
-    return tuple(found)
+        extended += [Phase(name=f"{one.name} to {other.name}", roles=roles, in_program=False), other]
+    return tuple(extended)
 
 
 def _refuse_carrying_at_rest(cell: Cell, tasks: Sequence[Task]) -> None:

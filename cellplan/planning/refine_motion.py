@@ -31,7 +31,7 @@ def plan_within_accuracy(task: MotionTask, *, progress: Progress = silent) -> Mo
     The arguments and errors are those of `plan_motion`.
     """
     order = NameOrder.of(task.cell)
-    tasks = tuple(sorted(task.schedule.tasks, key=lambda each: each.task.name))
+    tasks = tuple(sorted(task.schedule.tasks, key=lambda path: path.task.name))
     paths = tuple(sorted(task.schedule.paths, key=lambda path: path.task.name))
     schedule = replace(task.schedule, tasks=tasks, paths=paths)
     start = order.sorted(task.start)

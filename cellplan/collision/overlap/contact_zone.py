@@ -37,16 +37,16 @@ def _outside_zone(shape: Solid, centre: tuple[float, float, float], radius: floa
     """What ``outside_zone`` returns; a cell is made computable more than once, with the same tools."""
     mesh, middle = _surface(shape), np.array(centre)
     open_ = mesh.vertices[mesh.faces]
-    kept, is_cut = [], False
+    outside, is_cut = [], False
     while len(open_):
         inside = np.linalg.norm(open_ - middle, axis=2).max(axis=1) <= radius
         is_cut |= bool(np.any(inside))
         open_ = open_[~inside]
         longest = np.linalg.norm(open_ - np.roll(open_, -1, axis=1), axis=2).max(axis=1, initial=0.0)
         across = (_distance_bound(open_, middle, longest) < radius) & (longest > FINEST_FRACTION * radius)
-        kept.append(open_[~across])
+        outside.append(open_[~across])
         open_ = halved(open_[across])
-    triangles = np.concatenate(kept) if kept else np.empty((0, 3, 3))
+    triangles = np.concatenate(outside) if outside else np.empty((0, 3, 3))
     if not len(triangles):
         return None, is_cut
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)

@@ -34,13 +34,13 @@ def outside_grip(shape: Solid, X_ST: Array, *, radius: float, layer: float) -> t
     is_in_layer = bool(np.any((height.min(axis=1) < layer) & (height.max(axis=1) > -layer)))
     if not is_in_layer:
         return surface, is_in_ball
-    kept = np.concatenate([_above(triangles, height - layer), _above(triangles, -layer - height)])
-    sides = kept[:, 1:] - kept[:, :1]
-    kept = kept[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > SLIVER_AREA]
-    if not len(kept):
+    outside = np.concatenate([_above(triangles, height - layer), _above(triangles, -layer - height)])
+    sides = outside[:, 1:] - outside[:, :1]
+    outside = outside[np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) > SLIVER_AREA]
+    if not len(outside):
         return None, True
-    faces = np.arange(3 * len(kept)).reshape(-1, 3)
-    return make_mesh(kept.reshape(-1, 3), faces, source="tool outside the contact zone"), True
+    faces = np.arange(3 * len(outside)).reshape(-1, 3)
+    return make_mesh(outside.reshape(-1, 3), faces, source="tool outside the contact zone"), True
 
 
 def _above(triangles: Array, height: Array) -> Array:

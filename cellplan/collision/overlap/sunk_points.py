@@ -121,10 +121,10 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array, s
     height = np.einsum("ij,ij->i", _normals(mesh.vertices[mesh.faces[faces]]), ways)
     if not has_several_solids(mesh):  # the nearest face of one solid may be inside another
         sides = np.where((sides == 0.0) & (np.abs(height) >= STRAIGHT * depths), np.sign(height), sides)
-    asked = np.flatnonzero(is_relevant & (sides == 0.0))
-    sides[asked] = np.where(_is_within(mesh, points[asked]), -1.0, 1.0)
-    found: Array = np.where(is_relevant, -sides * depths, 0.0)
-    return found
+    undecided = np.flatnonzero(is_relevant & (sides == 0.0))
+    sides[undecided] = np.where(_is_within(mesh, points[undecided]), -1.0, 1.0)
+    inside_depths: Array = np.where(is_relevant, -sides * depths, 0.0)
+    return inside_depths
 
 
 def _is_within(mesh: Mesh, points: Array) -> Flags:

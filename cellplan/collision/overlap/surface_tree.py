@@ -52,10 +52,10 @@ class SurfaceTree:
         triangles, middles = triangles[order], middles[order]
         centres, radii = [], []
         for level in range(depth):
-            own, corners = middles.reshape(2**level, -1, 3), triangles.reshape(2**level, -1, 3)
+            centroids, corners = middles.reshape(2**level, -1, 3), triangles.reshape(2**level, -1, 3)
             box = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-            nearest = np.argmin(np.linalg.norm(own - box[:, None], axis=2), axis=1)
-            centres.append(own[np.arange(2**level), nearest])
+            nearest = np.argmin(np.linalg.norm(centroids - box[:, None], axis=2), axis=1)
+            centres.append(centroids[np.arange(2**level), nearest])
             radii.append(np.linalg.norm(corners - centres[-1][:, None], axis=2).max(axis=1))
         return cls(count, triangles, tuple(centres), tuple(radii))
 

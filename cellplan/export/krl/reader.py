@@ -31,15 +31,15 @@ def read_krl(
     Raises:
         InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
     """
-    found: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
+    programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
     left = dict(files)
     for (program, robot), path in paths.items():
-        found[program][robot] = _rows(frame, robot, _played(frame, robot, left, path))
-        if len({len(rows.marks) for rows in found[program].values()}) > 1:
+        programs[program][robot] = _rows(frame, robot, _played(frame, robot, left, path))
+        if len({len(rows.marks) for rows in programs[program].values()}) > 1:
             raise InputError(f"{path}.src: expected as many marks as the programs of the other robots have")
     if left:
         raise InputError(f"{min(left)}: expected no such file in this export")
-    return tuple(ProgramRows(name=program, robots=robots) for program, robots in found.items())
+    return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
 def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_Player":

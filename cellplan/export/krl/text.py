@@ -133,15 +133,15 @@ def _data(file: str, lines: Sequence[_Line], name: str) -> tuple[dict[str, Seque
 
 def _components(file: str, line: _Line, text: str) -> tuple[list[float], int]:
     """Values of all axes of a point, not a number for absent external ones, and how many are present."""
-    found: dict[str, float] = {}
+    components: dict[str, float] = {}
     for part in text.split(","):
         match = _COMPONENT.fullmatch(part.strip())
-        if match is None or match[1].upper() in found:
+        if match is None or match[1].upper() in components:
             raise located(file, line.number, "each axis once with a plain decimal number", part)
-        found[match[1].upper()] = float(match[2])
-    if any(axis not in found for axis in AXES[: len(found)]) or len(found) < len(AXES) - EXTERNAL:
+        components[match[1].upper()] = float(match[2])
+    if any(axis not in components for axis in AXES[: len(components)]) or len(components) < len(AXES) - EXTERNAL:
         raise located(file, line.number, "A1 to A6, and E1 to En without a gap", text)
-    return [found.get(axis, nan) for axis in AXES], len(found)
+    return [components.get(axis, nan) for axis in AXES], len(components)
 
 
 def _body(file: str, lines: Sequence[_Line], words: tuple[str, str, str]) -> Sequence[_Line]:
@@ -162,7 +162,7 @@ def _lines(text: str, file: str) -> list[_Line]:
     parts = split_lines(text, file)
     if parts[-1]:
         raise located(file, len(parts), "a last line that is ended", parts[-1])
-    found = list[_Line]()
+    lines = list[_Line]()
     for number, part in enumerate(parts[:-1], start=1):
         bad = re.search(r"[^ -~\t]", part)
         if bad:
@@ -170,9 +170,9 @@ def _lines(text: str, file: str) -> list[_Line]:
         if len(part) > LINE:
             raise located(file, number, f"at most {LINE} characters", f"{len(part)}")
         said = part.partition(";")[0].strip()
-        if said and not (said.startswith("&") and not found):
-            found.append(_Line(number, said))
-    return found
+        if said and not (said.startswith("&") and not lines):
+            lines.append(_Line(number, said))
+    return lines
 
 
 def located(file: str, line: int, expected: str, got: str) -> InputError:

@@ -71,8 +71,8 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
 def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Program:
     """All that the files of one robot in one program are made of."""
     placed = job.frame.robot(rows.robot)
-    own = None if placed.control is None else placed.control.decimals
-    decimals = DECIMALS if own is None else own
+    control_decimals = None if placed.control is None else placed.control.decimals
+    decimals = DECIMALS if control_decimals is None else control_decimals
     axes = require_six_axes(placed, external=EXTERNAL, what="KRL")
     written = to_numbers(placed, rows.q, decimals=decimals)
     numbers = np.zeros((len(rows), len(AXES)))

@@ -41,10 +41,10 @@ class RapidData:
         Raises:
             InputError: It is not declared, or of another type.
         """
-        found = self._data.get(name.lower())
-        if found is None or found.kind != kind:
-            statement.refuse(f"{kind} that is declared", name if found is None else f"{name}, which is {found.kind}")
-        return found
+        get = self._data.get(name.lower())
+        if get is None or get.kind != kind:
+            statement.refuse(f"{kind} that is declared", name if get is None else f"{name}, which is {get.kind}")
+        return get
 
     def target(self, statement: Statement, name: str, *, is_cartesian: bool) -> str:
         """Text of a target that is declared.
@@ -72,15 +72,15 @@ def read_data(
     Raises:
         InputError: With file and line, when a declaration is not as it must be.
     """
-    found: dict[str, Datum] = {}
+    data: dict[str, Datum] = {}
     for _, module in modules:
         for name, datum in module.data.items():
-            if name in found or name in {other.name.lower() for _, other in modules}:
+            if name in data or name in {other.name.lower() for _, other in modules}:
                 datum.statement.refuse("a name that is used once", datum.name)
-            found[name] = datum
-    for datum in found.values():
+            data[name] = datum
+    for datum in data.values():
         _examine(frame, unit, datum, part)
-    return RapidData(found, part)
+    return RapidData(data, part)
 
 
 def _examine(frame: ExportFrame, unit: RapidUnit, datum: Datum, part: PartFrame | None) -> None:
@@ -118,7 +118,7 @@ def _examine_tasks(frame: ExportFrame, datum: Datum, value: Any) -> None:
     """A list of tasks names those of all robots that move together."""
     if frame.promise is not Promise.SYNCHRONISED:
         datum.statement.refuse("no list of tasks in programs that are not synchronised")
-    expected = [each.task for each in rapid_units(frame)]
+    expected = [unit.task for unit in rapid_units(frame)]
     if not _has_shape(value, [["s"]] * len(expected)) or datum.count != len(expected):
         datum.statement.refuse(f"a list of {len(expected)} tasks")
     names = [entry[0] for entry in value]
@@ -164,7 +164,7 @@ def _has_shape(value: Any, shape: Any) -> bool:
         return (
             isinstance(value, list)
             and len(value) == len(shape)
-            and all(_has_shape(own, part) for own, part in zip(value, shape, strict=True))
+            and all(_has_shape(item, part) for item, part in zip(value, shape, strict=True))
         )
     if shape == "n":
         return isinstance(value, float) and abs(value) < 9e9

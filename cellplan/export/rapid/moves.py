@@ -73,10 +73,10 @@ def read_move(statement: Statement, unit: RapidUnit, data: RapidData, place: Pla
     Raises:
         InputError: With file and line, when it is no such move.
     """
-    found = _MOVE.fullmatch(statement.text)
-    if found is None:
+    match = _MOVE.fullmatch(statement.text)
+    if match is None:
         statement.refuse("a move")
-    kind, named, target, number, speed, duration, zone, tool, work_object = found.groups()
+    kind, named, target, number, speed, duration, zone, tool, work_object = match.groups()
     is_cartesian, is_fine = kind.lower() == "movel", zone.lower() == _FINE
     _require_kind(statement, kind, unit, data, place)
     if named is not None:
@@ -108,7 +108,7 @@ def _require_kind(statement: Statement, kind: str, unit: RapidUnit, data: RapidD
     allowed = ["MoveAbsJ"] if unit.has_tool else ["MoveExtJ"]
     if unit.has_tool and data.part is not None and place.is_between:
         allowed.append("MoveL")
-    if kind.lower() not in {each.lower() for each in allowed}:
+    if kind.lower() not in {kind.lower() for kind in allowed}:
         statement.refuse(f"{' or '.join(allowed)} of robot '{unit.robot.name}' here", kind)
 
 
@@ -118,20 +118,20 @@ def _number(statement: Statement, number: str | None, place: Place) -> int | Non
         statement.refuse("further moves between SyncMoveOn and SyncMoveOff")
     if place.is_between is not (number is not None):
         statement.refuse(r"\ID between SyncMoveOn and SyncMoveOff, and nowhere else")
-    found = None if number is None else int(number)
-    if found is not None and found > LARGEST_ID:
-        statement.refuse(rf"\ID of at most {LARGEST_ID}", str(found))
-    return found
+    identifier = None if number is None else int(number)
+    if identifier is not None and identifier > LARGEST_ID:
+        statement.refuse(rf"\ID of at most {LARGEST_ID}", str(identifier))
+    return identifier
 
 
 def _duration(statement: Statement, duration: str | None, place: Place) -> float:
     r"""The ``\T`` of a move in [s], which all have but the first, whose way is not known."""
     if place.is_first is not (duration is None):
         statement.refuse(r"\T with every move but the first")
-    found = 0.0 if duration is None else float(duration)
-    if duration is not None and not found > 0.0:
+    seconds = 0.0 if duration is None else float(duration)
+    if duration is not None and not seconds > 0.0:
         statement.refuse(r"a duration \T above 0", duration)
-    return found
+    return seconds
 
 
 def _require_frames(

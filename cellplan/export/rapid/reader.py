@@ -56,17 +56,17 @@ def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRow
         InputError: With file and line, where a text is not such a program or breaks a rule of MultiMove.
     """
     units, part = rapid_units(frame), part_frame(frame)
-    left, found = dict(files), []
+    left, programs = dict(files), []
     for name in frame.programs:
         folder = "" if name is None else f"{name}/"
         tasks = [_read_task(frame, unit, left, folder=folder, part=part) for unit in units]
         if frame.promise is Promise.SYNCHRONISED:
             for task in tasks:
                 _require_same_moves(tasks[0], task)
-        found.append(ProgramRows(name=name, robots={task.unit.robot.name: _rows(task) for task in tasks}))
+        programs.append(ProgramRows(name=name, robots={task.unit.robot.name: _rows(task) for task in tasks}))
     if left:
         raise InputError(f"{min(left)}: expected files of the programs only, got another one")
-    return tuple(found)
+    return tuple(programs)
 
 
 def _rows(task: _Task) -> RobotRows:
@@ -119,19 +119,19 @@ def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tupl
     listed = _PROGRAM.fullmatch(text)
     if listed is None:
         raise InputError(f"{path}:1: expected <Program> with the names of its modules")
-    found = []
+    modules = []
     for name in re.findall(r"<Module>\s*([^<>]*?)\s*</Module>", listed[1]):
         file = f"{folder}{name}"
-        own = left.pop(file, None)
-        if own is None:
+        source = left.pop(file, None)
+        if source is None:
             raise InputError(f"{path}: expected module {name!r} among the files, once, got none")
-        module = read_module(own, file)
+        module = read_module(source, file)
         if f"{module.name}.mod".lower() != name.lower():
             raise InputError(f"{file}: expected a module with the name of its file, got {module.name!r}")
-        found.append((file, module))
-    if found[0][1].name.lower() != unit.module.lower():
-        raise InputError(f"{path}: expected module {unit.module!r} first, got {found[0][1].name!r}")
-    return found
+        modules.append((file, module))
+    if modules[0][1].name.lower() != unit.module.lower():
+        raise InputError(f"{path}: expected module {unit.module!r} first, got {modules[0][1].name!r}")
+    return modules
 
 
 def _flat(modules: list[tuple[str, Module]]) -> list[Statement]:
@@ -144,23 +144,23 @@ def _flat(modules: list[tuple[str, Module]]) -> list[Statement]:
             routines[name] = statements
     if "main" not in modules[0][1].routines:
         raise InputError(f"{modules[0][0]}: expected PROC main(), got none")
-    found, called = [], {"main"}
+    flat, called = [], {"main"}
     for statement in routines["main"]:
         name = statement.text.lower()
         if not _CALL.fullmatch(name) or name in WORDS:
-            found.append(statement)
+            flat.append(statement)
         elif name not in routines:
             statement.refuse("the name of a routine that is declared")
         elif name in called:
             statement.refuse("each page called once")
         else:
             called.add(name)
-            found += routines[name]
+            flat += routines[name]
     for _, module in modules:
         for name, head in module.heads.items():
             if name not in called:
                 head.refuse("each page called by main", f"{name}, which is not called")
-    return found
+    return flat
 
 
 def _end(modules: list[tuple[str, Module]]) -> Statement:
@@ -170,11 +170,11 @@ def _end(modules: list[tuple[str, Module]]) -> Statement:
 
 def _sync(statement: Statement, data: RapidData, moves: list[Move], *, between: bool, synchronised: bool) -> _Sync:
     """A statement that begins or ends synchronised moves, behind a stop point."""
-    found = _SYNC.fullmatch(statement.text)
-    if found is None or not synchronised:
-        statement.refuse("SyncMoveOn and SyncMoveOff in synchronised programs" if found is None else "no SyncMoveOn")
-    is_on = found[1] is not None
-    ident, tasks = (found[2], found[3]) if is_on else (found[5], "")
+    match = _SYNC.fullmatch(statement.text)
+    if match is None or not synchronised:
+        statement.refuse("SyncMoveOn and SyncMoveOff in synchronised programs" if match is None else "no SyncMoveOn")
+    is_on = match[1] is not None
+    ident, tasks = (match[2], match[3]) if is_on else (match[5], "")
     if is_on is between or (is_on and len(moves) != 1):
         statement.refuse("SyncMoveOn behind the first move, and one SyncMoveOff behind the last one")
     if not moves or not moves[-1].is_fine:
@@ -189,11 +189,11 @@ def _sync(statement: Statement, data: RapidData, moves: list[Move], *, between: 
 
 def _lowers(frame: ExportFrame, unit: RapidUnit, statements: list[Statement]) -> bool:
     """Whether a program begins with the instruction that lowers its output, and with no other one of a handshake."""
-    found = _SIGNAL.fullmatch(statements[0].text) if statements else None
-    if found is None:
+    match = _SIGNAL.fullmatch(statements[0].text) if statements else None
+    if match is None:
         return False
     first = lowering_step(frame, unit.robot.name)
-    if (found[1].lower(), found[2].lower(), found[3]) != ("setdo", first.signal.lower(), "0"):
+    if (match[1].lower(), match[2].lower(), match[3]) != ("setdo", first.signal.lower(), "0"):
         statements[0].refuse(f"SetDO {first.signal},0 before the first move")
     return True
 
@@ -202,11 +202,11 @@ def _handshake(statements: list[Statement], expected: tuple[Step, ...], moves: l
     """The instructions of a handshake, behind a stop point, once at a row."""
     for statement, step in zip(statements, expected or (None,), strict=False):
         shown = "a move" if step is None else f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)}"
-        found = _SIGNAL.fullmatch(statement.text)
-        if found is None:
+        match = _SIGNAL.fullmatch(statement.text)
+        if match is None:
             statement.refuse("a move, a call or a handshake")
-        own = Step(found[1].lower() == "waitdi", found[2].lower(), found[3] == "1")
-        if step is None or own != step._replace(signal=step.signal.lower()):
+        signal_step = Step(match[1].lower() == "waitdi", match[2].lower(), match[3] == "1")
+        if step is None or signal_step != step._replace(signal=step.signal.lower()):
             statement.refuse(shown)
     if len(statements) < len(expected):
         statements[-1].refuse("the whole of a handshake")
@@ -239,13 +239,13 @@ def _require_whole(
 
 def _require_same_moves(first: _Task, other: _Task) -> None:
     """Moves that run together have the same number and the same duration; lists and meeting points are the same."""
-    for mine, own in zip(first.syncs, other.syncs, strict=True):
-        if mine.ident != own.ident:
-            own.statement.refuse(f"the syncident '{mine.ident}' of the other tasks", own.ident)
-        if mine.tasks != own.tasks:
-            own.statement.refuse(f"the list of tasks '{mine.tasks}' of the other tasks", own.tasks)
-        if mine.is_on and first.data.tasks(mine.tasks) != other.data.tasks(own.tasks):
-            own.statement.refuse("the same list of tasks in all tasks", "another one")
+    for mine, theirs in zip(first.syncs, other.syncs, strict=True):
+        if mine.ident != theirs.ident:
+            theirs.statement.refuse(f"the syncident '{mine.ident}' of the other tasks", theirs.ident)
+        if mine.tasks != theirs.tasks:
+            theirs.statement.refuse(f"the list of tasks '{mine.tasks}' of the other tasks", theirs.tasks)
+        if mine.is_on and first.data.tasks(mine.tasks) != other.data.tasks(theirs.tasks):
+            theirs.statement.refuse("the same list of tasks in all tasks", "another one")
     if len(first.moves) != len(other.moves):
         other.syncs[-1].statement.refuse(
             f"{len(first.moves) - 1} moves before it, as in the other tasks", str(len(other.moves) - 1)

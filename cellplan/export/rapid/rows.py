@@ -39,15 +39,15 @@ def rows_of(unit: RapidUnit, moves: Sequence[Move], marks: tuple[int, ...]) -> R
     arm, external = np.zeros((len(moves), 6)), np.zeros((len(moves), EXTERNAL_AXES))
     X_PT, turns = np.full((len(moves), 4, 4), np.nan), np.full((len(moves), 4), 0, dtype=int)
     for place, move in enumerate(moves):
-        found = (_PART if move.is_cartesian else _JOINTS).fullmatch(move.target)
-        if found is None:
+        match = (_PART if move.is_cartesian else _JOINTS).fullmatch(move.target)
+        if match is None:
             move.statement.refuse("a target [[3],[4],[4],[6]]" if move.is_cartesian else "a target [[6],[6]]")
-        external[place] = _numbers(found[4] if move.is_cartesian else found[2])
+        external[place] = _numbers(match[4] if move.is_cartesian else match[2])
         if move.is_cartesian:
-            X_PT[place] = _pose(move, _numbers(found[1]), _numbers(found[2]))
-            turns[place] = _configuration(move, found[3])
+            X_PT[place] = _pose(move, _numbers(match[1]), _numbers(match[2]))
+            turns[place] = _configuration(move, match[3])
         else:
-            arm[place] = _numbers(found[1])
+            arm[place] = _numbers(match[1])
     _require_axes(unit, moves, arm, external, is_cartesian)
     numbers = np.zeros((len(moves), len(unit.robot.model.joints)))
     numbers[:, unit.axes.external] = external[:, : len(unit.axes.external)]
@@ -101,10 +101,10 @@ def _pose(move: Move, place: Array, turn: Array) -> Array:
 
 def _configuration(move: Move, text: str) -> list[int]:
     """Configuration data of a target."""
-    found = [int(number) for number in text.split(",")]
-    if not 0 <= found[3] <= 7:
-        move.statement.refuse("cfx of 0 to 7", str(found[3]))
-    return found
+    numbers = [int(number) for number in text.split(",")]
+    if not 0 <= numbers[3] <= 7:
+        move.statement.refuse("cfx of 0 to 7", str(numbers[3]))
+    return numbers
 
 
 def _numbers(text: str) -> Array:
@@ -119,8 +119,8 @@ def _require_axes(
     count = len(unit.axes.external)
     is_absent = external == _ABSENT
     bad = np.any(is_absent[:, :count], axis=1) | ~np.all(is_absent[:, count:], axis=1)
-    own = arm == _ABSENT
-    bad_arm = (np.any(own, axis=1) if unit.has_tool else ~np.all(own, axis=1)) & ~is_cartesian
+    unused = arm == _ABSENT
+    bad_arm = (np.any(unused, axis=1) if unit.has_tool else ~np.all(unused, axis=1)) & ~is_cartesian
     for rows, expected in (
         (bad, f"{count} external axes of robot '{unit.robot.name}', and 9E9 for the others"),
         (bad_arm, "six axes of the arm" if unit.has_tool else "9E9 for the axes of an arm"),

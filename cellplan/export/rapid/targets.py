@@ -34,7 +34,7 @@ def joint_targets(unit: RapidUnit, q: Array) -> list[str]:
     """
     numbers = to_numbers(unit.robot, q, decimals=unit.decimals)
     arm = _fields(numbers[:, unit.axes.arm], unit.decimals) if unit.has_tool else [",".join(absent(6))] * len(q)
-    return [f"[[{own}],[{rest}]]" for own, rest in zip(arm, _external(unit, numbers), strict=True)]
+    return [f"[[{axes}],[{rest}]]" for axes, rest in zip(arm, _external(unit, numbers), strict=True)]
 
 
 def part_targets(unit: RapidUnit, q: Array, X_PT: Array) -> list[str]:
@@ -50,11 +50,11 @@ def part_targets(unit: RapidUnit, q: Array, X_PT: Array) -> list[str]:
     """
     places = _fields(X_PT[:, :3, 3] * MM, unit.decimals)
     turns = _fields(quaternions(X_PT[:, :3, :3]), QUATERNION_DECIMALS)
-    own = [",".join(map(str, row)) for row in configuration(unit.robot, q).tolist()]
+    configurations = [",".join(map(str, row)) for row in configuration(unit.robot, q).tolist()]
     rest = _external(unit, to_numbers(unit.robot, q, decimals=unit.decimals))
     return [
         f"[[{place}],[{turn}],[{conf}],[{ext}]]"
-        for place, turn, conf, ext in zip(places, turns, own, rest, strict=True)
+        for place, turn, conf, ext in zip(places, turns, configurations, rest, strict=True)
     ]
 
 
@@ -133,7 +133,7 @@ def _external(unit: RapidUnit, numbers: Array) -> list[str]:
     missing = absent(EXTERNAL_AXES - count)
     if not count:
         return [",".join(missing)] * len(numbers)
-    return [",".join([own, *missing]) for own in _fields(numbers[:, unit.axes.external], unit.decimals)]
+    return [",".join([field, *missing]) for field in _fields(numbers[:, unit.axes.external], unit.decimals)]
 
 
 def _fields(numbers: Array, decimals: int) -> list[str]:

@@ -104,7 +104,7 @@ def value_of(datum: Datum) -> Any:
     Raises:
         InputError: It is no such value.
     """
-    plain = re.sub(r"\b(true|false)\b", lambda found: found[0].lower(), datum.value or "", flags=re.I)
+    plain = re.sub(r"\b(true|false)\b", lambda match: match[0].lower(), datum.value or "", flags=re.I)
     try:
         return json.loads(plain, parse_int=float, parse_constant=_no_number)
     except ValueError:
@@ -132,10 +132,10 @@ def _declare(module: Module, statement: Statement) -> None:
     """Take a declaration."""
     if module.routines:
         statement.refuse("declarations before routines")
-    found = _DATA.fullmatch(statement.text)
-    if found is None or found[3].lower() not in _TYPES:
+    match = _DATA.fullmatch(statement.text)
+    if match is None or match[3].lower() not in _TYPES:
         statement.refuse("a declaration, PROC or ENDMODULE")
-    task, storage, kind, name, count, value = found.groups()
+    task, storage, kind, name, count, value = match.groups()
     key, storage = name.lower(), storage.lower()
     if key in module.data:
         statement.refuse("a name that is used once", name)
@@ -164,8 +164,8 @@ def _statements(text: str, file: str) -> Iterator[Statement]:
                 yield Statement(_plain(block[1]), file, number)
                 rest = block[2]
                 continue
-            own, ended, rest = rest.partition(";")
-            pending = f"{pending} {own}" if pending else own
+            head, ended, rest = rest.partition(";")
+            pending = f"{pending} {head}" if pending else head
             if ended:
                 yield Statement(_plain(pending), file, begun)
                 pending = ""
@@ -191,8 +191,8 @@ def _code(line: str, statement: Statement) -> str:
     """A line without its comment."""
     if '"' not in line:
         return line.partition("!")[0]
-    found = _CODE.match(line)
-    code = found[0] if found else ""
+    match = _CODE.match(line)
+    code = match[0] if match else ""
     if line[len(code) :].startswith('"'):
         statement.refuse("a closing quotation mark")
     return code

@@ -168,13 +168,13 @@ def quaternions(R: Array) -> Array:
         ]
     )
     largest = np.argmax(np.diagonal(outer), axis=1)
-    found = np.moveaxis(outer, -1, 0)[np.arange(len(R)), largest]
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    if len(found):
-        found[0] *= np.where(found[0, 0] < 0.0, -1.0, 1.0)
-        turns = np.sum(found[1:] * found[:-1], axis=1) < 0.0
-        found[1:] *= np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)[:, None]
-    return found
+    quaternion = np.moveaxis(outer, -1, 0)[np.arange(len(R)), largest]
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    if len(quaternion):
+        quaternion[0] *= np.where(quaternion[0, 0] < 0.0, -1.0, 1.0)
+        turns = np.sum(quaternion[1:] * quaternion[:-1], axis=1) < 0.0
+        quaternion[1:] *= np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)[:, None]
+    return quaternion
 
 
 def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> RapidUnit:
@@ -203,10 +203,12 @@ def _controller(frame: ExportFrame, name: str) -> Controller:
     controllers: Mapping[str, Controller] = frame.cell.controllers
     if control is None or control.controller not in controllers:
         raise InputError(f"robots.{name}.controller: expected the controller that plays rapid, got none")
-    found = controllers[control.controller]
-    if found.kind is not ControllerKind.ABB:
-        raise InputError(f"robots.{name}.controller: expected a controller of kind abb for rapid, got {found.kind}")
-    return found
+    controller = controllers[control.controller]
+    if controller.kind is not ControllerKind.ABB:
+        raise InputError(
+            f"robots.{name}.controller: expected a controller of kind abb for rapid, got {controller.kind}"
+        )
+    return controller
 
 
 def rapid_task(frame: ExportFrame, name: str) -> str:

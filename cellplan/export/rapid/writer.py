@@ -105,7 +105,7 @@ def _program_file(modules: dict[str, str]) -> str:
 
 def _durations(frame: ExportFrame, program: ProgramRows) -> dict[str, list[str]]:
     """Durations of the moves to the second and further rows, as text, by robot; rounding does not add up."""
-    found: dict[str, list[str]] = {}
+    durations: dict[str, list[str]] = {}
     for name in frame.robots:
         rows = program.robots[name]
         if rows.times is None or len(rows) < 2:
@@ -113,20 +113,20 @@ def _durations(frame: ExportFrame, program: ProgramRows) -> dict[str, list[str]]
         quanta = np.rint((rows.times - rows.times[0]) * 10.0**TIME_DECIMALS)
         if not np.all(np.diff(quanta) > 0):
             raise InputError(f"rapid: robot '{name}': expected rows at least {10.0**-TIME_DECIMALS:g} s apart")
-        found[name] = [fixed(step, TIME_DECIMALS) for step in (np.diff(quanta) / 10.0**TIME_DECIMALS).tolist()]
+        durations[name] = [fixed(step, TIME_DECIMALS) for step in (np.diff(quanta) / 10.0**TIME_DECIMALS).tolist()]
     if frame.promise is Promise.SYNCHRONISED:
         first = frame.robots[0]
         for name in frame.robots[1:]:
-            if len(found[name]) != len(found[first]):
+            if len(durations[name]) != len(durations[first]):
                 raise InputError(
                     f"rapid: expected the same rows of all robots, as their moves run together, got "
-                    f"{len(found[first]) + 1} of '{first}' and {len(found[name]) + 1} of '{name}'"
+                    f"{len(durations[first]) + 1} of '{first}' and {len(durations[name]) + 1} of '{name}'"
                 )
-            if found[name] != found[first]:
+            if durations[name] != durations[first]:
                 raise InputError(f"rapid: expected rows of '{name}' at the same times as those of '{first}'")
-        if len(found[first]) * ID_STEP > LARGEST_ID:
-            raise InputError(f"rapid: expected at most {LARGEST_ID // ID_STEP} rows, got {len(found[first]) + 1}")
-    return found
+        if len(durations[first]) * ID_STEP > LARGEST_ID:
+            raise InputError(f"rapid: expected at most {LARGEST_ID // ID_STEP} rows, got {len(durations[first]) + 1}")
+    return durations
 
 
 def _moves(
@@ -143,19 +143,19 @@ def _moves(
     joint_move = "MoveAbsJ" if unit.has_tool else "MoveExtJ"
     tool = f",{unit.tool}" if unit.has_tool else ""
     names = [zone_name(size) if size else "fine" for size in zones]
-    found = [[f"{joint_move} {targets[0]},{FROM},fine{tool};"]]
+    moves = [[f"{joint_move} {targets[0]},{FROM},fine{tool};"]]
     for place, (duration, is_at_part) in enumerate(zip(durations, at_part[1:].tolist(), strict=True), start=1):
         number = f"\\ID:={ID_STEP * place}" if is_synchronised else ""
         move, ending = ("MoveL", f"{tool}\\WObj:={PART}") if is_at_part else (joint_move, tool)
-        found.append([f"{move} {targets[place]}{number},{ROWS}\\T:={duration},{names[place]}{ending};"])
+        moves.append([f"{move} {targets[place]}{number},{ROWS}\\T:={duration},{names[place]}{ending};"])
     if not is_synchronised:
         if rows.marks:
             _require_names(frame, unit.robot.name)
             if handshake_steps(frame, unit.robot.name):
-                found[0].insert(0, _signal(lowering_step(frame, unit.robot.name)))
+                moves[0].insert(0, _signal(lowering_step(frame, unit.robot.name)))
         for mark in rows.marks:
-            found[mark] += [_signal(step) for step in handshake_steps(frame, unit.robot.name)]
-    return found
+            moves[mark] += [_signal(step) for step in handshake_steps(frame, unit.robot.name)]
+    return moves
 
 
 def _require_names(frame: ExportFrame, robot: str) -> None:
@@ -188,7 +188,7 @@ def _modules(
     longest = LINES if job.frame.split is None else job.frame.split
     pages = [rest[start : start + longest] for start in range(0, len(rest), longest)] if len(moves) > longest else []
     names = [f"{unit.module}_{number:03d}" for number in range(1, len(pages) + 1)]
-    called = safe_names(names, longest=LONGEST_NAME, reserved=[each.module for each in units])
+    called = safe_names(names, longest=LONGEST_NAME, reserved=[unit.module for unit in units])
     body = [f"page_{number:03d};" for number in range(1, len(pages) + 1)] or [*chain.from_iterable(rest)]
     if is_synchronised:
         body = [f"SyncMoveOn {SYNC_ON},{TASKS};", *body, f"SyncMoveOff {SYNC_OFF};"]
@@ -215,7 +215,7 @@ def _notes(job: ExportJob, unit: RapidUnit) -> Iterator[str]:
 def _data(job: ExportJob, units: Sequence[RapidUnit], unit: RapidUnit, part: PartFrame | None) -> Iterator[str]:
     """Declarations of a robot's main module."""
     if job.frame.promise is Promise.SYNCHRONISED:
-        names = ",".join(f'["{each.task}"]' for each in units)
+        names = ",".join(f'["{unit.task}"]' for unit in units)
         yield f"PERS tasks {TASKS}{{{len(units)}}} := [{names}];"
         yield f"VAR syncident {SYNC_ON};"
         yield f"VAR syncident {SYNC_OFF};"

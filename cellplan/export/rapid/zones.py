@@ -41,21 +41,21 @@ def row_zones(job: ExportJob, program: ProgramRows, units: Sequence[RapidUnit]) 
     if job.frame.promise is Promise.SYNCHRONISED:
         passed: Flags = np.logical_and.reduce(
             [
-                (shares[name] > 0.0) & ((own > 0) | ~np.any(moves(program.robots[name]), axis=0))
-                for name, own in sizes.items()
+                (shares[name] > 0.0) & ((radii > 0) | ~np.any(moves(program.robots[name]), axis=0))
+                for name, radii in sizes.items()
             ]
         )
-        sizes = {name: np.where(passed, np.maximum(own, ZONES[0]), 0) for name, own in sizes.items()}
-    return {name: own.tolist() for name, own in sizes.items()}
+        sizes = {name: np.where(passed, np.maximum(radii, ZONES[0]), 0) for name, radii in sizes.items()}
+    return {name: radii.tolist() for name, radii in sizes.items()}
 
 
 def rows_at_part(rows: RobotRows) -> Flags:
     """Rows that are stated as targets on the part; never the first, which is reached before robots are in step."""
     if rows.X_PT is None:
         return np.zeros(len(rows), dtype=bool)
-    found = np.all(np.isfinite(rows.X_PT), axis=(1, 2))
-    found[0] = False
-    return found
+    is_at_part = np.all(np.isfinite(rows.X_PT), axis=(1, 2))
+    is_at_part[0] = False
+    return is_at_part
 
 
 def zone_data(unit: RapidUnit, sizes: Sequence[int]) -> Iterator[str]:
@@ -74,8 +74,8 @@ def _sizes(unit: RapidUnit, rows: RobotRows, shares: Array, *, chosen: Array) ->
         exact = np.maximum(1000.0 * axis_zones(unit.robot, q, chosen), ZONES[0]) * (shares > 0.0)
         return scale[np.searchsorted(scale, exact, side="right") - 1]
     exact = 1000.0 * MM * _tool_zones(unit, replace(rows, q=q), shares)
-    found: np.ndarray = scale[np.searchsorted(scale, exact, side="right") - 1]
-    return np.where(found >= SMALLEST_TOOL, found, 0)
+    sizes: np.ndarray = scale[np.searchsorted(scale, exact, side="right") - 1]
+    return np.where(sizes >= SMALLEST_TOOL, sizes, 0)
 
 
 def _tool_zones(unit: RapidUnit, rows: RobotRows, shares: Array) -> Array:

@@ -61,13 +61,13 @@ def read_ros2(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows
         InputError: With file and line, when a text is not such a file.
     """
     paths = {(name, robot): _paths(frame, files, name, robot) for name in frame.programs for robot in frame.robots}
-    require_paths(files, [path for own in paths.values() for path in own])
-    found = []
+    require_paths(files, [path for trajectory in paths.values() for path in trajectory])
+    programs = []
     for name in frame.programs:
         robots = {robot: _rows(frame.robot(robot), files, paths[name, robot]) for robot in frame.robots}
         _require_one_clock(robots, {robot: paths[name, robot][0] for robot in robots})
-        found.append(ProgramRows(name=name, robots=robots))
-    return tuple(found)
+        programs.append(ProgramRows(name=name, robots=robots))
+    return tuple(programs)
 
 
 def _paths(frame: ExportFrame, files: Mapping[str, str], program: str | None, robot: str) -> list[str]:
@@ -214,7 +214,7 @@ def _require_fit(robot: Robot, part: _Part) -> None:
 
 def _rounding(h: Array, slopes: Array) -> Array:
     """By how much rounding may part speeds and slopes around each row, shape (N, n)."""
-    each = (TICKS * 10.0**-DECIMALS + np.abs(slopes) / NANO) / h
-    padded = np.concatenate([each[:1], each, each[-1:]])
+    slope_error = (TICKS * 10.0**-DECIMALS + np.abs(slopes) / NANO) / h
+    padded = np.concatenate([slope_error[:1], slope_error, slope_error[-1:]])
     both: Array = np.maximum(padded[:-1], padded[1:]) + TICKS * 10.0**-DECIMALS
     return both

@@ -37,7 +37,7 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
         InputError: Rows have no speeds or do not rest at their ends, a number cannot be written, or robots rest
             nowhere within the largest number of points.
     """
-    found = {}
+    files = {}
     for program in job.programs:
         clock = shared_clock(program, job.frame.robots)
         speeds = {name: _resting_speeds(program.robots[name]) for name in job.frame.robots}
@@ -47,8 +47,8 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
             for number, (first, last) in enumerate(parts, start=1):
                 path = file_path(program.name, file_name(name, number, 0 if job.frame.split is None else len(parts)))
                 head = [*_head(job, program, name), *_part_note(number, len(parts))]
-                found[path] = _trajectory(job.frame.robot(name), head, clock[first : last + 1], lines[first : last + 1])
-    return found
+                files[path] = _trajectory(job.frame.robot(name), head, clock[first : last + 1], lines[first : last + 1])
+    return files
 
 
 def _resting_speeds(rows: RobotRows) -> Array:

@@ -47,7 +47,7 @@ def render_stream(job: ExportJob) -> dict[str, str]:
             not stated.
     """
     raise_findings(refusals(*_demands(job.frame, 0)))
-    found = {}
+    files = {}
     for program in job.programs:
         for name in job.frame.robots:
             robot = job.frame.robot(name)
@@ -55,10 +55,10 @@ def render_stream(job: ExportJob) -> dict[str, str]:
             record = stream_record(
                 job.frame, program.name, name, quanta=quanta, digest=_digest(text), notes=_notes(job, robot)
             )
-            found[file_path(program.name, f"{name}.csv")] = text
-            found[file_path(program.name, f"{name}.json")] = dumped(record) + "\n"
+            files[file_path(program.name, f"{name}.csv")] = text
+            files[file_path(program.name, f"{name}.json")] = dumped(record) + "\n"
         _require_one_end({name: float(times_of(program.robots[name])[-1]) for name in job.frame.robots})
-    return found
+    return files
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
@@ -89,12 +89,12 @@ def read_stream(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRo
     require_paths(
         files, [file_path(name, robot + end) for name in frame.programs for robot in frame.robots for end in endings]
     )
-    found = []
+    programs = []
     for name in frame.programs:
         robots = {robot: _read(frame, name, robot, files=files) for robot in frame.robots}
         _require_one_end_read({file_path(name, f"{robot}.csv"): rows for robot, rows in robots.items()})
-        found.append(ProgramRows(name=name, robots=robots))
-    return tuple(found)
+        programs.append(ProgramRows(name=name, robots=robots))
+    return tuple(programs)
 
 
 def columns(robot: Robot) -> str:
@@ -147,26 +147,26 @@ def _require_one_end(ends: Mapping[str, float]) -> None:
             )
 
 
-def _require_one_end_read(found: Mapping[str, RobotRows]) -> None:
+def _require_one_end_read(robot_rows: Mapping[str, RobotRows]) -> None:
     """Make sure that all streams of a program, by their path, end at the same time."""
-    first = next(iter(found))
-    ends = {path: float(times_of(rows)[-1]) for path, rows in found.items()}
+    first = next(iter(robot_rows))
+    ends = {path: float(times_of(rows)[-1]) for path, rows in robot_rows.items()}
     for path, end in ends.items():
         if abs(end - ends[first]) > OFF_CYCLE:
             raise found_error(
-                path, len(found[path]) + 1, f"the end at {ends[first]:.6f} s, as in {first}", f"{end:.6f} s"
+                path, len(robot_rows[path]) + 1, f"the end at {ends[first]:.6f} s, as in {first}", f"{end:.6f} s"
             )
 
 
 def _read(frame: ExportFrame, program: str | None, name: str, *, files: Mapping[str, str]) -> RobotRows:
     """Read the two files of a robot."""
-    robot, file, beside = frame.robot(name), file_path(program, f"{name}.csv"), file_path(program, f"{name}.json")
+    robot, file, header = frame.robot(name), file_path(program, f"{name}.csv"), file_path(program, f"{name}.json")
     numbers, process = _rows(robot, files[file], file)
     _require_rest(robot, numbers, file)
     quanta = _quanta(numbers)
     expected = stream_record(frame, program, name, quanta=quanta, digest=_digest(files[file]))
-    lines_of(files[beside], beside)
-    record = parsed(files[beside], beside)
+    lines_of(files[header], header)
+    record = parsed(files[header], header)
     record.require(expected, free=FREE)
     record.members(tuple(expected))["notes"].require_texts()
     q = np.empty_like(numbers)

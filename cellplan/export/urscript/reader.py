@@ -79,7 +79,7 @@ class _Statements:
             self.take(f"def {called[-1]}():")
             inside += self._routine(most)
         if not called:
-            self._require_length([each for each in self.all if each.text.startswith(MOVES)], most)
+            self._require_length([statement for statement in self.all if statement.text.startswith(MOVES)], most)
             return
         start = self.place
         while self.peek().text != f"{called[0]}()":
@@ -87,20 +87,20 @@ class _Statements:
         begin = self.all[start : self.place]
         for name in called:
             self.take(f"{name}()")
-        if moves := [each for each in begin if each.text.startswith(MOVES)]:
+        if moves := [statement for statement in begin if statement.text.startswith(MOVES)]:
             raise line_error(self.file, moves[0].line, f"{called[0]}()", moves[0].shown)
         self.all, self.place = [*begin, *inside, *self.all[self.place :]], 0
 
     def _routine(self, most: int) -> list[Statement]:
         """The instructions of a routine up to its end."""
-        found, depth = list[Statement](), 1
+        statements, depth = list[Statement](), 1
         while depth:
             at = self.peek()
             depth += at.text.startswith("while ") - (at.text == "end")
-            found.append(at)
+            statements.append(at)
             self.place += 1
-        self._require_length([each for each in found if each.text.startswith(MOVES)], most)
-        return found[:-1]
+        self._require_length([statement for statement in statements if statement.text.startswith(MOVES)], most)
+        return statements[:-1]
 
     def _require_length(self, moves: Sequence[Statement], most: int) -> None:
         """Refuse more rows than a routine holds."""
@@ -124,9 +124,9 @@ class _Statements:
         Raises:
             InputError: It is another one.
         """
-        found = self.peek()
-        if found.text != compact(expected):
-            raise line_error(self.file, found.line, expected.strip(), found.shown)
+        statement = self.peek()
+        if statement.text != compact(expected):
+            raise line_error(self.file, statement.line, expected.strip(), statement.shown)
         self.place += 1
 
     def end(self) -> None:
@@ -136,8 +136,8 @@ class _Statements:
             InputError: Something does.
         """
         if self.place < len(self.all):
-            found = self.all[self.place]
-            raise line_error(self.file, found.line, "the end of the file", found.shown)
+            statement = self.all[self.place]
+            raise line_error(self.file, statement.line, "the end of the file", statement.shown)
 
 
 def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
@@ -153,7 +153,7 @@ def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[Program
     keys = [(program, robot) for program in frame.programs for robot in frame.robots]
     paths = {key: file_path(key[0], f"{key[1]}{ENDING}") for key in keys}
     require_paths(files, tuple(paths.values()))
-    names, found = function_names(frame), []
+    names, programs = function_names(frame), []
     for program in frame.programs:
         robots = {}
         for robot in frame.robots:
@@ -165,8 +165,8 @@ def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[Program
             robots[robot] = read(frame, frame.robot(robot), statements)
             statements.take("end")
             statements.end()
-        found.append(ProgramRows(name=program, robots=robots))
-    return tuple(found)
+        programs.append(ProgramRows(name=program, robots=robots))
+    return tuple(programs)
 
 
 def compact(text: str) -> str:
@@ -192,16 +192,16 @@ class _Points:
         self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
         self.expected = f"{ARM} positions with {decimals} decimals"
 
-    def add(self, found: Statement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+    def add(self, statement: Statement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
         """Take in the row of an instruction.
 
         Raises:
             InputError: It is another instruction.
         """
-        match = pattern.fullmatch(found.text)
+        match = pattern.fullmatch(statement.text)
         if match is None:
-            raise line_error(self.file, found.line, f"{what} with {self.expected}", found.shown)
-        self.lines.append(found.line)
+            raise line_error(self.file, statement.line, f"{what} with {self.expected}", statement.shown)
+        self.lines.append(statement.line)
         self.numbers.append([float(text) for text in match[1].split(",")])
         return match
 
@@ -255,16 +255,16 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> Robo
         statements.take(lowering(frame, robot.name) if handshake_lines(frame, robot.name) else "movej")
     _approach(points, statements)
     is_blended, at = False, statements.all[statements.place - 1]
-    while (found := statements.peek()).text != "end":
-        if found.text.startswith("movej"):
-            match = points.add(found, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
-            _require_speed(robot, float(match[2]), found, statements.file)
-            is_blended, at = match[3] is not None, found
+    while (statement := statements.peek()).text != "end":
+        if statement.text.startswith("movej"):
+            match = points.add(statement, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
+            _require_speed(robot, float(match[2]), statement, statements.file)
+            is_blended, at = match[3] is not None, statement
             radii.append(float(match[3] or 0.0))
             statements.place += 1
             continue
         if is_blended or not is_met:
-            raise line_error(statements.file, found.line, "movej, or end", found.shown)
+            raise line_error(statements.file, statement.line, "movej, or end", statement.shown)
         _meet(frame, robot, statements)
         marks.append(len(points.lines) - 1)
     if is_blended:
@@ -275,18 +275,18 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> Robo
     return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
 
 
-def _require_speed(robot: Robot, speed: float, found: Statement, file: str) -> None:
+def _require_speed(robot: Robot, speed: float, statement: Statement, file: str) -> None:
     """Make sure that a speed is none beyond those of all joints."""
     largest = max(joint.velocity for joint in robot.model.joints)
     if speed > largest:
-        raise line_error(file, found.line, f"a speed of {largest:.3f} rad/s at most", found.shown)
+        raise line_error(file, statement.line, f"a speed of {largest:.3f} rad/s at most", statement.shown)
 
 
 def _meet(frame: ExportFrame, robot: Robot, statements: _Statements) -> None:
     """The handshake of a robot at a mark."""
     lines = handshake_lines(frame, robot.name)
     if not lines:
-        found = statements.peek()
-        raise line_error(statements.file, found.line, "movej, or end", found.shown)
+        statement = statements.peek()
+        raise line_error(statements.file, statement.line, "movej, or end", statement.shown)
     for line in lines:
         statements.take(line)

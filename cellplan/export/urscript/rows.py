@@ -25,9 +25,9 @@ def move_speeds(robot: Robot, rows: RobotRows) -> Array:
     The leading joint of a move is the one that travels farthest. Where rows have no times, or none travels, the speed
     is that of the approach.
     """
-    found = np.full(len(rows), APPROACH_SPEED)
+    speeds = np.full(len(rows), APPROACH_SPEED)
     if len(rows) < 2:
-        return found
+        return speeds
     travel = np.abs(np.diff(rows.q, axis=0))
     farthest = travel.max(axis=1)
     moves = np.flatnonzero(farthest > 0.0)
@@ -35,19 +35,19 @@ def move_speeds(robot: Robot, rows: RobotRows) -> Array:
     share = travel[moves] / farthest[moves, None]
     limits = np.array([joint.velocity for joint in robot.model.joints])
     allowed = (limits / np.maximum(share, 1e-12)).min(axis=1)
-    own = np.minimum(np.maximum(planned[moves], SLOWEST), allowed)
-    found[1 + moves] = np.maximum(np.floor(own / TICK + 1e-6), 1.0) * TICK
-    return found
+    limited = np.minimum(np.maximum(planned[moves], SLOWEST), allowed)
+    speeds[1 + moves] = np.maximum(np.floor(limited / TICK + 1e-6), 1.0) * TICK
+    return speeds
 
 
 def move_acceleration(robot: Robot) -> float:
     """Acceleration of the leading joint in [rad/s^2] that no joint exceeds; that of the approach if none is known."""
-    own = []
+    accelerations = []
     for place, joint in enumerate(robot.model.joints):
         seconds = full_speed_in(robot.acceleration, place)
         assumed = None if seconds is None else joint.top_speed / seconds
-        own.append(assumed if joint.acceleration is None else joint.acceleration)
-    stated = [limit for limit in own if limit is not None]
+        accelerations.append(assumed if joint.acceleration is None else joint.acceleration)
+    stated = [limit for limit in accelerations if limit is not None]
     smallest = min(stated, default=APPROACH_ACCELERATION)
     return float(max(np.floor(smallest / TICK + 1e-6), 1.0) * TICK)
 

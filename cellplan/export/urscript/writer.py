@@ -50,7 +50,7 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
             that its program needs.
     """
     raise_findings(refusals(*_demands(job.frame, 0)))
-    names, found = function_names(job.frame), {}
+    names, files = function_names(job.frame), {}
     for program in job.programs:
         for name in job.frame.robots:
             robot, rows = job.frame.robot(name), program.robots[name]
@@ -60,8 +60,8 @@ def render_urscript(job: ExportJob) -> dict[str, str]:
             at_rows = (_timed if is_timed else _sequence)(job, robot, rows, points)
             body = [*_routines(job, rows, at_rows), *([stop_call(robot)] if is_timed else [])]
             head = [line for note in _notes(job, rows) for line in comment(note, "#")]
-            found[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
-    return found
+            files[path] = joined([*head, f"def {names[program.name, name]}():", *("  " + line for line in body), "end"])
+    return files
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
@@ -87,10 +87,10 @@ def _routines(job: ExportJob, rows: RobotRows, at_rows: Sequence[Sequence[str]])
     begin = [lowering(job.frame, rows.robot)] if waits else []
     if len(pages) == 1:
         return [*begin, *(line for lines in at_rows for line in lines)]
-    found, names = list[str](), [page_name(number) for number in range(1, len(pages) + 1)]
+    lines, names = list[str](), [page_name(number) for number in range(1, len(pages) + 1)]
     for name, page in zip(names, pages, strict=True):
-        found += [f"def {name}():", *(f"  {line}" for row in page for line in at_rows[row]), "end"]
-    return [*found, *begin, *(f"{name}()" for name in names)]
+        lines += [f"def {name}():", *(f"  {line}" for row in page for line in at_rows[row]), "end"]
+    return [*lines, *begin, *(f"{name}()" for name in names)]
 
 
 def _points(robot: Robot, rows: RobotRows, decimals: int) -> list[str]:

@@ -119,19 +119,19 @@ class _Reader:
         Args:
             inside: What the loops around them count with.
         """
-        found = list[Node]()
+        nodes = list[Node]()
         while self.lines:
             line, said = self.lines.pop()
             if said == "endFor" and inside:
-                return found
+                return nodes
             loop = _FOR.fullmatch(said)
             if loop:
-                found.append(self._loop(line, loop, inside))
+                nodes.append(self._loop(line, loop, inside))
             else:
-                found.append(self._simple(line, said))
+                nodes.append(self._simple(line, said))
         if inside:
             raise _error(self.code, line, "endFor", said)
-        return found
+        return nodes
 
     def _loop(self, line: int, loop: re.Match[str], inside: tuple[str, ...]) -> Loop:
         """A loop and what is in it."""

@@ -60,23 +60,29 @@ def read_data(text: str, file: str) -> dict[str, Data]:
     database = parse(text, file, "Database", DATA_SPACE)
     database.require()
     database.only("Datas", space=DATA_SPACE)
-    found: dict[str, Data] = {}
+    variables: dict[str, Data] = {}
     for element in database.one("Datas", space=DATA_SPACE).only("Data", space=DATA_SPACE):
         name, data = _data(element)
-        if name in found:
+        if name in variables:
             raise element.error("names that differ", name)
-        found[name] = data
-    return found
+        variables[name] = data
+    return variables
 
 
 def _data(element: Element) -> tuple[str, Data]:
     """One array."""
     element.require(needed=("name", TYPE, "type", "size"), allowed=("access",))
-    own = element.attributes
-    name, kind, size = own["name"], own["type"], own["size"]
+    attributes = element.attributes
+    name, kind, size = attributes["name"], attributes["type"], attributes["size"]
     longest = TOOL_NAME if kind == "tool" else NAME
-    if kind not in _NUMBERS or own[TYPE] != "array" or own.get("access", "public") not in {"public", "private"}:
-        raise element.error(f"a public or private array of one of {', '.join(_NUMBERS)}", f"{own[TYPE]} of {kind}")
+    if (
+        kind not in _NUMBERS
+        or attributes[TYPE] != "array"
+        or attributes.get("access", "public") not in {"public", "private"}
+    ):
+        raise element.error(
+            f"a public or private array of one of {', '.join(_NUMBERS)}", f"{attributes[TYPE]} of {kind}"
+        )
     if not re.fullmatch(rf"[A-Za-z]\w{{0,{longest - 1}}}", name, re.ASCII):
         raise element.error(f"a name of at most {longest} letters and digits", name)
     if not re.fullmatch(r"[1-9][0-9]{0,6}", size):
@@ -92,17 +98,17 @@ def _value(value: Element, key: int, kind: str) -> Mapping[str, str]:
     """Attributes of one value."""
     value.require(needed=("key", *_NEEDED[kind]), allowed=(*_NUMBERS[kind], *_TEXTS[kind]))
     value.only(space=DATA_SPACE)
-    own = value.attributes
-    if own["key"] != str(key):
-        raise value.error(f'key="{key}"', own["key"])
+    attributes = value.attributes
+    if attributes["key"] != str(key):
+        raise value.error(f'key="{key}"', attributes["key"])
     for name in _NUMBERS[kind]:
-        if name in own and not re.fullmatch(r"-?[0-9]{1,7}(?:\.[0-9]{1,12})?", own[name]):
-            raise value.error(f"a plain decimal number as {name}", own[name])
-    if kind in _FATHERS and own["fatherId"] != _FATHERS[kind]:
-        raise value.error(f'fatherId="{_FATHERS[kind]}"', own["fatherId"])
+        if name in attributes and not re.fullmatch(r"-?[0-9]{1,7}(?:\.[0-9]{1,12})?", attributes[name]):
+            raise value.error(f"a plain decimal number as {name}", attributes[name])
+    if kind in _FATHERS and attributes["fatherId"] != _FATHERS[kind]:
+        raise value.error(f'fatherId="{_FATHERS[kind]}"', attributes["fatherId"])
     if kind == "mdesc":
-        if not 0.0 < float(own.get("vel", "100")) <= 100.0:
-            raise value.error("a speed above 0 and up to 100", own["vel"])
-        if own.get("blend", "off") not in _BLENDS:
-            raise value.error(f"one of {', '.join(_BLENDS)}", own["blend"])
-    return own
+        if not 0.0 < float(attributes.get("vel", "100")) <= 100.0:
+            raise value.error("a speed above 0 and up to 100", attributes["vel"])
+        if attributes.get("blend", "off") not in _BLENDS:
+            raise value.error(f"one of {', '.join(_BLENDS)}", attributes["blend"])
+    return attributes

@@ -48,18 +48,18 @@ def signal_names(steps: Iterable[Step]) -> dict[tuple[bool, str], str]:
         The names by whether it is an input, and by the signal, in the order of their first use.
     """
     used = {word.lower() for word in WORDS}
-    found: dict[tuple[bool, str], str] = {}
+    names: dict[tuple[bool, str], str] = {}
     for step in steps:
-        if (step.waits, step.signal) in found:
+        if (step.waits, step.signal) in names:
             continue
-        inputs = sum(is_input for is_input, _ in found)
+        inputs = sum(is_input for is_input, _ in names)
         name = f"{INPUT}{inputs + 1}" if step.waits else OUTPUT
         is_taken = step.signal.lower() in used or re.fullmatch(rf"{DATA}|.*_[0-9]{{3}}", step.signal, re.IGNORECASE)
         if re.fullmatch(_SIGNAL, step.signal) and not is_taken:
             name = step.signal
         used.add(name.lower())
-        found[step.waits, step.signal] = name
-    return found
+        names[step.waits, step.signal] = name
+    return names
 
 
 def input_link(signal: str) -> str:

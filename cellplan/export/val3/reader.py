@@ -34,7 +34,7 @@ def read_val3(
     Raises:
         InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
     """
-    found: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
+    programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
     left = dict(files)
     for (program, robot), path in paths.items():
         player = _Player(frame=frame, robot=robot, project=_project(left, path))
@@ -42,12 +42,12 @@ def read_val3(
         placed = frame.robot(robot)
         q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
         rounding = tool_shares(placed, q, np.array(player.zones) / MM)
-        found[program][robot] = RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
-        if len({len(rows.marks) for rows in found[program].values()}) > 1:
+        programs[program][robot] = RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
+        if len({len(rows.marks) for rows in programs[program].values()}) > 1:
             raise InputError(f"{path}: expected as many marks as the programs of the other robots have")
     if left:
         raise InputError(f"{min(left)}: expected no such file in this export")
-    return tuple(ProgramRows(name=program, robots=robots) for program, robots in found.items())
+    return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,10 +103,10 @@ def _listed(project: Element, path: str) -> tuple[list[str], str]:
             raise listed.error(f"{name}.pgx once", f"{names.count(name)} of them")
     database = project.one("Database", space=PROJECT_SPACE)
     entries = database.only("Data", space=PROJECT_SPACE)
-    own = path.rpartition("/")[2]
-    if [_file_name(entry, ".dtx") for entry in entries] != [own]:
-        raise database.error(f"{own}.dtx alone", f"{len(entries)} of them")
-    return names, f"{path}/{own}.dtx"
+    file_name = path.rpartition("/")[2]
+    if [_file_name(entry, ".dtx") for entry in entries] != [file_name]:
+        raise database.error(f"{file_name}.dtx alone", f"{len(entries)} of them")
+    return names, f"{path}/{file_name}.dtx"
 
 
 def _file_name(entry: Element, ending: str) -> str:
@@ -127,13 +127,13 @@ def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data
     program.require(needed=("name",), allowed=("access",))
     if program.attributes["name"] != name or program.attributes.get("access") not in {None, "public", "private"}:
         raise program.error(f"the program {name}, public or private", " ".join(program.attributes.values()))
-    counters = {each for each, own in data.items() if own.kind == "num"}
+    counters = {name for name, datum in data.items() if datum.kind == "num"}
     for child in program.children:
         if child.name == f"{PARAMETER_SPACE} Parameters":
             child.require()
             child.only(space=PARAMETER_SPACE)
         elif child.name == f"{PROGRAM_SPACE} Locals":
-            counters |= {_local(each) for each in child.only("Local", space=PROGRAM_SPACE)}
+            counters |= {_local(local) for local in child.only("Local", space=PROGRAM_SPACE)}
         elif child.name != f"{PROGRAM_SPACE} Code":
             raise child.error("Parameters, Locals or Code", child.name.rpartition(" ")[2])
     code = program.one("Code", space=PROGRAM_SPACE)

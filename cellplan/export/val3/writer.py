@@ -119,8 +119,8 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
 def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Project:
     """All that the project of one robot in one program is made of."""
     placed = job.frame.robot(rows.robot)
-    own = None if placed.control is None else placed.control.decimals
-    decimals = DECIMALS if own is None else own
+    control_decimals = None if placed.control is None else placed.control.decimals
+    decimals = DECIMALS if control_decimals is None else control_decimals
     numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, VAL3)
     shares = row_shares(job, program)[rows.robot] * is_rounded(job, program, rows.robot, numbers, pages)
     zones = _zones(placed, from_numbers(placed, numbers), shares)
@@ -131,7 +131,7 @@ def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -
         rows=rows,
         numbers=numbers,
         decimals=decimals,
-        moves=[_Move(*each) for each in zip(percentages(placed, rows), zones, strict=True)],
+        moves=[_Move(*entry) for entry in zip(percentages(placed, rows), zones, strict=True)],
         steps=steps,
         first=[lowering_step(job.frame, rows.robot)] if steps else [],
         pages=pages,
@@ -156,7 +156,7 @@ def _files(project: _Project) -> dict[str, str]:
         code = moves[0]
     else:
         code = [f"call {page}()" for page in pages]
-        programs |= {page: _program(page, own) for page, own in zip(pages, moves, strict=True)}
+        programs |= {page: _program(page, page_moves) for page, page_moves in zip(pages, moves, strict=True)}
     heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
     first = [_instruction(step, project.signals) for step in project.first]
     programs[START] = _program(START, [*heads, *first, *code, "waitEndMove()"])

@@ -65,10 +65,10 @@ class Element:
         Raises:
             InputError: With file and line: there is none, or another one.
         """
-        found = [child for child in self.children if child.name == f"{space} {name}"]
-        if len(found) != 1:
-            raise self.error(f"{name} once", f"{len(found)} of them")
-        return found[0]
+        matching = [child for child in self.children if child.name == f"{space} {name}"]
+        if len(matching) != 1:
+            raise self.error(f"{name} once", f"{len(matching)} of them")
+        return matching[0]
 
 
 def parse(text: str, file: str, root: str, space: str) -> Element:

@@ -41,22 +41,24 @@ class PhaseRows:
 
     def scheduled(self, task: str) -> TaskSchedule | None:
         """The desired tool poses of a task; None where it is not worked on."""
-        return next((each for each in self.schedule.tasks if each.task.name == task), None)
+        return next((scheduled for scheduled in self.schedule.tasks if scheduled.task.name == task), None)
 
     def tool_poses(self, task: str) -> Array | None:
         """Tool poses of a task in the frame that it is given in, shape (n, 4, 4); None where it is not worked on."""
-        own = self.scheduled(task)
-        if own is None:
+        scheduled = self.scheduled(task)
+        if scheduled is None:
             return None
-        X_WT = self.X_WT[own.task.robot]
-        return X_WT if own.task.relative_to is Frame.WORLD else inverse(self.X_WP) @ X_WT
+        X_WT = self.X_WT[scheduled.task.robot]
+        return X_WT if scheduled.task.relative_to is Frame.WORLD else inverse(self.X_WP) @ X_WT
 
     def errors(self, task: str) -> Array | None:
         """Position error in [mm] and orientation error in [deg] of a task, shape (n, 2); None likewise."""
-        own = next((each for each in self.report.accuracy if each.task == task), None)
-        if own is None:
+        accuracy = next((accuracy for accuracy in self.report.accuracy if accuracy.task == task), None)
+        if accuracy is None:
             return None
-        position, orientation = (np.linalg.norm(e, axis=1) for e in (own.position_error, own.orientation_error))
+        position, orientation = (
+            np.linalg.norm(e, axis=1) for e in (accuracy.position_error, accuracy.orientation_error)
+        )
         return np.stack([MM * position, DEG * orientation], axis=1)
 
 
@@ -94,13 +96,13 @@ class ProgramRows:
         Returns:
             The values, shape (N,), or (N, width).
         """
-        found = np.full((len(self.times), *([] if width is None else [width])), np.nan)
+        column = np.full((len(self.times), *([] if width is None else [width])), np.nan)
         for phase in self.phases:
-            found[phase.rows] = np.nan
+            column[phase.rows] = np.nan
             values = values_of(phase)
             if values is not None:
-                found[phase.rows.start : phase.rows.start + len(values)] = values
-        return found
+                column[phase.rows.start : phase.rows.start + len(values)] = values
+        return column
 
 
 def wide_columns(program: ProgramRows) -> Columns:
@@ -181,8 +183,8 @@ def _task_columns(program: ProgramRows, task: str) -> Columns:
         return None if X is None else MM * _speeds(X[:, :3, 3], phase.report.times)
 
     def travelled(phase: PhaseRows) -> Array | None:
-        own = phase.scheduled(task)
-        return None if own is None else MM * own.travelled
+        scheduled = phase.scheduled(task)
+        return None if scheduled is None else MM * scheduled.travelled
 
     pose = program.spread(poses, width=len(POSE))
     error = program.spread(lambda phase: phase.errors(task), width=2)

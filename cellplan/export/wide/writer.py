@@ -30,8 +30,8 @@ def render_wide(program: ProgramRows) -> str:
     """
     exact = {TIME: time_fields(program.times)}
     for robot in program.cell.robots:
-        own = joint_fields(robot, program.positions(robot.name))
-        exact |= {f"{robot.name}.{name}": column for name, column in own.items()}
+        robot_fields = joint_fields(robot, program.positions(robot.name))
+        exact |= {f"{robot.name}.{name}": column for name, column in robot_fields.items()}
     columns = wide_columns(program)
     fields = [exact[name] if name in exact else _fields(column) for name, column in columns.items()]
     return "\n".join([",".join(columns), *map(",".join, zip(*fields, strict=True))]) + "\n"
@@ -60,13 +60,13 @@ def read_wide(cell: Cell, text: str, file: str) -> dict[str, JointTable]:
 
 def _own_columns(robot: Robot, names: list[str], rows: list[list[str]], file: str) -> str:
     """Times and joints of one robot as a file of the plain format."""
-    own = {name: f"{robot.name}.{name}" for name in joint_fields(robot, np.empty((0, len(robot.model.joints))))}
-    missing = [name for name in (TIME, *own.values()) if names.count(name) != 1]
+    columns = {name: f"{robot.name}.{name}" for name in joint_fields(robot, np.empty((0, len(robot.model.joints))))}
+    missing = [name for name in (TIME, *columns.values()) if names.count(name) != 1]
     if missing:
         raise InputError(f"{file}:1: expected one column '{missing[0]}', got {names.count(missing[0])}")
-    places = [names.index(TIME), *(names.index(name) for name in own.values())]
+    places = [names.index(TIME), *(names.index(name) for name in columns.values())]
     lines = (",".join([row[place] for place in places]) for row in rows)
-    return "\n".join([",".join([TIME, *own]), *lines]) + "\n"
+    return "\n".join([",".join([TIME, *columns]), *lines]) + "\n"
 
 
 def _fields(column: Column) -> list[str]:

@@ -103,15 +103,15 @@ def read_collada(data: bytes, file: str) -> Located:
 
 def _all(element: ET.Element, path: str) -> Sequence[Located]:
     """Elements at a path below another."""
-    return [_located(found) for found in element.iterfind(path)]
+    return [_located(child) for child in element.iterfind(path)]
 
 
 def _one(element: Located, path: str) -> Located:
     """The only element at a path below another."""
-    found = _all(element, path)
-    if len(found) != 1:
-        raise element.error(f"expected one <{path.rpartition('/')[2]}>, got {len(found)}")
-    return found[0]
+    elements = _all(element, path)
+    if len(elements) != 1:
+        raise element.error(f"expected one <{path.rpartition('/')[2]}>, got {len(elements)}")
+    return elements[0]
 
 
 def _located(element: ET.Element) -> Located:
@@ -162,22 +162,22 @@ def _reduce_mesh(mesh: Located) -> None:
         if entry is not inputs[0]:
             vertices[0].remove(entry)
     count = _positions(sources[0])
-    for each in faces:
-        column, stride = _reduce_inputs(each, f"#{vertices[0].get('id')}", positions)
-        if not _check_faces(each, column=column, stride=stride, positions=count):
-            mesh.remove(each)
+    for face in faces:
+        column, stride = _reduce_inputs(face, f"#{vertices[0].get('id')}", positions)
+        if not _check_faces(face, column=column, stride=stride, positions=count):
+            mesh.remove(face)
 
 
 def _positions(source: Located) -> int:
     """Number of points in a source of three coordinates each."""
     array, accessor = _one(source, "float_array"), _one(source, "technique_common/accessor")
-    declared, found = array.number("count"), len(array.numbers())
-    if declared != found:
-        raise array.error(f"expected {declared} numbers as its count declares, got {found}: is the file truncated?")
+    declared, actual = array.number("count"), len(array.numbers())
+    if declared != actual:
+        raise array.error(f"expected {declared} numbers as its count declares, got {actual}: is the file truncated?")
     stride, columns = accessor.number("stride", 1), len(accessor)
-    if (stride, columns, accessor.number("offset", 0)) != (3, 3, 0) or 3 * accessor.number("count") != found:
-        raise accessor.error(f"expected {found / 3:g} points of three coordinates each without further numbers")
-    return found // 3
+    if (stride, columns, accessor.number("offset", 0)) != (3, 3, 0) or 3 * accessor.number("count") != actual:
+        raise accessor.error(f"expected {actual / 3:g} points of three coordinates each without further numbers")
+    return actual // 3
 
 
 def _reduce_inputs(faces: Located, vertices: str, positions: str) -> tuple[int, int]:
@@ -199,25 +199,25 @@ def _check_faces(faces: Located, *, column: int, stride: int, positions: int) ->
     """Number of faces, after their indices are held against it, against their inputs and the number of points."""
     lists, declared = _all(faces, "p"), faces.number("count")
     indices = [entry.indices() for entry in lists]
-    sizes = np.array([len(each) for each in indices], dtype=np.int64)
+    sizes = np.array([len(index) for index in indices], dtype=np.int64)
     if faces.tag == "polylist":
         corners = _one(faces, "vcount").indices()
-        found, is_whole = len(corners), len(lists) == 1 and int(sizes.sum()) == stride * int(corners.sum())
+        actual, is_whole = len(corners), len(lists) == 1 and int(sizes.sum()) == stride * int(corners.sum())
         is_whole = is_whole and bool(np.all(corners > 0))
     elif faces.tag == "triangles":
-        found = int(sizes.sum()) // (3 * stride)
-        is_whole = len(lists) <= 1 and int(sizes.sum()) == 3 * stride * found
+        actual = int(sizes.sum()) // (3 * stride)
+        is_whole = len(lists) <= 1 and int(sizes.sum()) == 3 * stride * actual
     else:
-        found, is_whole = len(lists), bool(np.all((sizes % stride == 0) & (sizes >= 3 * stride)))
-    if found != declared or not is_whole:
+        actual, is_whole = len(lists), bool(np.all((sizes % stride == 0) & (sizes >= 3 * stride)))
+    if actual != declared or not is_whole:
         raise faces.error(
-            f"expected {declared} as its count declares, with {stride} indices at each corner, got {found} in "
+            f"expected {declared} as its count declares, with {stride} indices at each corner, got {actual} in "
             f"{int(sizes.sum())} indices: is the file truncated?"
         )
-    highest = max((int(each[column::stride].max(initial=-1)) for each in indices), default=-1)
+    highest = max((int(index[column::stride].max(initial=-1)) for index in indices), default=-1)
     if highest >= positions:
         raise faces.error(f"expected corners among {positions} points, got point {highest} counted from 0")
-    return found
+    return actual
 
 
 class _Reader:

@@ -87,7 +87,9 @@ def ray_winding(triangles: Array, points: Array) -> Indices:
         np.flatnonzero((low[2] <= z) & (high[2] > z) & (low[1] <= y) & (high[1] >= y) & (high[0] > x))
         for x, y, z in points
     )
-    return np.array([_crossings(triangles[each] - point) for each, point in zip(near, points, strict=True)], dtype=int)
+    return np.array(
+        [_crossings(triangles[candidates] - point) for candidates, point in zip(near, points, strict=True)], dtype=int
+    )
 
 
 def _crossings(corner: Array) -> int:

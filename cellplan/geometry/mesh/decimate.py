@@ -39,9 +39,9 @@ def decimated(mesh: Mesh, limit: int, *, finest: float = FINEST) -> Decimated:
     longest = float((points.max(axis=0) - low).max())
     cells = finest
     while True:
-        found = _merged(points, triangles, np.floor((points - low) / (longest / cells)).astype(np.int64))
-        if len(found.triangles) <= limit or cells * COARSER < COARSEST:
-            return found
+        merged = _merged(points, triangles, np.floor((points - low) / (longest / cells)).astype(np.int64))
+        if len(merged.triangles) <= limit or cells * COARSER < COARSEST:
+            return merged
         cells *= COARSER
 
 
@@ -54,9 +54,9 @@ def _merged(points: Array, triangles: np.ndarray[tuple[int, int], np.dtype[np.in
     moved = float(np.linalg.norm(middles[group] - points, axis=1).max())
     corners = group[triangles]
     is_flat = (corners[:, 0] == corners[:, 1]) | (corners[:, 1] == corners[:, 2]) | (corners[:, 2] == corners[:, 0])
-    kept = corners[~is_flat]
-    _, first = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)  # both sides of a thin wall fall together
-    return Decimated(*_used(middles, kept[np.sort(first)]), moved)
+    proper = corners[~is_flat]
+    _, first = np.unique(np.sort(proper, axis=1), axis=0, return_index=True)  # both sides of a thin wall fall together
+    return Decimated(*_used(middles, proper[np.sort(first)]), moved)
 
 
 def _used(

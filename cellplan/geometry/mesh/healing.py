@@ -140,9 +140,9 @@ def _without_twins(faces: Indices) -> Indices:
     """The triangles without those pairs that have the same corners and face opposite ways."""
     keys, group = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
     balance = np.bincount(group.ravel(), weights=_parity(faces), minlength=len(keys))
-    kept = np.repeat(keys, np.abs(balance).astype(np.int64), axis=0)
+    unpaired = np.repeat(keys, np.abs(balance).astype(np.int64), axis=0)
     sign = np.repeat(balance > 0.0, np.abs(balance).astype(np.int64))
-    return np.where(sign[:, None], kept, kept[:, ::-1])
+    return np.where(sign[:, None], unpaired, unpaired[:, ::-1])
 
 
 def _parity(faces: Indices) -> Indices:

@@ -97,9 +97,9 @@ def _kept_mesh(path: Path, scale: Array, *, unit: str | None, is_upright: bool) 
     data = _read_bytes(path)
     way = f"{path.suffix.lower()} {unit} {is_upright}" if _is_collada(path.name) else path.suffix.lower()
     key = key_of("mesh", data, way.encode(), scale.tobytes())
-    kept = recall_mesh(key, source=path.name)
-    if kept is not None:
-        return kept
+    cached = recall_mesh(key, source=path.name)
+    if cached is not None:
+        return cached
     if _is_collada(path.name):
         loose, meter = parse_collada(data, path.name, is_upright=is_upright)
         if unit is not None and not np.isclose(meter, MESH_UNITS[unit], rtol=1e-6, atol=0.0):

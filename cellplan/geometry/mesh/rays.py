@@ -145,10 +145,10 @@ def _passes(low: Array, high: Array, rays: Array) -> NDArray[np.bool_]:
     a, b = low / slope, high / slope
     enters = np.where(along, -np.inf, np.minimum(a, b)).T
     leaves = np.where(along, np.inf, np.maximum(a, b)).T
-    beside = (along & ((low > 0.0) | (high < 0.0))).T
+    misses = (along & ((low > 0.0) | (high < 0.0))).T
     enter = np.maximum(np.maximum(enters[0], enters[1]), enters[2])  # three times as fast as a reduction over rows
     leave = np.minimum(np.minimum(leaves[0], leaves[1]), leaves[2])
-    return (enter <= leave) & ~(beside[0] | beside[1] | beside[2])
+    return (enter <= leave) & ~(misses[0] | misses[1] | misses[2])
 
 
 def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:

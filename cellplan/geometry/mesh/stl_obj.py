@@ -153,7 +153,7 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
     one.
     """
     tally = dict.fromkeys(STL_LETTERS, 0)
-    order, kept = [], []
+    order, tokens = [], []
     lines = BytesIO(data.lower().replace(b"\r\n", b"\n").replace(b"\r", b"\n"))
     for line, text in enumerate(lines, start=1):
         words = text.split()
@@ -167,14 +167,14 @@ def _checked_text_stl(data: bytes, name: str) -> tuple[bytes, int]:
         require_no_more(tally[words[0]], 3 * MAX_TRIANGLES, f"'{_shown(words[0])}' lines", place=f"{name}:{line}")
         order.append(STL_LETTERS[words[0]])
         if words[0] not in (b"solid", b"endsolid"):  # their names could hold words of the format
-            kept.append(text.strip() if words[0] == b"vertex" else words[0])
+            tokens.append(text.strip() if words[0] == b"vertex" else words[0])
     facets = tally[b"facet"]
     if not STL_ORDER.fullmatch("".join(order)):
         raise InputError(
             f"{name}: expected three vertices in each of {facets} facets and an 'endsolid', got {tally[b'vertex']} "
             f"vertices, {tally[b'endfacet']} 'endfacet' and {tally[b'endsolid']} 'endsolid': the file is truncated"
         )
-    return b"\n".join([b"solid", *kept, b"endsolid"]), facets
+    return b"\n".join([b"solid", *tokens, b"endsolid"]), facets
 
 
 def _parse_obj(data: bytes, name: str) -> Triangles:
@@ -215,8 +215,8 @@ def _regular_obj(data: bytes) -> tuple[Array, NDArray[np.int64], NDArray[np.int6
     if not is_short or b"\\" in data or not others <= OBJ_SILENT_BYTES:
         return None
     words = [line.split() for line in faces]
-    heads = b" ".join(word.partition(b"/")[0] for each in words for word in each[1:])
-    sizes = np.fromiter((len(each) - 1 for each in words), dtype=np.int64, count=len(words))
+    heads = b" ".join(word.partition(b"/")[0] for token in words for word in token[1:])
+    sizes = np.fromiter((len(token) - 1 for token in words), dtype=np.int64, count=len(words))
     if heads.translate(None, b"0123456789 ") or any(len(line.split()) != 4 for line in points) or np.any(sizes < 3):
         return None
     try:

@@ -60,12 +60,12 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     if not edges.is_closed:
         whole = oriented_alike(whole)
     is_closed = len(whole) > 0 if edges.is_closed else encloses(whole)
-    kept = whole[_has_area(welded, whole)]
-    flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(kept)
+    with_area = whole[_has_area(welded, whole)]
+    flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(with_area)
     _account_for(flat, total=len(faces), source=source)
     if is_closed:
-        kept = turn_outward(welded, kept, source=source)
-    used, compact = np.unique(kept, return_inverse=True)
+        with_area = turn_outward(welded, with_area, source=source)
+    used, compact = np.unique(with_area, return_inverse=True)
     return Mesh(vertices=welded[used], faces=_as_faces(compact), source=source, is_closed=is_closed)
 
 

@@ -84,8 +84,8 @@ def network(
     q = checked_configuration(cell, q)
     _refuse_world_in_plane(cell, plane)
     graph = coupling_graph(cell, plane, measure_grasps=measure_grasps)
-    found = circuits(graph, spanning_tree(graph, tree_order))
-    B = circuit_matrix(graph, found)
+    fundamental_circuits = circuits(graph, spanning_tree(graph, tree_order))
+    B = circuit_matrix(graph, fundamental_circuits)
     rows = list(components(plane))
     screws = _unit_screws(cell, q, graph)
     _check_planar(graph, screws, B=B, rows=rows)
@@ -95,7 +95,7 @@ def network(
     for row, joint in enumerate(graph.joints):
         shares[row, joints.index(joint.drive)] = joint.ratio
     summed = (B[:, None, :] * screws[None, rows, :]).reshape(-1, len(graph.joints))
-    return Network(graph=graph, circuits=found, joints=joints, matrix=summed @ shares)
+    return Network(graph=graph, circuits=fundamental_circuits, joints=joints, matrix=summed @ shares)
 
 
 def partition(net: Network, primary: Collection[str]) -> tuple[Array, Array]:

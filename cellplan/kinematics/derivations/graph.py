@@ -80,24 +80,24 @@ def spanning_tree(graph: CouplingGraph, order: Sequence[int] | None = None) -> f
 
 def circuits(graph: CouplingGraph, tree: Iterable[int]) -> tuple[Circuit, ...]:
     """One circuit for each chord: the chord, then back through the tree from its head to its tail."""
-    kept = frozenset(tree)
+    tree_edges = frozenset(tree)
     neighbours: dict[str, list[tuple[int, int, str]]] = {link: [] for link in graph.links}
-    for index in sorted(kept):
+    for index in sorted(tree_edges):
         joint = graph.joints[index]
         neighbours[joint.tail].append((index, 1, joint.head))
         neighbours[joint.head].append((index, -1, joint.tail))
-    found = []
+    fundamental_circuits = []
     for chord, joint in enumerate(graph.joints):
-        if chord not in kept:
+        if chord not in tree_edges:
             back = _way(neighbours, joint.head, joint.tail)
-            found.append(Circuit(chord=chord, passed=((chord, 1), *back)))
-    return tuple(found)
+            fundamental_circuits.append(Circuit(chord=chord, passed=((chord, 1), *back)))
+    return tuple(fundamental_circuits)
 
 
-def circuit_matrix(graph: CouplingGraph, found: Sequence[Circuit]) -> Signs:
+def circuit_matrix(graph: CouplingGraph, fundamental_circuits: Sequence[Circuit]) -> Signs:
     """Circuit matrix ``B``, shape (circuits, joints), entries 0, +1, -1 ([Ribeiro2010]_ Eqs. 3.58, 4.26)."""
-    B = np.zeros((len(found), len(graph.joints)), dtype=np.int_)
-    for row, circuit in enumerate(found):
+    B = np.zeros((len(fundamental_circuits), len(graph.joints)), dtype=np.int_)
+    for row, circuit in enumerate(fundamental_circuits):
         for joint, sign in circuit.passed:
             B[row, joint] = sign
     return B

@@ -95,9 +95,9 @@ class ArrowInverse:
         u -= np.einsum("imtb,mb->itb", self._Y, shared)
         return np.einsum("jitb,jtb->itb", self._D_factor, u), shared
 
-    def twists(self, own: Array, shared: Array) -> Array:
+    def twists(self, local: Array, shared: Array) -> Array:
         """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, batch)."""
-        return np.einsum("intb,ntb->itb", self._A, own) + np.einsum("imtb,mb->itb", self._C, shared)
+        return np.einsum("intb,ntb->itb", self._A, local) + np.einsum("imtb,mb->itb", self._C, shared)
 
 
 def eliminated(M: Array, B: Array) -> tuple[Array, Array]:
@@ -113,11 +113,11 @@ def eliminated(M: Array, B: Array) -> tuple[Array, Array]:
     Returns:
         ``F``, shape (k, k, ...), and ``F B``, shape (k, m, ...).
     """
-    size, beside = len(M), B.shape[1]
+    size, width = len(M), B.shape[1]
     unit = np.broadcast_to(np.eye(size).reshape(size, size, *[1] * (M.ndim - 2)), M.shape)
     rows = np.concatenate([M, B, unit], axis=1)
     for j in range(size):
-        filled = slice(j + 1, size + beside + j + 1)
+        filled = slice(j + 1, size + width + j + 1)
         rows[j, j : filled.stop] /= np.sqrt(rows[j, j])
         rows[j + 1 :, filled] -= rows[j, j + 1 : size, None] * rows[j, None, filled]
-    return rows[:, size + beside :], rows[:, size : size + beside]
+    return rows[:, size + width :], rows[:, size : size + width]

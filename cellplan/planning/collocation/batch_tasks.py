@@ -104,10 +104,10 @@ class BatchTasks:
         errors[3:, free] = np.einsum("ijtb,jtb->itb", X[:3, :3, free], errors[3:, free])
         return errors
 
-    def stacked(self, own: Array, shared: Array) -> Array:
+    def stacked(self, local: Array, shared: Array) -> Array:
         """What belongs to the joints, sorted into the stacked joint vector, shape (nq, batch)."""
         everything = np.zeros((self.joint_count + 1, shared.shape[1]))
-        everything[self._own_columns] = own
+        everything[self._own_columns] = local
         everything[self._shared_columns] = shared
         return everything[:-1]
 

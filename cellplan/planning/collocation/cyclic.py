@@ -66,15 +66,15 @@ def _refuse_open(run: AccurateRun, problem: TrackingProblem, begin: float, end: 
 
 def _closing(run: AccurateRun, problem: TrackingProblem, q: Array, *, begin: float, end: float) -> CollocatedPath:
     """Motion of one cycle that brings the joints back."""
-    found: list[CollocatedPath] = []
+    paths: list[CollocatedPath] = []
 
     def moved(drift: Array) -> Array:
-        found[:] = [_whole(run, q, begin=begin, end=end, drift=drift)]
-        return found[0].last - q
+        paths[:] = [_whole(run, q, begin=begin, end=end, drift=drift)]
+        return paths[0].last - q
 
     sample = int(np.argmin(np.abs(problem.times - begin)))
     closing_drift(problem, q, moved, duration=end - begin, sample=sample)
-    return found[0]
+    return paths[0]
 
 
 def _whole(run: AccurateRun, q: Array, *, begin: float, end: float, drift: Array | None = None) -> CollocatedPath:

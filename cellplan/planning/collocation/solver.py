@@ -177,8 +177,8 @@ class Collocation:
         """Corrections of q at the nodes in one pass, (nq, cells, nodes), and tool errors before it, (cells,)."""
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
-        linear, found = self._velocities(np.tile(window.times[: window.count], q.shape[1]), q, desired, placement)
-        speeds = found.reshape(q.shape)
+        linear, velocities = self._velocities(np.tile(window.times[: window.count], q.shape[1]), q, desired, placement)
+        speeds = velocities.reshape(q.shape)
         picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
@@ -188,10 +188,10 @@ class Collocation:
         self, times: Array, q: Array, desired: Desired, placement: Placement
     ) -> tuple[Linearisation, Array]:
         """The tasks to first order at the nodes, times of shape (cells * nodes,), and the joint velocities there."""
-        at, mobile, beside = q.reshape(len(q), -1), self._mobile, self._null_space
-        drift = None if beside.drift is None else beside.drift(times)
-        if beside.redundancy is not None:
-            return beside.redundancy.velocities(times, at, desired, placement=placement, mobile=mobile, drift=drift)
+        at, mobile, null_space = q.reshape(len(q), -1), self._mobile, self._null_space
+        drift = None if null_space.drift is None else null_space.drift(times)
+        if null_space.redundancy is not None:
+            return null_space.redundancy.velocities(times, at, desired, placement=placement, mobile=mobile, drift=drift)
         linear = self._tasks.linearise(at, desired, placement, mobile=mobile)
         return linear, linear.speeds(drift)
 

@@ -92,7 +92,9 @@ class Window:
     @cached_property
     def stretches(self) -> tuple[Array, Array]:
         """Begin and end in [s] of the panel that each of the times belongs to."""
-        begins, ends = (np.array(part) for part in zip(*((each.begin, each.end) for each in self.panels), strict=True))
+        begins, ends = (
+            np.array(part) for part in zip(*((panel.begin, panel.end) for panel in self.panels), strict=True)
+        )
         return begins[self.panel_of], ends[self.panel_of]
 
     @cached_property
@@ -206,7 +208,7 @@ def grouped(panels: Sequence[Panel], *, longest: float) -> tuple[Window, ...]:
     groups: list[list[Panel]] = []
     for panel in panels:
         if groups:
-            nodes = sum(each.degree + 1 for each in groups[-1]) + panel.degree + 1
+            nodes = sum(panel.degree + 1 for panel in groups[-1]) + panel.degree + 1
             if nodes <= MOST_NODES and panel.end - groups[-1][0].begin <= longest * (1.0 + 1e-12):
                 groups[-1].append(panel)
                 continue

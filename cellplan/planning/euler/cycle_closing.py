@@ -99,10 +99,10 @@ def closing_drift(
         if np.max(np.abs(drift), initial=0.0) <= CLOSED:
             return N @ u
         change = -B @ drift
-        found = gap(u + change)
-        gained = found - drift
+        remaining = gap(u + change)
+        gained = remaining - drift
         B += np.outer(change - B @ gained, change @ B) / (change @ B @ gained)
-        u, drift = u + change, found
+        u, drift = u + change, remaining
     left = np.abs(N @ drift)
     robot, joint = joint_at(problem.cell, int(np.argmax(left)))
     raise NoSolutionError(

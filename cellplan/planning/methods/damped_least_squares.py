@@ -32,7 +32,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
         share = gain_share(measure, settings.region) if settings.shapes_gain else 1.0
         speeds = inverse.speeds(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), beside=speeds)
+            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
         return Advance(q=q + speeds * problem.step(k))
 
     return advance

@@ -103,9 +103,9 @@ class _Rounds:
                 )
                 q, spent = self._to_first_order(expansion, near, shares, min(rounds - used, ROUNDS_ON_A_LOOK))
                 used += spent
-                found = cost.expand(q)
-                if found.cost < expansion.cost:
-                    return found, used
+                expanded = cost.expand(q)
+                if expanded.cost < expansion.cost:
+                    return expanded, used
                 trust = 0.25 * float(np.max(np.abs(q - expansion.q)))
             return expansion, max(used, 1)
 
@@ -196,7 +196,7 @@ class _Line:
     def _plain(self) -> tuple[list[list[float]], list[float], list[float], list[float]]:
         """Products, factors and bounds as plain numbers."""
         factors, lowest, highest = (
-            each.tolist() for each in (self._factors, self._bounds.lowest, self._bounds.highest)
+            array.tolist() for array in (self._factors, self._bounds.lowest, self._bounds.highest)
         )
         return self._gram.tolist(), factors, lowest, highest
 
@@ -215,7 +215,7 @@ class _Line:
             move = reached - here
             if move != 0.0:
                 gained += move * (2.0 * slope - move * row[i])
-                slopes = [each - move * product for each, product in zip(slopes, row, strict=True)]
+                slopes = [slope - move * product for slope, product in zip(slopes, row, strict=True)]
                 q[i] = reached
         self.q, self._slopes = np.array(q), np.array(slopes)
         return gained

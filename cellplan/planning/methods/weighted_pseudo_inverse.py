@@ -24,7 +24,7 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
         inverse = WeightedInverse(tasks.J, tasks.weights)
         speeds = damped_speeds(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), beside=speeds)
+            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
         return Advance(q=q + speeds * problem.step(k))
 
     return advance

@@ -225,13 +225,13 @@ def _turns(points: Array) -> Array:
 def _refuse_blend(corners: Array, angles: Array, blend: float, where: str) -> None:
     """Refuse a rounding that does not fit the sides, or a corner that turns back."""
     sides = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-    room = 0.5 * np.minimum(sides[:-1], sides[1:])
+    half = 0.5 * np.minimum(sides[:-1], sides[1:])
     if not blend > 0.0:
         raise InputError(f"{where}: expected a rounding above zero, got {length(blend)} mm; or write corners: stop")
-    if np.any(blend > room + SAME_POINT):
-        k = int(np.argmin(room))
+    if np.any(blend > half + SAME_POINT):
+        k = int(np.argmin(half))
         raise InputError(
-            f"{where}: expected a rounding of at most {length(room[k])} mm, half of the shorter side at the corner "
+            f"{where}: expected a rounding of at most {length(half[k])} mm, half of the shorter side at the corner "
             f"{in_mm(corners[k + 1])}, got {length(blend)} mm"
         )
     if np.any(angles > SHARPEST_BLEND):

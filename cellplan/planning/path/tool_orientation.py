@@ -120,9 +120,9 @@ def _room(z: Array, direction: Array) -> Array:
 
 def _refuse_parallel(z: Array, p: Array, task: Task) -> None:
     """Refuse a ``tool_x`` that runs along the tool axis somewhere, and name the best direction instead."""
-    room = _room(z, task.tool_x)
-    k = int(np.argmin(room))
-    if room[k] < PARALLEL:
+    distance = _room(z, task.tool_x)
+    k = int(np.argmin(distance))
+    if distance[k] < PARALLEL:
         best = max(_CHOICES, key=lambda choice: (round(float(_room(z, choice).min()), 6), float(choice.sum())))
         place = f" at {in_mm(p[k])}" if len(z) > 1 else ""
         raise InputError(

@@ -56,16 +56,16 @@ class Lines:
         R = self._X_WT[self._cell.index(robot)][:3, :3]
         up = np.array([0.0, 0.0, 1.0])
         x, y, z = R.T
-        found = [(-z, "along its tool axis")]
+        candidates = [(-z, "along its tool axis")]
         is_holder = robot in self._cell.positioners
         for other in others:
-            found.insert(0, (self._X_WT[self._cell.index(other)][:3, 2], f"along the tool axis of '{other}'"))
+            candidates.insert(0, (self._X_WT[self._cell.index(other)][:3, 2], f"along the tool axis of '{other}'"))
         if is_holder:
-            found.insert(0, (up, "upwards"))
+            candidates.insert(0, (up, "upwards"))
         for side in (x, -x, y, -y):
             leaning = -z + TILT * side
-            found.append((leaning / np.linalg.norm(leaning), "beside its tool axis"))
-        return found if is_holder else [*found, (up, "upwards")]
+            candidates.append((leaning / np.linalg.norm(leaning), "beside its tool axis"))
+        return candidates if is_holder else [*candidates, (up, "upwards")]
 
     def line(self, robot: str, direction: Array, words: str, *, longest: float) -> RetractLine | None:
         """The line of a robot as far as it comes within its joint limits; None where it comes nowhere.
@@ -76,29 +76,29 @@ class Lines:
             words: The direction in words.
             longest: Length in [m] at which it ends at the latest.
         """
-        for kept in KEPT:
-            q = self._followed(robot, direction, longest, kept)
+        for count in KEPT:
+            q = self._followed(robot, direction, longest, count)
             if len(q) > 1:
                 return RetractLine(robot=robot, lengths=np.arange(len(q), dtype=np.float64) * STEP, q=q, words=words)
         return None
 
-    def _followed(self, robot: str, direction: Array, longest: float, kept: int) -> Array:
+    def _followed(self, robot: str, direction: Array, longest: float, count: int) -> Array:
         """Configurations of a robot along a line, shape (M, n); its own only where the next one is not reached."""
         index, columns = self._cell.index(robot), self._cell.columns(robot)
         model, X = self._cell.robot(robot).model, self._X_WT[index]
-        found = [self._q[columns]]
+        configurations = [self._q[columns]]
         for number in range(1, round(longest / STEP) + 1):
             goal = X[:3, 3] + number * STEP * direction
-            guess = found[-1] if number == 1 else 2.0 * found[-1] - found[-2]
-            q = self._reached(index, columns, guess, goal, X[:3, :3], kept)
-            if q is None or np.abs(q - found[-1]).max() > LONGEST_MOVE:
+            guess = configurations[-1] if number == 1 else 2.0 * configurations[-1] - configurations[-2]
+            q = self._reached(index, columns, guess, goal, X[:3, :3], count)
+            if q is None or np.abs(q - configurations[-1]).max() > LONGEST_MOVE:
                 break
             if np.any((q < model.lower) | (q > model.upper)):
                 break
-            found.append(q)
-        return np.array(found)
+            configurations.append(q)
+        return np.array(configurations)
 
-    def _reached(self, index: int, columns: slice, guess: Array, goal: Array, R: Array, kept: int) -> Array | None:
+    def _reached(self, index: int, columns: slice, guess: Array, goal: Array, R: Array, count: int) -> Array | None:
         """Joints of a robot that put its tool at a point with an orientation; None where Newton's steps do not."""
         q = self._q.copy()
         q[columns] = guess
@@ -108,13 +108,13 @@ class Lines:
             X = state.X_WT[index]
             turn = R.T @ X[:3, :3]
             turned = 0.5 * np.array([turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]])
-            error = np.concatenate([R.T @ (goal - X[:3, 3]), turned])[:kept]
+            error = np.concatenate([R.T @ (goal - X[:3, 3]), turned])[:count]
             if np.abs(error).max() < CLOSED:
                 return q[columns]
             screws = state.screws_W[:, columns] * self._model.carries_flange[index, columns]
             linear = screws[:3] + np.cross(screws[3:].T, X[:3, 3]).T
-            J = np.concatenate([R.T @ linear, R.T @ screws[3:]])[:kept]
+            J = np.concatenate([R.T @ linear, R.T @ screws[3:]])[:count]
             normal = (J * weights) @ J.T
-            normal += DAMPING * DAMPING * np.trace(normal) * np.eye(kept)
+            normal += DAMPING * DAMPING * np.trace(normal) * np.eye(count)
             q[columns] += weights * (J.T @ np.linalg.solve(normal, error))
         return None

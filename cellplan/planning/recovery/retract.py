@@ -108,7 +108,7 @@ class _RetractSearch:
             state = leg.q[-1]
             waiting.remove(name)
             still = set(rows_too_near(self._scene, state))
-            waiting = [each for each in waiting if still & set(self._pairs[each])]
+            waiting = [robot for robot in waiting if still & set(self._pairs[robot])]
         return tuple(legs)
 
     def together(self, legs: Sequence[RetractLeg]) -> tuple[RetractLeg] | None:
@@ -126,7 +126,7 @@ class _RetractSearch:
         """The first line of a robot that is free while all others stand; None where none is."""
         near = rows_too_near(self._scene, state)
         others = {row for name in waiting if name != robot for row in self._pairs[name]}
-        own = set(self._pairs[robot]) - others or set(self._pairs[robot])
+        robot_pairs = set(self._pairs[robot]) - others or set(self._pairs[robot])
         moved = rows_moved_by(self._scene, robot)
         first_fault, tried = "", 0
         for line in self._candidates(robot):
@@ -135,7 +135,7 @@ class _RetractSearch:
             q[:, self._scene.cell.columns(robot)] = line.q
             growth = sampled_growth(self._scene, q, near=near, moved=moved)
             left = {row for row, pair in zip(near, growth.apart, strict=False) if pair.row is None}
-            if growth.is_proved and not left & own:
+            if growth.is_proved and not left & robot_pairs:
                 return RetractLeg(q=q, lines=(line,))
             if not first_fault:
                 fault = _fault(growth, self._scene, q, near)
@@ -152,7 +152,7 @@ class _RetractSearch:
         longest = self._demand + max(ROOMS)
         for direction, words in self._lines.directions(robot, self._at_work.get(robot, ())):
             line = self._lines.line(robot, direction, words, longest=longest)
-            lengths = dict.fromkeys(line.up_to(self._demand + room).lengths[-1] for room in ROOMS) if line else {}
+            lengths = dict.fromkeys(line.up_to(self._demand + margin).lengths[-1] for margin in ROOMS) if line else {}
             for length in lengths:
                 if line is not None and length > 0.0:
                     yield line.up_to(float(length))
@@ -170,11 +170,11 @@ def _fault(growth: Growth, scene: Scene, q: Array, near: Sequence[int]) -> str:
         return f"is not free: '{first}' to '{second}' {what}"
     if not growth.kept.is_kept:
         others = [row for row in range(len(scene.pairs)) if row not in set(near)]
-        kept = certify(scene_of_rows(scene, others), q, with_curves=False)
-        pairs = [pair for pair in kept.pairs if not pair.is_kept]
+        bound = certify(scene_of_rows(scene, others), q, with_curves=False)
+        pairs = [pair for pair in bound.pairs if not pair.is_kept]
         if pairs:
             worst = min(pairs, key=lambda pair: pair.proved - pair.demand)
-            first, second = kept.names(worst)
+            first, second = bound.names(worst)
             return f"brings '{first}' {_shown(worst.proved)} '{second}', {MM * worst.demand:.3g} mm are demanded"
     left = [pair for pair in growth.apart if pair.row is None]
     if left:

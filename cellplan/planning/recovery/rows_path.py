@@ -34,8 +34,8 @@ class RowsPath:
         rise = u * u * (3.0 - 2.0 * u)
         bend = u * (1.0 - u)
         change = (self.q[k + 1] - self.q[k]) * rise
-        found: Array = self.q[k] + change + step * bend * ((1.0 - u) * slopes[k] - u * slopes[k + 1])
-        return found
+        configuration: Array = self.q[k] + change + step * bend * ((1.0 - u) * slopes[k] - u * slopes[k + 1])
+        return configuration
 
 
 def rows_along(path: RowsPath, retimer: Retimer, *, widths: tuple[float, float, float]) -> Array:
@@ -57,7 +57,7 @@ def rows_along(path: RowsPath, retimer: Retimer, *, widths: tuple[float, float, 
             break
         if factor > NEAR:
             ramp = min(factor, MOST_RAMP)
-            second, third = (each * ramp if factor > MOST_RAMP else each for each in widths[1:])
+            second, third = (width * ramp if factor > MOST_RAMP else width for width in widths[1:])
             widths = max(widths[0] * factor, second + third), second, third
             factor = sum(widths) / (count * retimer.step)
         count = max(count + 1, int(np.ceil(count * factor)))

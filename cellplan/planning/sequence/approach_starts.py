@@ -47,7 +47,7 @@ def _moved_back(cell: Cell, chain: ScrewChain, task: Task, start: Array, *, X_WR
     on_path[:3, 3] += X_PT[:3, 2] * (task.approach.distance if task.approach else 0.0)
     if is_off(cell, task, tool_distance(chain, task, start, on_path, X_WR=X_WR)):
         return None
-    found = reaching_configurations(chain, task, X_PT, X_WP=X_WR, seeds=start[None])
+    reaching = reaching_configurations(chain, task, X_PT, X_WP=X_WR, seeds=start[None])
     lower, upper = finite_limits(cell.robot(task.robot).model)
-    near = [q for q in found if np.all((q >= lower) & (q <= upper)) and np.abs(q - start).max() <= FARTHEST]
+    near = [q for q in reaching if np.all((q >= lower) & (q <= upper)) and np.abs(q - start).max() <= FARTHEST]
     return near[0] if near else None

@@ -78,10 +78,10 @@ def _require_one_configuration(cell: Cell, tasks: Sequence[Task], cure: str) -> 
 
     Where the holder has a task of its own, the others need not name the configuration in which that begins.
     """
-    own = [task for task in tasks if task.robot in cell.positioners[:1]]
-    first = next(iter(own or tasks), None)
+    carrier_tasks = [task for task in tasks if task.robot in cell.positioners[:1]]
+    first = next(iter(carrier_tasks or tasks), None)
     for task in tasks:
-        if first and not (own and task.holder_posture is None) and not _same_configuration(cell, first, task):
+        if first and not (carrier_tasks and task.holder_posture is None) and not _same_configuration(cell, first, task):
             raise InputError(
                 f"{task.where('holder_deg')}: expected the configuration of the holder for '{first.name}' in the mode "
                 f"{cell.motion.mode}, got another: {cure}"
@@ -98,8 +98,8 @@ def _holder_configuration(cell: Cell, task: Task) -> Array | None:
     """Configuration of the first holder at the start of a task; None for its start posture, when it is to be found."""
     if cell.carrier is None:
         return None
-    own = task.start_posture if task.robot == cell.robots[cell.carrier].name else task.holder_posture
-    return cell.robots[cell.carrier].start if own is None else own
+    posture = task.start_posture if task.robot == cell.robots[cell.carrier].name else task.holder_posture
+    return cell.robots[cell.carrier].start if posture is None else posture
 
 
 def _require_names(cell: Cell) -> None:

@@ -35,7 +35,7 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
     if all(robot.start is not None for robot in cell.robots):
         return None
     by_robot = {task.robot: task for task in cell.tasks}
-    found: list[Array] = []
+    starts: list[Array] = []
     for robot in cell.robots:
         start: Array | None = robot.start
         if start is None and robot.name in last:
@@ -43,8 +43,8 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
             start = last[robot.name] if task is None else _nearest(scene, task, paths[task.name], last[robot.name])
         if start is None:
             return None
-        found.append(start)
-    start = np.concatenate(found)
+        starts.append(start)
+    start = np.concatenate(starts)
     trial = StartTrials(scene, paths).judge(NameOrder.of(cell).sorted(start), may_turn=False)
     return start if trial.is_sound else None
 

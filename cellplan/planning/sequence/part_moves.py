@@ -61,8 +61,8 @@ def with_move(cell: Cell, move: PartMove, place: PartPlace, holder: str) -> Cell
     if move in (PartMove.LIFT, PartMove.RELEASE):
         ends = ends[::-1]
     is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
-    own = part_lying(cell, place) if is_lying else cell
-    return replace(own, tasks=(_task(move, holder, ends, at[:3, :3]),))
+    lying_cell = part_lying(cell, place) if is_lying else cell
+    return replace(lying_cell, tasks=(_task(move, holder, ends, at[:3, :3]),))
 
 
 def _task(move: PartMove, robot: str, ends: Array, R: Array) -> Task:

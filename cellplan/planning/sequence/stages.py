@@ -67,11 +67,11 @@ def _worked_on(cell: Cell) -> Iterator[Stage]:
         if not block.tasks:
             yield Stage(phase=_at_home(cell, f"dwell-{number}"), cell=_without_tasks(cell), dwell=block.dwell)
             continue
-        own = _cell_of_block(cell, block, first)
-        work = _phase(own, f"work-{number}")
+        block_cell = _cell_of_block(cell, block, first)
+        work = _phase(block_cell, f"work-{number}")
         if block.dwell > 0.0:
-            yield Stage(phase=_dwell(work, f"dwell-{number}"), cell=_without_tasks(own), dwell=block.dwell)
-        yield Stage(phase=work, cell=own)
+            yield Stage(phase=_dwell(work, f"dwell-{number}"), cell=_without_tasks(block_cell), dwell=block.dwell)
+        yield Stage(phase=work, cell=block_cell)
 
 
 def _dwell(work: Phase, name: str) -> Phase:
@@ -107,11 +107,11 @@ def _straight(cell: Cell, move: PartMove, place: PartPlace) -> Stage:
     """A straight move of the holder; all others stand at their homes."""
     robots = tuple(replace(robot, start=robot.home if robot.home is not None else robot.start) for robot in cell.robots)
     holder = cell.positioners[0]
-    own = with_move(replace(cell, robots=robots), move, place, holder)
-    motion = replace(own.motion, mode=Mode.SIMULTANEOUS, duration=None, cyclic=False)
-    own = replace(own, robots=_with_start(own.robots, holder, None), motion=motion)
+    move_cell = with_move(replace(cell, robots=robots), move, place, holder)
+    motion = replace(move_cell.motion, mode=Mode.SIMULTANEOUS, duration=None, cyclic=False)
+    move_cell = replace(move_cell, robots=_with_start(move_cell.robots, holder, None), motion=motion)
     is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
-    return Stage(phase=_phase(own, move.value), cell=own, move=move, place=place if is_lying else None)
+    return Stage(phase=_phase(move_cell, move.value), cell=move_cell, move=move, place=place if is_lying else None)
 
 
 def _phase(cell: Cell, name: str) -> Phase:
@@ -169,8 +169,8 @@ def _transfer(cell: Cell, before: Stage | None, after: Stage | None, *, name: st
     for robot in cell.robots:
         is_moving = len(held_by) == 1 if robot.name in held_by else robot.name in at_work
         roles[robot.name] = Transfer(to) if is_moving else Hold(at_home=robot.name not in held_by)
-    own = _without_tasks(cell if place is None else part_lying(cell, place))
-    return Stage(phase=Phase(name=name, roles=roles), cell=own, place=place)
+    idle_cell = _without_tasks(cell if place is None else part_lying(cell, place))
+    return Stage(phase=Phase(name=name, roles=roles), cell=idle_cell, place=place)
 
 
 def _at_work(stage: Stage) -> set[str]:

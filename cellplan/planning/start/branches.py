@@ -72,9 +72,9 @@ def holder_configurations(search: StartSearch) -> list[Array | None]:
     holder = cell.robot(cell.positioners[0])
     if holder.start is not None:
         return [holder.start]
-    found = _configurations_of_holder(search, holder)
-    search.failures.reached(holder.name, found, None)
-    return list(found)
+    configurations = _configurations_of_holder(search, holder)
+    search.failures.reached(holder.name, configurations, None)
+    return list(configurations)
 
 
 def _configurations_of_holder(search: StartSearch, holder: Robot) -> Array:
@@ -89,9 +89,9 @@ def _configurations_of_holder(search: StartSearch, holder: Robot) -> Array:
             return _configurations_meeting(search, relation, operator.start)
     for relation in cell.relations:
         if relation.relative_to is Frame.PART and _lacks_axes(search, relation):
-            found = _configurations_of_pairs(search, holder, relation)
-            if len(found):
-                return found
+            configurations = _configurations_of_pairs(search, holder, relation)
+            if len(configurations):
+                return configurations
     return _promising_configurations(search, holder)
 
 
@@ -100,7 +100,7 @@ def branches_of(search: StartSearch, robot: Robot, holder_configuration: Array |
     cell = search.cell
     if holder_configuration is not None and robot.name == cell.positioners[0]:
         return [(np.inf, holder_configuration)]
-    relation = next((each for each in cell.relations if each.robot == robot.name), None)
+    relation = next((relation for relation in cell.relations if relation.robot == robot.name), None)
     if robot.start is not None:
         start = robot.start if relation is None else _placed(search, robot, relation, holder_configuration)
         return [] if start is None else [(np.inf, start)]
@@ -177,10 +177,10 @@ def _scored_branches(
     X_PT = search.X_PT_start(relation)
     chain = search.chains[robot.name]
     seeds = search.random_configurations(robot, SEEDS_PER_HOLDER if search.is_holder_open else SEEDS)
-    found = reaching_configurations(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
-    q = within_limits(robot.model, found)
+    configurations = reaching_configurations(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
+    q = within_limits(robot.model, configurations)
     if not len(q):
-        search.failures.unreached(robot.name, Goal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=found)
+        search.failures.unreached(robot.name, Goal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=configurations)
         return []
     manipulability = np.minimum(1.0, smallest_singular_values(chain, relation, X_PT, q) / COMFORTABLE)
     scores = np.sort(joint_margin_shares(robot.model, q), axis=1) * manipulability[:, None]
@@ -249,11 +249,13 @@ def _configurations_of_pairs(search: StartSearch, holder: Robot, relation: Relat
 def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X_W_holder: Array) -> Array:
     """Configurations of the positioner that bring its tool to a place in the world, those with most margin first."""
     seeds = search.random_configurations(holder, SEEDS)
-    found = reaching_configurations(search.chains[holder.name], relation, X_W_holder, X_WP=np.eye(4), seeds=seeds)
-    inside = within_limits(holder.model, found)
+    configurations = reaching_configurations(
+        search.chains[holder.name], relation, X_W_holder, X_WP=np.eye(4), seeds=seeds
+    )
+    inside = within_limits(holder.model, configurations)
     if not len(inside):
         goal = Goal(relation=relation, X_PT=X_W_holder, X_WP=np.eye(4))
-        search.failures.unreached(holder.name, goal, beyond=found)
+        search.failures.unreached(holder.name, goal, beyond=configurations)
         return inside
     order = best_first(np.column_stack([np.sort(joint_margin_shares(holder.model, inside), axis=1), inside]))
     return inside[order]

@@ -51,11 +51,11 @@ def contacts_of(
     for q, holder_configuration in tried:
         counts.update(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among))
     bodies = {body.name: body for body in trials.bodies}
-    found = [
+    contacts = [
         Contact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
         for pair, count in counts.items()
     ]
-    return sorted(found, key=lambda each: (-each.count, [body.name for body in each.bodies]))
+    return sorted(contacts, key=lambda contact: (-contact.count, [body.name for body in contact.bodies]))
 
 
 def touches_anywhere(trials: StartTrials, cell: Cell, contact: Contact, holder_configuration: Array | None) -> bool:
@@ -73,12 +73,12 @@ def contacts_between(trials: StartTrials, tried: Sequence[Array]) -> list[tuple[
     for q in tried:
         counts.update(trials.contacts(q, among=trials.open_pairs))
     ordered = [((min(pair), max(pair)), count) for pair, count in counts.items()]
-    return sorted(ordered, key=lambda each: (-each[1], each[0]))
+    return sorted(ordered, key=lambda entry: (-entry[1], entry[0]))
 
 
 def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
     """Pairs of a body that the robot moves and one of its own or one that stands where it stands, shape (pairs,)."""
-    given = {each.name for each in cell.robots if each.start is not None} | {robot.name, *cell.positioners[:1]}
+    given = {robot.name for robot in cell.robots if robot.start is not None} | {robot.name, *cell.positioners[:1]}
 
     def is_own(body: SceneBody) -> bool:
         return body.robot == robot.name and not body.is_at_rest
@@ -87,14 +87,14 @@ def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
         return body.is_at_rest or body.robot in given
 
     pairs = [(trials.bodies[pair.first], trials.bodies[pair.second]) for pair in trials.pairs]
-    own = [(is_own(a) and is_settled(b)) or (is_own(b) and is_settled(a)) for a, b in pairs]
-    return np.array(own, dtype=bool) & trials.open_pairs
+    flags = [(is_own(a) and is_settled(b)) or (is_own(b) and is_settled(a)) for a, b in pairs]
+    return np.array(flags, dtype=bool) & trials.open_pairs
 
 
 def _placed(cell: Cell, robot: Robot, q: Array, holder_configuration: Array | None) -> Array:
     """The whole cell with one robot and the positioner where they are desired, shape (nq,)."""
     whole = np.concatenate(
-        [each.start if each.start is not None else np.clip(0.0, *finite_limits(each.model)) for each in cell.robots]
+        [robot.start if robot.start is not None else np.clip(0.0, *finite_limits(robot.model)) for robot in cell.robots]
     )
     if holder_configuration is not None:
         whole[cell.columns(cell.positioners[0])] = holder_configuration

@@ -40,8 +40,8 @@ class Failures:
 
     def reached(self, robot: str, q: Array, holder_configuration: Array | None) -> None:
         """Keep configurations of a robot, shape (K, n), that reach its goal with the positioner at one of its own."""
-        kept = self.arrived.setdefault(robot, [])
-        kept += [(each, holder_configuration) for each in q[: MOST_KEPT - len(kept)]]
+        arrived = self.arrived.setdefault(robot, [])
+        arrived += [(configuration, holder_configuration) for configuration in q[: MOST_KEPT - len(arrived)]]
 
     def unreached(self, robot: str, goal: Goal, *, beyond: Array) -> None:
         """Keep a goal that a robot does not reach, and configurations that do outside its limits, shape (K, n)."""

@@ -127,13 +127,13 @@ def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:
     """One finding for each joint that is outside its limits at the start or at home."""
-    found: list[InputError] = [
+    errors: list[InputError] = [
         StartOutsideLimitsError(f"{start_place(cell, robot)}: joint '{joint.name}' starts at {words}")
         for joint, words in _outside_limits(robot, robot.start)
     ]
-    if found and robot.home is not None and np.array_equal(robot.home, np.asarray(robot.start)):
-        return found  # a parked robot, whose start is its home
-    return found + [
+    if errors and robot.home is not None and np.array_equal(robot.home, np.asarray(robot.start)):
+        return errors  # a parked robot, whose start is its home
+    return errors + [
         HomeOutsideLimitsError(f"{home_place(cell, robot)}: joint '{joint.name}' stands at {words}")
         for joint, words in _outside_limits(robot, robot.home)
     ]

@@ -39,13 +39,13 @@ def home_candidates(model: RobotModel, chain: ScrewChain, start: Array, rng: np.
     endless = np.isinf(model.lower) | np.isinf(model.upper)
     lower, upper = np.where(endless, start + np.array([[-np.pi], [np.pi]]), finite_limits(model))
     inside = np.clip(start, lower, upper)
-    found = [
+    configurations = [
         inside,
         *_retreats(chain, inside),
         *_single_joints(inside, lower, upper),
         *_drawn(inside, lower, upper, rng),
     ]
-    q = np.clip(np.array(found), lower, upper)
+    q = np.clip(np.array(configurations), lower, upper)
     rank = np.round(displacements(model, inside, q) / SAME)
     return q[np.argsort(rank, kind="stable")]
 

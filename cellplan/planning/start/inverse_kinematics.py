@@ -145,8 +145,8 @@ def tip_jacobian(screws_W: Array, p_WT: Array, R_PW: Array) -> Array:
 
 def _distinct(q: Array) -> Array:
     """One configuration of each branch, in the order they were found."""
-    kept: list[Array] = []
+    distinct: list[Array] = []
     for configuration in q:
-        if all(np.abs(configuration - other).max() > SAME_POSTURE for other in kept):
-            kept.append(configuration)
-    return np.array(kept).reshape(len(kept), q.shape[1])
+        if all(np.abs(configuration - other).max() > SAME_POSTURE for other in distinct):
+            distinct.append(configuration)
+    return np.array(distinct).reshape(len(distinct), q.shape[1])

@@ -38,15 +38,17 @@ def _unavoidable(search: StartSearch) -> list[Contact]:
 
     Those that are there wherever the robot is come first, and of these what stands in the surroundings.
     """
-    found: list[Contact] = []
+    contacts: list[Contact] = []
     for robot in search.cell.robots:
         tried = search.failures.arrived.get(robot.name, [])
         if robot.start is not None or not tried:
             continue
-        in_all = [each for each in contacts_of(search.trials, search.cell, robot, tried) if each.is_in_all]
-        own = sorted((replace(each, is_everywhere=_is_everywhere(search, each)) for each in in_all), key=_urgency)
-        found += own[:1]
-    return sorted(found, key=_urgency)
+        in_all = [contact for contact in contacts_of(search.trials, search.cell, robot, tried) if contact.is_in_all]
+        ranked = sorted(
+            (replace(contact, is_everywhere=_is_everywhere(search, contact)) for contact in in_all), key=_urgency
+        )
+        contacts += ranked[:1]
+    return sorted(contacts, key=_urgency)
 
 
 def _urgency(contact: Contact) -> tuple[bool, bool]:
@@ -56,16 +58,17 @@ def _urgency(contact: Contact) -> tuple[bool, bool]:
 
 def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) -> str:
     """What to say of a contact that no configuration of a robot avoids, and of the same of other robots."""
-    cell, (own, other) = search.cell, contact.bodies
+    cell, (body, other) = search.cell, contact.bodies
     also = ", and wherever else its joints may be" if contact.is_everywhere else ""
     which = "the only one" if contact.of == 1 else f"all {contact.of}"
     besides = [
-        f"'{each.bodies[0].name}' touches '{each.bodies[1].name}' in all {each.of} of its own" for each in others
+        f"'{contact.bodies[0].name}' touches '{contact.bodies[1].name}' in all {contact.of} of its own"
+        for contact in others
     ]
     more = f"; besides, {', '.join(besides[: SHOWN - 1])}" if besides else ""
     return (
         f"{start_place(cell, cell.robot(contact.robot))}: no start configuration of '{contact.robot}' is free of "
-        f"contact: '{own.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
+        f"contact: '{body.name}' touches '{other.name}' in {which} that {_arrives(search, contact.robot)}{also}: "
         f"{doubt_about(cell, cell.robot(contact.robot)) or _cure(contact)}{more}"
     )
 
@@ -78,18 +81,18 @@ def _is_everywhere(search: StartSearch, contact: Contact) -> bool:
 
 def _cure(contact: Contact) -> str:
     """What to change so that two bodies need not touch."""
-    robot, (own, other) = contact.robot, contact.bodies
+    robot, (body, other) = contact.robot, contact.bodies
     if other.robot == robot:
-        if Kind.PART in {own.kind, other.kind}:
+        if Kind.PART in {body.kind, other.kind}:
             return "hold the part otherwise"
-        return "change its tool" if Kind.TOOL in {own.kind, other.kind} else "move its base, so that it need not fold"
+        return "change its tool" if Kind.TOOL in {body.kind, other.kind} else "move its base, so that it need not fold"
     if other.kind is Kind.PART:
         tool = f"change the tool of '{robot}' or the direction of its axis"
-        return tool if own.kind is Kind.TOOL else f"lengthen the tool of '{robot}' or turn its axis"
+        return tool if body.kind is Kind.TOOL else f"lengthen the tool of '{robot}' or turn its axis"
     if other.robot is not None:
         return f"move the bases of '{robot}' and '{other.robot}' apart"
     places = f"move the base of '{robot}' or the obstacle '{other.name}'"
-    return places if own.kind is Kind.LINK or contact.is_everywhere else f"{places}, or change the tool"
+    return places if body.kind is Kind.LINK or contact.is_everywhere else f"{places}, or change the tool"
 
 
 def _frequent_words(search: StartSearch) -> str:
@@ -105,7 +108,7 @@ def _frequent_words(search: StartSearch) -> str:
 
 def _arrives(search: StartSearch, name: str) -> str:
     """What a robot's configurations do, as the end of a sentence."""
-    relation = next((each for each in search.cell.relations if each.robot == name), None)
+    relation = next((relation for relation in search.cell.relations if relation.robot == name), None)
     if relation is None:
         return "were tried"
     return (
@@ -119,7 +122,7 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
     usual = (*cell.positioners, cell.robots[0].name)[0]
     name = max(sorted(failures.misses), key=lambda robot: failures.misses[robot], default=usual)
     robot = cell.robot(name)
-    relation = next((each for each in cell.relations if each.robot == name), None)
+    relation = next((relation for relation in cell.relations if relation.robot == name), None)
     if name in failures.off and relation is not None:
         return off_words(cell, relation, failures.off[name], at_best="at best ")
     tried = f"{SEEDS} attempts of the inverse kinematics"
@@ -135,7 +138,7 @@ def _unreached_words(search: StartSearch, holder_count: int) -> str:
 
 def _goal_words(search: StartSearch, name: str) -> str:
     """Where a robot's tool is desired at the start."""
-    relation = next((each for each in search.cell.relations if each.robot == name), None)
+    relation = next((relation for relation in search.cell.relations if relation.robot == name), None)
     if relation is None:
         return "where the part meets the robots that stand"
     return "its grasp on the part" if isinstance(relation, Grasp) else f"the start of task '{relation.name}'"
@@ -150,7 +153,7 @@ def _shortfall(search: StartSearch, robot: Robot) -> str:
     left = [
         nearest_reach(robot, goal.relation, goal.X_PT, X_WP=goal.X_WP, seeds=seeds, tip_only=True) for goal in goals
     ]
-    distance, best = min((each[0], index) for index, each in enumerate(left))
+    distance, best = min((shortfall[0], index) for index, shortfall in enumerate(left))
     outside = search.failures.beyond.get(robot.name, [])
     if outside:
         return _beyond_words(robot, np.array(outside), distance)

@@ -44,8 +44,8 @@ class StartChoice:
         among = "the only one found" if self.tried == 1 else f"the best of {self.tried} found"
         if self.trial.is_sound:
             share = 100.0 * float(self.trial.shares[0])
-            kept = f"its whole motion keeps limits and speeds, {share:.0f} % of the tightest one left free"
-            return f"start chosen: {among}; on trial {kept}"
+            margins = f"its whole motion keeps limits and speeds, {share:.0f} % of the tightest one left free"
+            return f"start chosen: {among}; on trial {margins}"
         return f"start chosen: {among}, but no trial was without fault: {self.fault}"
 
     @property
@@ -113,14 +113,14 @@ def _candidates(search: StartSearch, progress: Progress) -> Iterator[Array]:
         StartNotFoundError: There is none.
     """
     configurations = holder_configurations(search)
-    found = 0
+    yielded = 0
     for index, configuration in enumerate(configurations):
         progress("searching start configurations", index / len(configurations))
-        room = CANDIDATES * ROUNDS if len(configurations) == 1 else COMBINATIONS_PER_HOLDER
-        for candidate in islice(_combinations(search, configuration), room):
-            found += 1
+        limit = CANDIDATES * ROUNDS if len(configurations) == 1 else COMBINATIONS_PER_HOLDER
+        for candidate in islice(_combinations(search, configuration), limit):
+            yielded += 1
             yield candidate
-    if not found:
+    if not yielded:
         raise StartNotFoundError(why_nothing(search, len(configurations)))
 
 

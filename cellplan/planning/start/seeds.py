@@ -85,7 +85,9 @@ def with_seeds(
     """
     moved: list[MovedStart] = []
     carriers = cell.positioners[:1]
-    for relation in sorted(cell.relations, key=lambda each: each.robot not in carriers):  # the part goes with a carrier
+    for relation in sorted(
+        cell.relations, key=lambda relation: relation.robot not in carriers
+    ):  # the part goes with a carrier
         robot = cell.robot(relation.robot)
         holder = cell.robot(carriers[0]).start if carriers else None
         X_WR = part_pose(cell, holder) if relation.relative_to is Frame.PART else np.eye(4)
@@ -104,7 +106,7 @@ def with_seeds(
             raise NoSolutionError(_lost_words(cell, relation, robot, off, run))
         if q is not None:
             moved.append(_moved(relation, robot, q, off, run=run if is_of_run else ""))
-            robots = (replace(each, start=q) if each is robot else each for each in cell.robots)
+            robots = (replace(other, start=q) if other is robot else other for other in cell.robots)
             cell = replace(cell, robots=tuple(robots))
     return cell, tuple(moved)
 

@@ -125,11 +125,11 @@ class StartTrials:
     def contacts(self, q: Array, *, among: NDArray[np.bool_]) -> list[tuple[str, str]]:
         """All of some pairs, shape (pairs,), that touch at a configuration in the order of names, shape (nq,)."""
         listed, left = self._order.as_listed(q), among.copy()
-        found: list[tuple[str, str]] = []
+        pairs: list[tuple[str, str]] = []
         while (pair := self._scene.touching(listed, among=left)) is not None:
-            found.append(pair)
+            pairs.append(pair)
             left[self.pair_names.index(pair)] = False
-        return found
+        return pairs
 
     def judge(self, start: Array, *, may_turn: bool = True) -> Trial:
         """What follows from a start configuration of the whole cell in the order of names, shape (nq,).
@@ -144,11 +144,11 @@ class StartTrials:
             lost = np.full(len(start), LOST)
             return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
         turns = _whole_turns(self._cell, np.concatenate(motions)) if may_turn else np.zeros(len(start))
-        found = [_shares_left_free(self._cell, q + turns, self._step) for q in motions]
+        shares = [_shares_left_free(self._cell, q + turns, self._step) for q in motions]
         return Trial(
             start=start + turns,
-            ranges=np.min([ranges for ranges, _ in found], axis=0),
-            speeds=np.min([speeds for _, speeds in found], axis=0),
+            ranges=np.min([ranges for ranges, _ in shares], axis=0),
+            speeds=np.min([speeds for _, speeds in shares], axis=0),
             contact=next(filter(None, map(self._contact_on_the_way, self._phases, motions)), ""),
         )
 
@@ -162,7 +162,7 @@ class StartTrials:
         if len(trials) < 2 or not cell.solver.is_accurate or cell.solver.is_varied:
             return list(trials)
         schedules = [schedule_paths(cell, self._paths_of(run.tasks)) for run in self._phases]
-        if max(len(each.breaks) for each in schedules) > MOST_BREAKS:
+        if max(len(schedule.breaks) for schedule in schedules) > MOST_BREAKS:
             return list(trials)
         candidates = Candidates.of([cell] * len(trials), np.array([trial.start for trial in trials]))
         runs = [
@@ -175,10 +175,10 @@ class StartTrials:
             )
             for run, schedule in zip(self._phases, schedules, strict=True)
         ]
-        found = reduce(Screening.worst, runs)
-        ranges = _range_shares(cell, found.margins)
+        worst = reduce(Screening.worst, runs)
+        ranges = _range_shares(cell, worst.margins)
         return [
-            replace(trial, ranges=ranges[k], speeds=1.0 - found.speed_ratios[k]) if found.is_followed[k] else trial
+            replace(trial, ranges=ranges[k], speeds=1.0 - worst.speed_ratios[k]) if worst.is_followed[k] else trial
             for k, trial in enumerate(trials)
         ]
 
@@ -237,11 +237,13 @@ class StartTrials:
         """The cell with the first holder and one operator; all robots stay where goals may evaluate them."""
         if robot not in self._alone:
             whole = self._cell
-            kept = {robot, *whole.positioners[:1]} if not whole.solver.goals else {each.name for each in whole.robots}
+            names = (
+                {robot, *whole.positioners[:1]} if not whole.solver.goals else {robot.name for robot in whole.robots}
+            )
             self._alone[robot] = replace(
                 whole,
-                robots=tuple(each for each in whole.robots if each.name in kept),
-                tasks=tuple(each for each in whole.tasks if each.robot in kept),
+                robots=tuple(robot for robot in whole.robots if robot.name in names),
+                tasks=tuple(task for task in whole.tasks if task.robot in names),
                 part=replace(whole.part, held_by=whole.part.held_by[:1]),
             )
         return self._alone[robot]
@@ -286,9 +288,9 @@ def _whole_turns(cell: Cell, q: Array) -> Array:
             motion = q[:, cell.columns(robot.name)]
             turning = np.isfinite(upper - lower) & np.array([joint.is_revolute for joint in robot.model.joints])
             middle = 0.5 * np.add(lower, upper, out=np.zeros_like(lower), where=turning)
-            own = -2 * np.pi * np.round((0.5 * (motion.min(axis=0) + motion.max(axis=0)) - middle) / (2 * np.pi))
-            start = motion[0] + own
-            turns[cell.columns(robot.name)] = np.where(turning & (start >= lower) & (start <= upper), own, 0.0)
+            turn = -2 * np.pi * np.round((0.5 * (motion.min(axis=0) + motion.max(axis=0)) - middle) / (2 * np.pi))
+            start = motion[0] + turn
+            turns[cell.columns(robot.name)] = np.where(turning & (start >= lower) & (start <= upper), turn, 0.0)
     return turns
 
 

@@ -119,7 +119,7 @@ class AtKeptRate:
 
     def _times(self, grid: Array, freedom: Array, middle: Array, *, free: float) -> Array:
         """Times in [s] at which the nominal times of the grid are passed, by Simpson's rule, from 0."""
-        at, between = (1.0 / (self.rate + (free - self.rate) * each) for each in (freedom, middle))
+        at, between = (1.0 / (self.rate + (free - self.rate) * share) for share in (freedom, middle))
         return np.append(0.0, np.cumsum(np.diff(grid) * (at[:-1] + 4.0 * between + at[1:]) / 6.0))
 
 
@@ -144,18 +144,18 @@ def least_steps(motion: AtKeptRate, is_allowed: Callable[[Array], bool]) -> int 
     return high
 
 
-def spans_within(kept: Sequence[KeptRate], begin: float, end: float) -> Array:
+def spans_within(fixed_rates: Sequence[KeptRate], begin: float, end: float) -> Array:
     """What is demanded between two nominal times in [s]: stretches in their order that do not overlap, shape (n, 2)."""
-    found: list[list[float]] = []
-    for each in sorted(kept, key=lambda one: one.begin):
-        low, high = max(each.begin, begin), min(each.end, end)
+    spans: list[list[float]] = []
+    for fixed_rate in sorted(fixed_rates, key=lambda one: one.begin):
+        low, high = max(fixed_rate.begin, begin), min(fixed_rate.end, end)
         if high <= low:
             continue
-        if found and low <= found[-1][1]:
-            found[-1][1] = max(found[-1][1], high)
+        if spans and low <= spans[-1][1]:
+            spans[-1][1] = max(spans[-1][1], high)
         else:
-            found.append([low, high])
-    return np.array(found).reshape(-1, 2)
+            spans.append([low, high])
+    return np.array(spans).reshape(-1, 2)
 
 
 def whole_steps(seconds: float, step: float) -> int:
@@ -169,5 +169,5 @@ def _cubic(times: Array, knots: Array, values: Array, slopes: Array) -> Array:
     width, rise = knots[k + 1] - knots[k], values[k + 1] - values[k]
     u = (times - knots[k]) / width
     curved = u * (1.0 - u) * ((1.0 - u) * slopes[k] - u * slopes[k + 1]) * width
-    found: Array = values[k] + u * u * (3.0 - 2.0 * u) * rise + curved
-    return found
+    interpolated: Array = values[k] + u * u * (3.0 - 2.0 * u) * rise + curved
+    return interpolated

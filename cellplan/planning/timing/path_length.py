@@ -62,8 +62,8 @@ class Stretch:
         speeds = np.linalg.norm(velocities * self.scale, axis=1)
         known = np.flatnonzero(speeds > REST_SHARE * self.rates.max())
         nearest = known[np.clip(np.searchsorted(known, np.arange(len(sigma))), 0, len(known) - 1)]
-        found: Array = velocities[nearest] / speeds[nearest, None]
-        return found
+        directions: Array = velocities[nearest] / speeds[nearest, None]
+        return directions
 
 
 def stretches(path: JointPath, top_speeds: Array) -> list[Stretch]:
@@ -85,11 +85,11 @@ def stretches(path: JointPath, top_speeds: Array) -> list[Stretch]:
     ends = set(np.flatnonzero(~moves).tolist()) | {0, len(sigma) - 1}
     ends |= {count * k for k in _kinks(path, scale)}
     cuts = sorted(ends)
-    found = []
+    pieces = []
     for first, last in pairwise(cuts):
         if joined[first] and last > first:
-            found.append(_stretch(path, scale, sigma[first : last + 1]))
-    return found
+            pieces.append(_stretch(path, scale, sigma[first : last + 1]))
+    return pieces
 
 
 def _stretch(path: JointPath, scale: Array, sigma: Array) -> Stretch:

@@ -101,20 +101,20 @@ class Retimer:
             made += [*self._rest(rest, float(piece.sigma[0])), self._kept(piece) or self._settled(piece)]
             rest = float(piece.sigma[-1])
         made += self._rest(rest, path.end)
-        found = RetimedPath(
+        retimed = RetimedPath(
             motions=tuple(motion for _, motion in made), counts=tuple(count for count, _ in made), end=path.end
         )
         for _ in range(MOST_STRETCHINGS):
-            sigma = found.sigma
+            sigma = retimed.sigma
             factor = self.slower(sigma, path.at(sigma))
             if factor <= 1.0:
-                return found
-            both = zip(found.motions, found.counts, strict=True)
+                return retimed
+            both = zip(retimed.motions, retimed.counts, strict=True)
             counts = tuple(count if motion.is_fixed else _longer(count, factor) for motion, count in both)
-            if counts == found.counts:
-                return found
-            found = replace(found, counts=counts)
-        return found
+            if counts == retimed.counts:
+                return retimed
+            retimed = replace(retimed, counts=counts)
+        return retimed
 
     def _rest(self, begin: float, end: float) -> list[tuple[int, Rows]]:
         """What is demanded of a rest of all joints with its steps; nothing where no time has to pass.
@@ -134,7 +134,9 @@ class Retimer:
         spans = spans[np.diff(spans, axis=1)[:, 0] > FEWEST_STEPS * self.step]
         if not len(spans):
             return None
-        left = min(each.tolerance for each in self.kept if each.begin < end and each.end > begin)
+        left = min(
+            fixed_rate.tolerance for fixed_rate in self.kept if fixed_rate.begin < end and fixed_rate.end > begin
+        )
         for share in RATES:
             motion = AtKeptRate(piece, spans, 1.0 - left * (1.0 - share), self.step)
             count = least_steps(motion, lambda sigma: self.slower(sigma, piece.path.at(sigma)) <= 1.0)
@@ -178,7 +180,7 @@ class Retimer:
         build_up = self.bounds.build_up
         if build_up:
             profiles = [self._profile(piece, points, share) for share in BEND_SHARES]
-            tried = [RestToRest(piece, each, window * build_up) for each in profiles for window in WINDOWS]
+            tried = [RestToRest(piece, profile, window * build_up) for profile in profiles for window in WINDOWS]
         else:
             tried = [RestToRest(piece, self._profile(piece, points), 0.0)]
         counts = [self._steps(piece, motion, motion.duration) for motion in tried]

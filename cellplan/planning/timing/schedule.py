@@ -57,8 +57,8 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
     tasks = []
     for path in schedule.paths:
         nominal = _on_clock(clock.sigma, path)
-        own = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
-        start, end, *rest = clock.reached_at(np.array(own)).tolist()
+        instants = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
+        start, end, *rest = clock.reached_at(np.array(instants)).tolist()
         cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 2)
         tasks.append(
             replace(
@@ -96,9 +96,9 @@ def clock_paths(cell: Cell, toolpaths: Iterable[Toolpath]) -> dict[str, ClockedP
         InputError: As `schedule_tasks` does, a task has too few samples to judge its motion by, or it settles for as
             long as it lasts.
     """
-    found = {each.name: clock_path(cell, cell.task(each.name), each) for each in toolpaths}
-    _refuse_poor_sampling(cell, tuple(found.values()))
-    return found
+    paths = {toolpath.name: clock_path(cell, cell.task(toolpath.name), toolpath) for toolpath in toolpaths}
+    _refuse_poor_sampling(cell, tuple(paths.values()))
+    return paths
 
 
 def clock_path(cell: Cell, task: Task, toolpath: Toolpath) -> ClockedPath:
@@ -134,10 +134,10 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
         duration = whole / task.repeat
         if duration < least * (1.0 - STEP_TOLERANCE) - TIME_TOLERANCE:
             key = "duration_s" if task.feed is None else task.feed_key
-            own = "path" if path.toolpath.is_timed else key
+            entry_key = "path" if path.toolpath.is_timed else key
             what = "a task" if task.repeat == 1 else "a cycle"
             raise TooFewStepsError(
-                f"{task.where(own)}: expected {what} of at least {least:g} s "
+                f"{task.where(entry_key)}: expected {what} of at least {least:g} s "
                 f"({FEWEST_STEPS} times motion.step_s), got {duration:g} s; slow the task down or shorten the step"
             )
         if task.settle > whole - least * (1.0 - STEP_TOLERANCE) + TIME_TOLERANCE:

@@ -70,6 +70,6 @@ class GivenRows:
 
     def placed(self, k: int, q: Array) -> Array:
         """A configuration, shape (nq,), with these joints where they are at sample k."""
-        found = q.copy()
-        found[self.columns] = self.q[k]
-        return found
+        placed = q.copy()
+        placed[self.columns] = self.q[k]
+        return placed

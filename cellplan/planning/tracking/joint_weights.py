@@ -117,9 +117,9 @@ def limit_slope(q: Array, lower: Array, upper: Array) -> Array:
     """
     bounded = np.isfinite(lower) & np.isfinite(upper)
     low, high = np.where(bounded, lower, -1.0), np.where(bounded, upper, 1.0)
-    room = high - low
-    inside = np.clip(np.where(bounded, q, 0.0), low + NEAREST * room, high - NEAREST * room)
-    slope = room**2 * (2.0 * inside - high - low) / (4.0 * (high - inside) ** 2 * (inside - low) ** 2)
+    span = high - low
+    inside = np.clip(np.where(bounded, q, 0.0), low + NEAREST * span, high - NEAREST * span)
+    slope = span**2 * (2.0 * inside - high - low) / (4.0 * (high - inside) ** 2 * (inside - low) ** 2)
     return np.where(bounded, slope, 0.0)
 
 

@@ -27,7 +27,7 @@ class MotionTask:
     @property
     def relations(self) -> tuple[Relation, ...]:
         """The tasks, then the grasps of the further holders that move ([Ribeiro2010]_ 4.5), one block row each."""
-        return (*(each.task for each in self.schedule.tasks), *self.grasps)
+        return (*(task.task for task in self.schedule.tasks), *self.grasps)
 
     def references(self) -> tuple[Array, Array]:
         """Reference poses X_PT and twists V_PT_P of all relations at the samples.
@@ -38,8 +38,8 @@ class MotionTask:
             Poses, shape (N, relations, 4, 4), and twists, linear first, shape (N, relations, 6).
         """
         tasks, grasps, count = self.schedule.tasks, self.grasps, len(self.schedule.times)
-        X_PT = [each.X_PT for each in tasks] + [np.broadcast_to(grasp.X_PT, (count, 4, 4)) for grasp in grasps]
-        V_PT_P = [each.V_PT_P for each in tasks] + [np.zeros((count, 6))] * len(grasps)
+        X_PT = [task.X_PT for task in tasks] + [np.broadcast_to(grasp.X_PT, (count, 4, 4)) for grasp in grasps]
+        V_PT_P = [task.V_PT_P for task in tasks] + [np.zeros((count, 6))] * len(grasps)
         return np.stack(X_PT, axis=1), np.stack(V_PT_P, axis=1)
 
 

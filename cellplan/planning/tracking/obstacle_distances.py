@@ -66,15 +66,15 @@ class ClosestPairs:
         """
         table = self._table
         D = table.forest.displacements(q, self._X_WB)
-        found = table.find(self._scene.engine, D, within)
+        nearby = table.find(self._scene.engine, D, within)
         return NearPairs(
-            rows=found.rows,
-            samples=found.samples,
-            distances=found.distances,
-            normals=found.normals,
-            first=found.first,
-            second=found.second,
-            by_joints=table.by_joints(D, found),
+            rows=nearby.rows,
+            samples=nearby.samples,
+            distances=nearby.distances,
+            normals=nearby.normals,
+            first=nearby.first,
+            second=nearby.second,
+            by_joints=table.by_joints(D, nearby),
         )
 
     def at(self, q: Array, *, within: float) -> tuple[ClosestPair, ...]:
@@ -100,14 +100,14 @@ def _among(table: NearTable, chosen: Flags) -> NearTable:
     A body that is not convex is its surface at any distance, so that none jumps while bodies approach each other.
     """
     pairs = table.pairs
-    kept: Indices = np.flatnonzero(chosen[pairs.rows]) if len(chosen) else np.zeros(0, dtype=np.intp)
-    solid, ground = kept[kept < len(pairs.solids)], kept[kept >= len(pairs.solids)] - len(pairs.solids)
+    indices: Indices = np.flatnonzero(chosen[pairs.rows]) if len(chosen) else np.zeros(0, dtype=np.intp)
+    solid, ground = indices[indices < len(pairs.solids)], indices[indices >= len(pairs.solids)] - len(pairs.solids)
     some = WatchedPairs(
-        rows=pairs.rows[kept],
+        rows=pairs.rows[indices],
         solids=pairs.solids[solid],
         above=pairs.above[ground],
         planes=pairs.planes[ground],
-        demands=np.full(len(kept), np.inf),
-        once=pairs.once[kept],
+        demands=np.full(len(indices), np.inf),
+        once=pairs.once[indices],
     )
     return replace(table, pairs=some)

@@ -42,7 +42,7 @@ class FirstOrder:
     secondary: Array | None  # joint speeds that the secondary goals ask for, shape (nq,); None when there are none
     bounds: tuple[Array, Array] | None = None
 
-    def bounded(self, null_space_projection: Array, *, beside: Array) -> Array:
+    def bounded(self, null_space_projection: Array, *, velocities: Array) -> Array:
         """Share of null-space velocities that may be added to the velocities that the tasks need, shape (nq,).
 
         They are scaled together, so they still move no tool.
@@ -54,7 +54,7 @@ class FirstOrder:
         if self.bounds is None:
             return null_space_projection
         lowest, highest = self.bounds
-        return share_within(beside, null_space_projection, lowest=lowest, highest=highest) * null_space_projection
+        return share_within(velocities, null_space_projection, lowest=lowest, highest=highest) * null_space_projection
 
 
 @dataclass(frozen=True, slots=True, eq=False)

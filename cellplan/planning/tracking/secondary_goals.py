@@ -146,8 +146,8 @@ def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) 
         Shape (...).
     """
     moves = extra != 0.0
-    room = np.where(extra > 0.0, highest - speeds, lowest - speeds) / np.where(moves, extra, 1.0)
-    return np.clip(np.min(np.where(moves, room, 1.0), axis=-1, initial=1.0), 0.0, 1.0)
+    margin = np.where(extra > 0.0, highest - speeds, lowest - speeds) / np.where(moves, extra, 1.0)
+    return np.clip(np.min(np.where(moves, margin, 1.0), axis=-1, initial=1.0), 0.0, 1.0)
 
 
 def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:

@@ -25,12 +25,12 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
         return None
     blocks = problem.rows(k, q)
     stack = _smallest(np.concatenate(blocks))
-    found: list[NearestSingular] = []
+    candidates: list[NearestSingular] = []
     for task, block in zip(problem.tasks, blocks, strict=True):
         smallest = _smallest(block[:, problem.cell.columns(task.robot)])
         if smallest is not None and stack is not None:
-            found.append(NearestSingular(robot=task.robot, task=task.name, smallest=smallest, stack=stack))
-    return min(found, key=lambda each: each.smallest, default=None)
+            candidates.append(NearestSingular(robot=task.robot, task=task.name, smallest=smallest, stack=stack))
+    return min(candidates, key=lambda candidate: candidate.smallest, default=None)
 
 
 def singular_words(problem: TrackingProblem, k: int, q: Array) -> str:

@@ -106,10 +106,10 @@ class TaskConstraints:
 
 def kept_components(task: Relation) -> NDArray[np.bool_]:
     """Which components a task constrains, shape (6,); with free spin the two rotations across the tool axis."""
-    kept = np.isin(np.arange(6), task.axes)
+    is_constrained = np.isin(np.arange(6), task.axes)
     if task.is_spin_free:
-        kept[3:] = [True, True, False]
-    return kept
+        is_constrained[3:] = [True, True, False]
+    return is_constrained
 
 
 def constraint_rows(task: Relation, X_RT: Array) -> Array:

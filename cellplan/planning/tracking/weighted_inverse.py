@@ -59,6 +59,6 @@ class WeightedInverse:
         Args:
             speeds: Any joint speeds, shape (nq,).
         """
-        kept = self._s_squared > ROUNDING * self._s_squared[-1]
-        U = self._U[:, kept]
-        return speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[kept]))
+        significant = self._s_squared > ROUNDING * self._s_squared[-1]
+        U = self._U[:, significant]
+        return speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[significant]))

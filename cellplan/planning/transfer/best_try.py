@@ -73,7 +73,7 @@ class BlockedTransferError(TransferNotFoundError):
 
 def best_try(scene: Scene, tries: Iterable[Try]) -> BlockedTry:
     """The try whose worst pair falls short of its demand least; the first of equal ones."""
-    return min((in_the_way(scene, each) for each in tries), key=lambda blocked: round(blocked.missing, 6))
+    return min((in_the_way(scene, attempt) for attempt in tries), key=lambda blocked: round(blocked.missing, 6))
 
 
 def in_the_way(scene: Scene, tried: Try) -> BlockedTry:
@@ -82,7 +82,7 @@ def in_the_way(scene: Scene, tried: Try) -> BlockedTry:
     short = [_shortfall(bound, pair) for pair in bound.pairs if not pair.is_kept]
     if not short:  # free at last: only more rows were refused
         return BlockedTry(scene=scene, tried=tried, bodies=("", ""), missing=0.0, row=0, words="nothing is in the way")
-    missing, depth, row, pair = max(short, key=lambda each: each[0])
+    missing, depth, row, pair = max(short, key=lambda entry: entry[0])
     first, second = bound.names(pair)
     is_deep = round(depth * MM, 3) > 0.0  # less is rounding: the bodies touch
     held = f"is {depth * MM:.3g} mm deep in" if is_deep else f"is {pair.proved * MM:.3g} mm from"

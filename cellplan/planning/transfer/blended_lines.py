@@ -63,16 +63,16 @@ class BlendedLine:
 
     def at(self, times: Array) -> Array:
         """Positions at nominal times in [s], shape (N, n)."""
-        found = np.column_stack([np.interp(times, self.times, column) for column in self.q.T])
+        positions = np.column_stack([np.interp(times, self.times, column) for column in self.q.T])
         speeds = np.diff(self.q, axis=0) / np.diff(self.times)[:, None]
         rest = np.zeros((1, self.q.shape[1]))
         changes = np.diff(np.concatenate([rest, speeds, rest]), axis=0)
         for middle, half, change in zip(self.times, self.halves, changes, strict=True):
             u = np.clip((times - middle) / half, -1.0, 1.0)
             cut = u * (0.5 + u * (0.375 - 0.0625 * u * u)) + 0.1875 - np.maximum(u, 0.0)
-            found += (half * cut)[:, None] * change
-        found[times <= self.begin], found[times >= self.end] = self.q[0], self.q[-1]
-        return found
+            positions += (half * cut)[:, None] * change
+        positions[times <= self.begin], positions[times >= self.end] = self.q[0], self.q[-1]
+        return positions
 
 
 def joint_path(start: Array, lines: Sequence[BlendedLine]) -> JointPath:
@@ -93,9 +93,9 @@ def joint_path(start: Array, lines: Sequence[BlendedLine]) -> JointPath:
     times = inner.ravel()
     q = np.tile(start, (len(times), 1))
     for line in lines:
-        own = line.shifted(-first)
-        begun = times > own.begin
-        q[begun, line.columns] = own.at(times[begun])
+        shifted = line.shifted(-first)
+        begun = times > shifted.begin
+        q[begun, line.columns] = shifted.at(times[begun])
     nodes = q.reshape(*inner.shape, -1)
     nodes[1:, 0] = nodes[:-1, -1]
     return JointPath(start, breaks, list(np.swapaxes(nodes, 1, 2)))

@@ -126,13 +126,13 @@ class InTurn:
         if self.tried.searches >= MOST_FAILED:
             return None
         rng = generator(f"transfer of {robot} after {sorted(moved)}", query.seed)
-        found = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
-        if found.way is None:
-            self.tried.failed(robot, DRAWN, found.reached)
-            if found.over_gap is not None:
-                self._over_gaps[robot, moved] = found.over_gap
+        connection = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
+        if connection.way is None:
+            self.tried.failed(robot, DRAWN, connection.reached)
+            if connection.over_gap is not None:
+                self._over_gaps[robot, moved] = connection.over_gap
             return None
-        return self._rounded(check, shortened(check, found.way, box.velocity, rng))
+        return self._rounded(check, shortened(check, connection.way, box.velocity, rng))
 
     def _rounded(self, check: MoveCheck, way: Array) -> RobotMove:
         """A way through via points, shape (K, n), as a smooth move."""

@@ -178,13 +178,13 @@ class MoveCheck:
 
     def _refuse(self, place: int) -> None:
         """Count a refusal; the pair comes first in the next moves."""
-        self._recent = [place, *(each for each in self._recent if each != place)][:RECENT]
+        self._recent = [place, *(recent for recent in self._recent if recent != place)][:RECENT]
         self.refused[self._scene.names(self._scene.pairs[self._rows[place]])] += 1
 
     def _placed(self, q: Array, moments: Indices, places: Indices) -> "_Samples":
         """The bodies of some pairs, and the centres of their spheres."""
         D, engine, others = self._chain.link_displacements(q), self._scene.engine, self._others.poses
-        found = _Samples(poses={}, centres=np.zeros((len(engine.bodies), len(q), 3)))
+        samples = _Samples(poses={}, centres=np.zeros((len(engine.bodies), len(q), 3)))
         for index in np.unique(self._ends[places]).tolist():
             if index < 0:
                 continue
@@ -193,9 +193,9 @@ class MoveCheck:
                 R, p = X[:, :3, :3], X[:, :3, 3]
             else:
                 R, p = others.R[index][moments], others.p[index][moments]
-            found.poses[index] = R, p
-            found.centres[index] = R @ engine.centres[index] + p
-        return found
+            samples.poses[index] = R, p
+            samples.centres[index] = R @ engine.centres[index] + p
+        return samples
 
     def _gaps(self, places: Indices, samples: "_Samples") -> Array:
         """Distances of the bounding spheres of pairs in [m], or of one above a half-space, shape (pairs, K)."""

@@ -75,18 +75,18 @@ def plan_transfer(
     straight = start + share * (goal - start)
     if certify(scene, straight, with_minimum=False).is_kept:
         rows = straight_rows(start, goal, retimer)
-        found = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
-        if found is not None:
-            return found
+        transfer = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
+        if transfer is not None:
+            return transfer
     in_turn, in_time = Tried(), Tried() if len(query.movers) > 1 else None
     search = InTurn(query, in_turn, reserve=RESERVES[0], progress=progress)
-    found = _in_turn(search, retimer, progress)
-    if found is None and in_time is not None:
-        found = _in_time(query, retimer, in_time, progress)
-    if found is None:
+    transfer = _in_turn(search, retimer, progress)
+    if transfer is None and in_time is not None:
+        transfer = _in_time(query, retimer, in_time, progress)
+    if transfer is None:
         tries = [Try(words="all at once, straight" if in_time else "straight", q=straight), *search.tries()]
         raise not_found(query, tries, in_turn, in_time)
-    return found
+    return transfer
 
 
 def _in_turn(search: InTurn, retimer: Retimer, progress: Progress) -> PlannedTransfer | None:
@@ -100,9 +100,9 @@ def _in_turn(search: InTurn, retimer: Retimer, progress: Progress) -> PlannedTra
             for move in moves:
                 rows.append(_rows_of(move, rows[-1][-1], retimer)[1:])
             rungs = {move.robot: Rung.IN_TURN for move in moves}
-            found = _in_rows(query, np.concatenate(rows), retimer, rungs)
-            if found is not None:
-                return found
+            transfer = _in_rows(query, np.concatenate(rows), retimer, rungs)
+            if transfer is not None:
+                return transfer
             tried.uncertified += 1
         if tried.uncertified == before:
             break  # nothing was found; with more reserve neither
@@ -128,9 +128,9 @@ def _in_time(query: TransferQuery, retimer: Retimer, tried: Tried, progress: Pro
         for lines in islice(InTime(query, tried, reserve=reserve, progress=progress).lines(), MOST_RETIMED):
             path = joint_path(query.start, lines)
             rows = path.at(retimer.fastest(path).sigma)
-            found = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.IN_TIME))
-            if found is not None:
-                return found
+            transfer = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.IN_TIME))
+            if transfer is not None:
+                return transfer
             tried.uncertified += 1
         if tried.uncertified == before:
             break

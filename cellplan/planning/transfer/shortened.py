@@ -60,12 +60,12 @@ def rounded_line(check: MoveCheck, way: Array, columns: slice, velocity: Array) 
 
 def _without_detours(check: MoveCheck, way: Array) -> Array:
     """Via points left out, from each one straight to the last one that is free."""
-    kept = [0]
-    while kept[-1] < len(way) - 1:
-        here = kept[-1]
+    vertices = [0]
+    while vertices[-1] < len(way) - 1:
+        here = vertices[-1]
         free = (k for k in range(len(way) - 1, here + 1, -1) if check.is_free(way[here], way[k]))
-        kept.append(next(free, here + 1))
-    return way[kept]
+        vertices.append(next(free, here + 1))
+    return way[vertices]
 
 
 def _lengths(way: Array, velocity: Array) -> Array:

@@ -28,9 +28,9 @@ class Tree:
     parents: list[int] = field(default_factory=lambda: [0])  # index of the node each one was reached from
 
     @classmethod
-    def at(cls, root: Array, *, room: int) -> "Tree":
+    def at(cls, root: Array, *, capacity: int) -> "Tree":
         """A tree of its root only, with room for so many nodes."""
-        nodes = np.empty((room, len(root)))
+        nodes = np.empty((capacity, len(root)))
         nodes[0] = root
         return cls(nodes)
 
@@ -86,7 +86,7 @@ def connected(
         tick: Called with the fraction done.
     """
     scale, (start, goal) = box.velocity, ends
-    trees = [Tree.at(start / scale, room=256), Tree.at(goal / scale, room=256)]
+    trees = [Tree.at(start / scale, capacity=256), Tree.at(goal / scale, capacity=256)]
     for number in range(drawn):
         tick(number / drawn)
         mine, other = trees[number % 2], trees[1 - number % 2]
@@ -97,9 +97,9 @@ def connected(
         if met is not None:
             ahead, back = (new, met) if number % 2 == 0 else (met, new)
             way = trees[0].way_to(ahead) + trees[1].way_to(back)[-2::-1]
-            found = np.array(way) * scale
-            found[0], found[-1] = start, goal
-            return Found(way=found, reached=(trees[0].count, trees[1].count))
+            path = np.array(way) * scale
+            path[0], path[-1] = start, goal
+            return Found(way=path, reached=(trees[0].count, trees[1].count))
     return Found(way=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
 
 
@@ -113,9 +113,9 @@ class JointBox:
 
     def draw(self, rng: np.random.Generator, number: int, start: Array, goal: Array) -> Array:
         """A configuration from the limits, more often from near the ends of the way."""
-        beside = BOXES[number // 2 % len(BOXES)] * (self.upper - self.lower)
-        low = np.maximum(self.lower, np.minimum(start, goal) - beside)
-        high = np.minimum(self.upper, np.maximum(start, goal) + beside)
+        margin = BOXES[number // 2 % len(BOXES)] * (self.upper - self.lower)
+        low = np.maximum(self.lower, np.minimum(start, goal) - margin)
+        high = np.minimum(self.upper, np.maximum(start, goal) + margin)
         return rng.uniform(low, high)
 
 

@@ -35,11 +35,11 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
         standing: Whether what stands there is judged too, by its depth.
     """
     if stands_by_link(scene.cell, robot) and len(q) > 1:  # its pairs depend on where it stands
-        each = (slice(k, k + 1) for k in range(len(q)))
-        return [contacts(scene, robot, X_WB[k], q[k], standing=standing)[0] for k in each]
-    found: list[Contact | None] = [None] * len(q)
+        slices = (slice(k, k + 1) for k in range(len(q)))
+        return [contacts(scene, robot, X_WB[k], q[k], standing=standing)[0] for k in slices]
+    touching: list[Contact | None] = [None] * len(q)
     if not len(q):
-        return found
+        return touching
     placed = scene.moved({robot: X_WB[0]})
     places, seen = np.arange(len(q)), np.zeros(q.shape[1], dtype=bool)
     for count in KEYS:
@@ -49,31 +49,31 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
         step = max(1, AT_ONCE // max(1, len(nodes)))
         for some in (places[begin : begin + step] for begin in range(0, len(places), step)):
             for place, contact in _worst(placed, robot, X_WB[some], q[some][:, nodes]).items():
-                found[some[place]] = Contact(
+                touching[some[place]] = Contact(
                     pair=contact.pair, distance=contact.distance, node=int(nodes[contact.node])
                 )
-        places = np.array([place for place in places.tolist() if found[place] is None], dtype=np.intp)
+        places = np.array([place for place in places.tolist() if touching[place] is None], dtype=np.intp)
     for place in places.tolist() if standing else ():
-        found[place] = _standing(scene.moved({robot: X_WB[place]}), q[place, :1])
-    return found
+        touching[place] = _standing(scene.moved({robot: X_WB[place]}), q[place, :1])
+    return touching
 
 
 def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact]:
     """The worst contact of motions of shape (K, nodes, nq), by motion and node, for those that have one."""
     table, (count, nodes, joints) = near_table(scene), q.shape
-    bases = np.array([np.tile(each.X_WB, (count * nodes, 1, 1)) for each in scene.cell.robots])
+    bases = np.array([np.tile(robot.X_WB, (count * nodes, 1, 1)) for robot in scene.cell.robots])
     bases[scene.cell.index(robot)] = np.repeat(X_WB, nodes, axis=0)
     demands = np.zeros(len(scene.pairs))
     demands[table.pairs.rows] = table.pairs.demands
     D = table.forest.displacements(q.reshape(-1, joints), bases)
     near = table.find(scene.engine, D, float(demands.max(initial=0.0)))
     short, motions = near.distances - demands[near.rows], near.samples // nodes
-    found = dict[int, Contact]()
+    worst = dict[int, Contact]()
     for query in _first_of_each(short, motions).tolist():
         pair = scene.names(scene.pairs[near.rows[query]])
         node = int(near.samples[query] % nodes)
-        found[int(motions[query])] = Contact(pair=pair, distance=float(near.distances[query]), node=node)
-    return found
+        worst[int(motions[query])] = Contact(pair=pair, distance=float(near.distances[query]), node=node)
+    return worst
 
 
 def _first_of_each(short: Array, motions: Indices) -> Indices:
@@ -87,9 +87,9 @@ def _first_of_each(short: Array, motions: Indices) -> Indices:
 def _standing(scene: Scene, q: Array) -> Contact | None:
     """The first pair of which one stands too deep in the other, at a configuration of shape (1, nq)."""
     table = near_table(scene)
-    D = table.forest.displacements(q, np.array([each.X_WB for each in scene.cell.robots]))
-    for found in mounted_depths(scene, q, table.bodies.poses(D)):
-        if found.depth > found.pair.limit:
-            names = (scene.bodies[found.pair.first].name, scene.bodies[found.pair.second].name)
-            return Contact(pair=names, distance=-found.depth, node=0)
+    D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
+    for mounted_depth in mounted_depths(scene, q, table.bodies.poses(D)):
+        if mounted_depth.depth > mounted_depth.pair.limit:
+            names = (scene.bodies[mounted_depth.pair.first].name, scene.bodies[mounted_depth.pair.second].name)
+            return Contact(pair=names, distance=-mounted_depth.depth, node=0)
     return None

@@ -60,7 +60,7 @@ class Places:
     def neighbours(self, stride: int) -> Indices:
         """Pairs of places that are so many rows or columns, or both, apart, both ways, shape (P, 2)."""
         index = np.arange(len(self)).reshape(self.shape)
-        found = [np.zeros((0, 2), dtype=np.intp)]
+        pairs = [np.zeros((0, 2), dtype=np.intp)]
         for down, right in ((0, stride), (stride, 0), (stride, stride), (stride, -stride)):
             if down >= self.shape[0] or abs(right) >= self.shape[1]:
                 continue
@@ -69,5 +69,5 @@ class Places:
                 first, second = first[:, :-right], second[:, right:]
             elif right < 0:
                 first, second = first[:, -right:], second[:, :right]
-            found += [np.stack([a.ravel(), b.ravel()], axis=1) for a, b in ((first, second), (second, first))]
-        return np.concatenate(found)
+            pairs += [np.stack([a.ravel(), b.ravel()], axis=1) for a, b in ((first, second), (second, first))]
+        return np.concatenate(pairs)

@@ -62,8 +62,8 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
     drawn = np.vstack([goal.given, random_configurations(model, SEEDS - 1, generator(model.name, seed))])
 
     def solved(at: Indices, seeds: Array) -> tuple[Array, Indices]:
-        found, rows = reached_by_rows(goal.chain, goal.relation, goal.X_RT, X_WP=X_WR[at], seeds=seeds)
-        return _distinct(_near_turns(model, found, goal.given), at[rows])
+        configurations, rows = reached_by_rows(goal.chain, goal.relation, goal.X_RT, X_WP=X_WR[at], seeds=seeds)
+        return _distinct(_near_turns(model, configurations, goal.given), at[rows])
 
     stride = _first_stride(places)
     coarse = places.coarse(stride)
@@ -102,15 +102,15 @@ def _first_stride(places: Places) -> int:
 def _carried_on(q: Array, at: Indices, pairs: Indices, among: Flags, solved: Solve) -> tuple[Array, Indices]:
     """Starts found so far, and those of places that had none, from the ones at their neighbours."""
     has = np.isin(np.arange(len(among)), at)
-    asked = pairs[has[pairs[:, 0]] & ~has[pairs[:, 1]] & among[pairs[:, 1]]]
-    if not len(asked):
+    attempted = pairs[has[pairs[:, 0]] & ~has[pairs[:, 1]] & among[pairs[:, 1]]]
+    if not len(attempted):
         return q, at
     order = np.argsort(at, kind="stable")
     q, at = q[order], at[order]
-    first, last = (np.searchsorted(at, asked[:, 0], side=side) for side in ("left", "right"))
+    first, last = (np.searchsorted(at, attempted[:, 0], side=side) for side in ("left", "right"))
     counts = last - first
     source = np.repeat(first - np.cumsum(counts) + counts, counts) + np.arange(counts.sum())
-    more, places = solved(np.repeat(asked[:, 1], counts), q[source])
+    more, places = solved(np.repeat(attempted[:, 1], counts), q[source])
     return np.concatenate([q, more]), np.concatenate([at, places])
 
 

@@ -82,7 +82,7 @@ class MapJob:
     places: Places
 
 
-def verdicts_at_start(asked: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVerdict], Indices]:
+def verdicts_at_start(job: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVerdict], Indices]:
     """What the starts alone say of every place, and which starts are within limits.
 
     Args:
@@ -93,20 +93,20 @@ def verdicts_at_start(asked: MapJob, q: Array, at: Indices) -> tuple[list[PlaceV
     Returns:
         The verdict of every place, and the starts to be judged, ascending.
     """
-    model = asked.scene.cell.robot(asked.robot).model
-    room = np.minimum(q - model.lower, model.upper - q)
-    found = [PlaceVerdict(verdict=Verdict.OUT_OF_REACH) for _ in range(len(asked.places))]
-    for start, place, rooms in zip(q, at.tolist(), room, strict=True):
+    model = job.scene.cell.robot(job.robot).model
+    margins = np.minimum(q - model.lower, model.upper - q)
+    verdicts = [PlaceVerdict(verdict=Verdict.OUT_OF_REACH) for _ in range(len(job.places))]
+    for start, place, rooms in zip(q, at.tolist(), margins, strict=True):
         tight = int(np.argmin(rooms))
-        worst = found[place].margin
+        worst = verdicts[place].margin
         if rooms[tight] < 0.0 and (worst is None or rooms[tight] > worst):
-            joint = (asked.robot, model.joint_names[tight])
+            joint = (job.robot, model.joint_names[tight])
             margin = float(rooms[tight])
-            found[place] = PlaceVerdict(verdict=Verdict.LIMIT, start=start, joint=joint, margin=margin, at=0.0)
-    return found, np.flatnonzero(room.min(axis=1) >= 0.0)
+            verdicts[place] = PlaceVerdict(verdict=Verdict.LIMIT, start=start, joint=joint, margin=margin, at=0.0)
+    return verdicts, np.flatnonzero(margins.min(axis=1) >= 0.0)
 
 
-def judge(asked: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
+def judge(job: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
     """The verdict of each place of some starts by its motions: of the first that passes, else of the best one.
 
     Args:
@@ -114,38 +114,38 @@ def judge(asked: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
         q: Starts of the robot within its limits, shape (S, n).
         at: Their places, ascending, shape (S,); at each place those that are tried first come first.
     """
-    found = dict[int, PlaceVerdict]()
+    verdicts = dict[int, PlaceVerdict]()
     turn = np.arange(len(at)) - np.searchsorted(at, at, side="left")
     for rows in (np.flatnonzero(turn == 0), np.flatnonzero(turn > 0)[np.argsort(turn[turn > 0], kind="stable")]):
-        left = rows[[place not in found or not found[place].passes for place in at[rows].tolist()]]
-        left = left[~_is_in_vain(asked, found, q[left], at[left])]
+        left = rows[[place not in verdicts or not verdicts[place].passes for place in at[rows].tolist()]]
+        left = left[~_is_in_vain(job, verdicts, q[left], at[left])]
         for begin in range(0, len(left), AT_ONCE):
             group = left[begin : begin + AT_ONCE]
-            group = group[[place not in found or not found[place].passes for place in at[group].tolist()]]
-            for place, verdict in zip(at[group].tolist(), _judged(asked, q[group], at[group]), strict=True):
-                found[place] = verdict.or_better(found.get(place))
-    return found
+            group = group[[place not in verdicts or not verdicts[place].passes for place in at[group].tolist()]]
+            for place, verdict in zip(at[group].tolist(), _judged(job, q[group], at[group]), strict=True):
+                verdicts[place] = verdict.or_better(verdicts.get(place))
+    return verdicts
 
 
-def _is_in_vain(asked: MapJob, found: Mapping[int, PlaceVerdict], q: Array, at: Indices) -> Flags:
+def _is_in_vain(job: MapJob, verdicts: Mapping[int, PlaceVerdict], q: Array, at: Indices) -> Flags:
     """Starts that need no motion: two bodies are too near already there, and at their place nothing else is known."""
-    collides = [place in found and found[place].verdict is Verdict.COLLISION for place in at.tolist()]
+    collides = [place in verdicts and verdicts[place].verdict is Verdict.COLLISION for place in at.tolist()]
     asking = np.flatnonzero(np.array(collides, dtype=bool))
-    start = np.tile(asked.start, (len(asking), 1, 1))
-    start[:, 0, asked.scene.cell.columns(asked.robot)] = q[asking]
-    touching = contacts(asked.scene, asked.robot, asked.places.X_WB[at[asking]], start, standing=False)
+    start = np.tile(job.start, (len(asking), 1, 1))
+    start[:, 0, job.scene.cell.columns(job.robot)] = q[asking]
+    touching = contacts(job.scene, job.robot, job.places.X_WB[at[asking]], start, standing=False)
     is_vain = np.zeros(len(at), dtype=bool)
     is_vain[asking] = [contact is not None for contact in touching]
     return is_vain
 
 
-def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
+def _judged(map_job: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
     """Verdicts of some starts, their motions worked out together."""
-    job, cell = asked.job, asked.scene.cell
+    job, cell = map_job.job, map_job.scene.cell
     X_WB = np.tile(np.array([robot.X_WB for robot in cell.robots]), (len(q), 1, 1, 1))
-    X_WB[:, cell.index(asked.robot)] = asked.places.X_WB[at]
-    start = np.tile(asked.start, (len(q), 1))
-    start[:, cell.columns(asked.robot)] = q
+    X_WB[:, cell.index(map_job.robot)] = map_job.places.X_WB[at]
+    start = np.tile(map_job.start, (len(q), 1))
+    start[:, cell.columns(map_job.robot)] = q
     weights = np.concatenate([robot.weights for robot in cell.robots])
     tools = np.array([robot.tool.X_FT for robot in cell.robots])
     layouts = Layouts(
@@ -154,13 +154,13 @@ def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
     motions = run(job, layouts)
     with np.errstate(all="ignore"):  # what lost its path is no number
         figures = Figures.of(job, motions)
-        allowed = acceleration_limits(asked.scene)
+        allowed = acceleration_limits(map_job.scene)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / allowed), in_magnitude=True).value
     known = {
-        k: _known(asked, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
+        k: _known(map_job, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
         for k in np.flatnonzero(motions.is_followed).tolist()
     }
-    _with_contacts(asked, known, motions.q, asked.places.X_WB[at])
+    _with_contacts(map_job, known, motions.q, map_job.places.X_WB[at])
     for k in range(len(q)):
         lost_at = float(max(motions.lost_at[k], 0.0))
         yield known.get(k, PlaceVerdict(verdict=Verdict.OUT_OF_REACH, start=q[k], lost_at=lost_at))
@@ -168,13 +168,13 @@ def _judged(asked: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
 
 def acceleration_limits(scene: Scene) -> Array:
     """Largest accelerations that the joints of a cell are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,)."""
-    found = [acceleration_limit(robot, i)[0] for robot in scene.cell.robots for i in range(len(robot.model.joints))]
-    return np.array([np.inf if limit is None else limit for limit in found])
+    limits = [acceleration_limit(robot, i)[0] for robot in scene.cell.robots for i in range(len(robot.model.joints))]
+    return np.array([np.inf if limit is None else limit for limit in limits])
 
 
-def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Array) -> PlaceVerdict:
+def _known(job: MapJob, start: Array, margins: Array, speeds: Array, rates: Array) -> PlaceVerdict:
     """What is known of a motion that all tools follow, without the bodies: figures of its joints, shape (nq,) each."""
-    cell = asked.scene.cell
+    cell = job.scene.cell
     tight, times = int(np.argmin(margins)), np.maximum(speeds, np.sqrt(rates))
     fastest = int(np.argmax(times))
     known = PlaceVerdict(
@@ -185,7 +185,7 @@ def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Ar
         fast=joint_at(cell, fastest),
         speed=float(speeds.max()),
         acceleration=float(rates.max()),
-        cycle=float(asked.job.times[-1] * times[fastest]),
+        cycle=float(job.job.times[-1] * times[fastest]),
     )
     if margins[tight] < 0.0:
         return replace(known, verdict=Verdict.LIMIT)
@@ -194,7 +194,7 @@ def _known(asked: MapJob, start: Array, margins: Array, speeds: Array, rates: Ar
     return known
 
 
-def _with_contacts(asked: MapJob, known: dict[int, PlaceVerdict], q: Array, X_WB: Array) -> None:
+def _with_contacts(job: MapJob, known: dict[int, PlaceVerdict], q: Array, X_WB: Array) -> None:
     """Make collisions of those that pass in which two bodies are too near at a node, or one stands too deep in another.
 
     Args:
@@ -203,28 +203,28 @@ def _with_contacts(asked: MapJob, known: dict[int, PlaceVerdict], q: Array, X_WB
         q: All motions, shape (K, N, nq).
         X_WB: Bases of the robot, shape (K, 4, 4).
     """
-    passing = [motion for motion, each in known.items() if each.verdict is Verdict.PASSES]
-    found = contacts(asked.scene, asked.robot, X_WB[passing], q[passing])
-    for motion, contact in zip(passing, found, strict=True):
+    passing = [motion for motion, verdict in known.items() if verdict.verdict is Verdict.PASSES]
+    touching = contacts(job.scene, job.robot, X_WB[passing], q[passing])
+    for motion, contact in zip(passing, touching, strict=True):
         if contact is not None:
             known[motion] = replace(
                 known[motion],
                 verdict=Verdict.COLLISION,
                 pair=contact.pair,
                 distance=contact.distance,
-                at=float(asked.job.times[contact.node]),
+                at=float(job.job.times[contact.node]),
             )
 
 
-def best_first(found: Sequence[PlaceVerdict]) -> list[int]:
+def best_first(verdicts: Sequence[PlaceVerdict]) -> list[int]:
     """Places that pass: the shortest cycle first, of equal ones the widest margin, then the first one."""
-    passing = [place for place, each in enumerate(found) if each.verdict is Verdict.PASSES]
+    passing = [place for place, verdict in enumerate(verdicts) if verdict.verdict is Verdict.PASSES]
     return sorted(
-        passing, key=lambda place: (round(found[place].cycle or 0.0, 6), -round(found[place].margin or 0.0, 6))
+        passing, key=lambda place: (round(verdicts[place].cycle or 0.0, 6), -round(verdicts[place].margin or 0.0, 6))
     )
 
 
-def counts(found: Sequence[PlaceVerdict]) -> dict[Verdict, int]:
+def counts(verdicts: Sequence[PlaceVerdict]) -> dict[Verdict, int]:
     """How many places each verdict has, the best verdict first; places that are not judged only where there are any."""
-    number = Counter(each.verdict for each in found)
-    return {each: number[each] for each in reversed(Verdict) if number[each] or each is not Verdict.NOT_JUDGED}
+    number = Counter(verdict.verdict for verdict in verdicts)
+    return {kind: number[kind] for kind in reversed(Verdict) if number[kind] or kind is not Verdict.NOT_JUDGED}

@@ -81,16 +81,16 @@ class CellDistances:
         self.pairs, watched = layout_pairs(scene)
         areas, origins = keep_out_bodies(scene.cell)
         carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))] + [*areas, *origins]
-        added = [prepare(each.name, each.shape) for each in (*areas, *origins)]  # type: ignore[arg-type] # no half-space
+        added = [prepare(area.name, area.shape) for area in (*areas, *origins)]  # type: ignore[arg-type] # no half-space
         first = len(scene.engine.bodies)
-        at_base = {each.robot: first + len(areas) + place for place, each in enumerate(origins)}
+        at_base = {origin.robot: first + len(areas) + place for place, origin in enumerate(origins)}
         ends = [
             (first + area, body)
             for area in range(len(areas))
             for robot, origin in at_base.items()
             for body in (origin, *([self._moving.columns[robot]] if robot in self._moving.columns else []))
         ]
-        self.pairs, watched = with_areas(self.pairs, watched, ends, [each.name for each in carriers])
+        self.pairs, watched = with_areas(self.pairs, watched, ends, [carrier.name for carrier in carriers])
         self._engine = Engine([*scene.engine.bodies, *added]) if added else scene.engine
         changed = {index for index, _ in self._moving.of_tools(variables.placed(variables.given))}
         self._table = replace(
@@ -102,7 +102,9 @@ class CellDistances:
         self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
         self.most_demanded = float(self._demands.max(initial=0.0))
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
-        self._robots = np.array([-1 if each.robot is None else index[each.robot] for each in carriers], dtype=np.intp)
+        self._robots = np.array(
+            [-1 if carrier.robot is None else index[carrier.robot] for carrier in carriers], dtype=np.intp
+        )
 
     @classmethod
     def of(cls, scene: Scene, variables: LayoutVariables) -> "CellDistances":
@@ -122,9 +124,9 @@ class CellDistances:
 
     def of_variables(self, variables: LayoutVariables) -> "CellDistances":
         """The same pairs for other variables that change the same bodies."""
-        found = copy(self)
-        found._variables = variables
-        return found
+        distances = copy(self)
+        distances._variables = variables
+        return distances
 
     def near(self, x: Array, q: Array, within: float) -> LayoutDistances:
         """All pairs of one layout that are nearer than a distance.
@@ -137,18 +139,18 @@ class CellDistances:
         cell = self._variables.placed(x)
         table, engine = self._placed(cell)
         D = table.forest.displacements(q, _bases(cell))
-        found = table.find(engine, D, within)
+        nearby = table.find(engine, D, within)
         return LayoutDistances(
-            pairs=found.rows,
-            keys=found.samples,
-            distances=found.distances,
-            demands=self._demands[found.rows],
-            is_own=self._own[found.rows],
-            normals=found.normals,
-            first=found.first,
-            second=found.second,
-            by_joints=table.by_joints(D, found),
-            bodies=found.bodies,
+            pairs=nearby.rows,
+            keys=nearby.samples,
+            distances=nearby.distances,
+            demands=self._demands[nearby.rows],
+            is_own=self._own[nearby.rows],
+            normals=nearby.normals,
+            first=nearby.first,
+            second=nearby.second,
+            by_joints=table.by_joints(D, nearby),
+            bodies=nearby.bodies,
             D=D,
         )
 
@@ -160,26 +162,26 @@ class CellDistances:
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """
-        found, base = np.empty((len(near.pairs), dq.shape[2])), self._variables.base_twists(x)
+        derivatives, base = np.empty((len(near.pairs), dq.shape[2])), self._variables.base_twists(x)
         for key in range(len(dq)):
             rows = near.keys == key
-            found[rows] = near.by_joints[rows] @ dq[key]
-        self._add_by_bases(found, near, base)
-        self._add_by_shapes(found, near, x, base)
-        return found
+            derivatives[rows] = near.by_joints[rows] @ dq[key]
+        self._add_by_bases(derivatives, near, base)
+        self._add_by_shapes(derivatives, near, x, base)
+        return derivatives
 
     def _placed(self, cell: Cell) -> tuple[NearTable, Engine]:
         """The bodies as a layout has them."""
         placed = {**dict(self._moving.of_bases(_bases(cell))), **dict(self._moving.of_tools(cell))}
         bodies = self._engine.bodies
         other = dict[int, CollisionBody]()
-        for index, each in placed.items():
-            if each.shape is not None and each.shape is not bodies[index].shape and each.shape != bodies[index].shape:
-                other[index] = prepare(bodies[index].name, each.shape)
-        poses = {index: each.X_LS if each.shape is not None else far_away(index) for index, each in placed.items()}
+        for index, body in placed.items():
+            if body.shape is not None and body.shape is not bodies[index].shape and body.shape != bodies[index].shape:
+                other[index] = prepare(bodies[index].name, body.shape)
+        poses = {index: body.X_LS if body.shape is not None else far_away(index) for index, body in placed.items()}
         return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
-    def _add_by_bases(self, found: Array, near: LayoutDistances, base: Array) -> None:
+    def _add_by_bases(self, derivatives: Array, near: LayoutDistances, base: Array) -> None:
         """Add derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
         X_WB = near.D[[near_table(self._scene).forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
@@ -193,9 +195,9 @@ class CellDistances:
         for side, sign in ((0, -1.0), (1, 1.0)):
             for robot in range(len(base)):
                 rows = (ends[:, side] == robot) & (ends[:, 1 - side] != robot)
-                found[rows] += sign * forces[rows] @ twists[robot]
+                derivatives[rows] += sign * forces[rows] @ twists[robot]
 
-    def _add_by_shapes(self, found: Array, near: LayoutDistances, x: Array, base: Array) -> None:
+    def _add_by_shapes(self, derivatives: Array, near: LayoutDistances, x: Array, base: Array) -> None:
         """Add derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
         directions = dict[int, tuple[Indices, Array]]()
         for index, by, forward, back in self._changes(near, x, base):
@@ -205,7 +207,7 @@ class CellDistances:
             if len(rows):
                 change = (reaches(back, n) - reaches(forward, n)) / (2.0 * STEP)
                 columns = np.flatnonzero(by)
-                found[rows[:, None], columns] += change[:, None] * by[columns]
+                derivatives[rows[:, None], columns] += change[:, None] * by[columns]
 
     def _column(self, name: str, X_WB: Array) -> Placed:
         """The column of a robot at its base, as seen from the world."""
@@ -232,21 +234,21 @@ class CellDistances:
             for component in np.flatnonzero(by.any(axis=1)).tolist():
                 forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
                 yield index, by[component], forward, back
-        for each in self._variables.beside(x, STEP):
-            moved = (self._moving.that_differ(cell, each.robot) for cell in each.sides)
+        for neighbour in self._variables.beside(x, STEP):
+            moved = (self._moving.that_differ(cell, neighbour.robot) for cell in neighbour.sides)
             for (index, forward), (_, back) in zip(*moved, strict=True):
                 if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):
-                    yield index, each.by, forward, back
+                    yield index, neighbour.by, forward, back
 
 
 def _displaced(X: Array, component: int, step: float) -> Array:
     """A frame moved along an axis of the world, or turned about one through its origin."""
-    found = X.copy()
+    displaced = X.copy()
     if component < TURNS:
-        found[component, 3] += step
+        displaced[component, 3] += step
     else:
-        found[:3, :3] = rotation_about(np.eye(3)[component - TURNS], step) @ X[:3, :3]
-    return found
+        displaced[:3, :3] = rotation_about(np.eye(3)[component - TURNS], step) @ X[:3, :3]
+    return displaced
 
 
 def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:

@@ -32,14 +32,14 @@ def keep_out_bodies(cell: Cell) -> tuple[list[SceneBody], list[SceneBody]]:
 
 def in_areas(cell: Cell, p: Array) -> Flags:
     """Which places, shape (B, 3) in [m], lie in an area of a cell from above, shape (B,)."""
-    found = np.zeros(len(p), dtype=bool)
+    inside = np.zeros(len(p), dtype=bool)
     for area in () if cell.layout is None else cell.layout.keep_out:
         away = (p[:, :2] - area.X_WS[:2, 3]) @ area.X_WS[:2, :2]
         if isinstance(area.shape, Cylinder):
-            found |= np.linalg.norm(away, axis=1) < area.shape.radius
+            inside |= np.linalg.norm(away, axis=1) < area.shape.radius
         else:
-            found |= np.all(np.abs(away) < 0.5 * np.array(area.shape.size[:2]), axis=1)
-    return found
+            inside |= np.all(np.abs(away) < 0.5 * np.array(area.shape.size[:2]), axis=1)
+    return inside
 
 
 def _column(area: KeepOut) -> SceneBody:

@@ -40,22 +40,25 @@ def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
             is_fixed=carriers[first] == carriers[second],
         )
 
-    found = [pair(each.first, each.second, each.demand if each.rule is Rule.CLEARANCE else 0.0) for each in scene.pairs]
-    found += [pair(each.first, each.second, -each.limit) for each in scene.mounted]
+    watched_pairs = [
+        pair(watched.first, watched.second, watched.demand if watched.rule is Rule.CLEARANCE else 0.0)
+        for watched in scene.pairs
+    ]
+    watched_pairs += [pair(mounted.first, mounted.second, -mounted.limit) for mounted in scene.mounted]
     first = len(scene.pairs)
-    solids = [(first + k, each) for k, each in enumerate(scene.mounted) if not is_ground(bodies[each.second])]
-    grounds = [(first + k, each) for k, each in enumerate(scene.mounted) if is_ground(bodies[each.second])]
+    solids = [(first + k, mounted) for k, mounted in enumerate(scene.mounted) if not is_ground(bodies[mounted.second])]
+    grounds = [(first + k, mounted) for k, mounted in enumerate(scene.mounted) if is_ground(bodies[mounted.second])]
     count = len(known.solids)
     rows = [*known.rows[:count], *(row for row, _ in solids), *known.rows[count:], *(row for row, _ in grounds)]
     pairs = WatchedPairs(
         rows=np.array(rows, dtype=np.intp),
-        solids=np.concatenate([known.solids, _ends([(each.first, each.second) for _, each in solids])]),
-        above=np.array([*known.above, *(each.first for _, each in grounds)], dtype=np.intp),
-        planes=np.concatenate([known.planes, _poses([bodies[each.second].X_BS for _, each in grounds])]),
-        demands=np.array([found[row].demand for row in rows]),
-        once=np.array([found[row].is_fixed for row in rows], dtype=bool),
+        solids=np.concatenate([known.solids, _ends([(solid.first, solid.second) for _, solid in solids])]),
+        above=np.array([*known.above, *(ground.first for _, ground in grounds)], dtype=np.intp),
+        planes=np.concatenate([known.planes, _poses([bodies[ground.second].X_BS for _, ground in grounds])]),
+        demands=np.array([watched_pairs[row].demand for row in rows]),
+        once=np.array([watched_pairs[row].is_fixed for row in rows], dtype=bool),
     )
-    return tuple(found), pairs
+    return tuple(watched_pairs), pairs
 
 
 def with_areas(
@@ -85,10 +88,10 @@ def are_own(pairs: Sequence[LayoutPair]) -> Flags:
     return np.array([pair.is_own for pair in pairs], dtype=bool)
 
 
-def among(pairs: WatchedPairs, kept: Flags) -> WatchedPairs:
+def among(pairs: WatchedPairs, is_selected: Flags) -> WatchedPairs:
     """Some of the pairs, by what they are called: ``kept`` has an entry for each row."""
     count = len(pairs.solids)
-    is_kept = kept[pairs.rows]
+    is_kept = is_selected[pairs.rows]
     solids, above = is_kept[:count], is_kept[count:]
     return replace(
         pairs,

@@ -47,19 +47,19 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     rates = _Rates(job, layout, q, qd, directions)
     nq, begins, last = q.shape[1], job.is_begin.tolist(), len(q) - 1
     before = np.zeros((BACK + len(q), 2 * nq, directions.count))  # nodes that there are not, then all nodes
-    blocks, found, at = before.reshape(-1, nq * directions.count), before[BACK:], rates.start(directions.start)
+    blocks, states, at = before.reshape(-1, nq * directions.count), before[BACK:], rates.start(directions.start)
     shares = _shares(job)
     for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
-        np.matmul(taking, at, out=found[node])
-        found[node] += adding
+        np.matmul(taking, at, out=states[node])
+        states[node] += adding
         if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
-            at = found[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * found[
+            at = states[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * states[
                 node - 1 : node + 1, nq:
             ].sum(axis=0)
-            found[node] = taking @ at + adding
+            states[node] = taking @ at + adding
         if node < last:
             at = (shares[node] @ blocks[2 * node : 2 * (node + BACK + 1)]).reshape(nq, -1)
-    return MotionDerivatives(q=found[:, :nq], qd=found[:, nq:], rates=np.ascontiguousarray(rates.by_joints[:, nq:]))
+    return MotionDerivatives(q=states[:, :nq], qd=states[:, nq:], rates=np.ascontiguousarray(rates.by_joints[:, nq:]))
 
 
 def _shares(job: Job) -> Array:
@@ -105,14 +105,14 @@ class _Rates:
         twists = changes.twists()
         twists += J @ bent
         bent -= inverse @ twists
-        beside = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
-        self._beside = beside.reshape(len(q), -1, directions.count)
+        driven = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
+        self._beside = driven.reshape(len(q), -1, directions.count)
         by_joints = np.ascontiguousarray(bent[:, :, :nq])
         self.by_joints, self.by_layout = (np.empty((len(q), 2 * nq, width)) for width in (nq, directions.count))
-        kept, closed = self.by_joints[:, :nq], self.by_layout[:, :nq]
-        np.subtract(np.eye(nq), inverse @ J, out=kept)
+        projection, closed = self.by_joints[:, :nq], self.by_layout[:, :nq]
+        np.subtract(np.eye(nq), inverse @ J, out=projection)
         np.matmul(inverse, self._beside, out=closed)
-        np.matmul(by_joints, kept, out=self.by_joints[:, nq:])
+        np.matmul(by_joints, projection, out=self.by_joints[:, nq:])
         np.add(by_joints @ closed, bent[:, :, nq:], out=self.by_layout[:, nq:])
 
     def start(self, start: Array) -> Array:
@@ -133,9 +133,9 @@ class _Rates:
 
 def _lower_inverse(L: Array) -> Array:
     """Inverses of lower triangular matrices, shape (N, m, m), row by row."""
-    found = np.zeros_like(L)
+    inverse = np.zeros_like(L)
     for row in range(L.shape[1]):
-        found[:, row, row] = 1.0
-        found[:, row, :row] = -(L[:, row, None, :row] @ found[:, :row, :row])[:, 0]
-        found[:, row] /= L[:, row, row, None]
-    return found
+        inverse[:, row, row] = 1.0
+        inverse[:, row, :row] = -(L[:, row, None, :row] @ inverse[:, :row, :row])[:, 0]
+        inverse[:, row] /= L[:, row, row, None]
+    return inverse

@@ -101,9 +101,9 @@ class Crests:
         """Derivatives of some of them from those of the values at the nodes, shape (N, n, p) to (M, p)."""
         last = len(self.value) - 1
         shares = self.shares[nodes, columns]
-        found = shares[:, 1, None] * of_values[nodes, columns]
-        found += shares[:, 0, None] * of_values[np.maximum(nodes - 1, 0), columns]
-        return found + shares[:, 2, None] * of_values[np.minimum(nodes + 1, last), columns]
+        derivatives = shares[:, 1, None] * of_values[nodes, columns]
+        derivatives += shares[:, 0, None] * of_values[np.maximum(nodes - 1, 0), columns]
+        return derivatives + shares[:, 2, None] * of_values[np.minimum(nodes + 1, last), columns]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,16 +123,16 @@ class Figures:
             NotFiniteError: A figure of a motion that follows all paths is no finite number.
         """
         limits, times = job.limits, job.times
-        found = cls(
+        figures = cls(
             beyond_lower=Peaks.of(times, limits.lower - motions.q),
             beyond_upper=Peaks.of(times, motions.q - limits.upper),
             speeds=Peaks.of(times, motions.qd / limits.velocity, in_magnitude=True),
             accelerations=Peaks.of(times, job.rates @ (motions.qd / limits.acceleration), in_magnitude=True),
         )
-        peaks = (found.beyond_lower, found.beyond_upper, found.speeds, found.accelerations)
+        peaks = (figures.beyond_lower, figures.beyond_upper, figures.speeds, figures.accelerations)
         for name, peak in zip(FIGURES, peaks, strict=True):
             refuse_not_finite(name, peak.value[motions.is_followed], lambda column: joint_at(job.cell, column))
-        return found
+        return figures
 
     @property
     def margins(self) -> Array:

@@ -16,7 +16,7 @@ class JacobianChanges:
         idle: 1 for components that a relation leaves open, whose rows are 0, shape (6 T,).
     """
 
-    def __init__(self, job: Job, screws: TaskScrews, own: Array, shared: Array, *, at_tips: bool = False) -> None:
+    def __init__(self, job: Job, screws: TaskScrews, local: Array, shared: Array, *, at_tips: bool = False) -> None:
         """Note the screws and how fast their axes move.
 
         Args:
@@ -26,15 +26,15 @@ class JacobianChanges:
             shared: Rates of the axes of the positioner, shape (N, levels).
             at_tips: Whether all twists are taken at the tips.
         """
-        self._screws, self._nq, found = screws, job.cell.joint_count, job.constraints
-        self._has_own = (found.operator_signs > 0.0) | (found.carrier_signs > 0.0)
-        self._is_carried = found.carrier_signs < 0.0
+        self._screws, self._nq, constraints = screws, job.cell.joint_count, job.constraints
+        self._has_own = (constraints.operator_signs > 0.0) | (constraints.carrier_signs > 0.0)
+        self._is_carried = constraints.carrier_signs < 0.0
         self._ways, self._holder = ways(job)
-        self._is_whole = found.is_whole and not at_tips
-        self.idle = (1.0 - found.kept).ravel()
+        self._is_whole = constraints.is_whole and not at_tips
+        self.idle = (1.0 - constraints.kept).ravel()
         if not self._is_whole:
             self._rows = constrained_rows(job, screws.tip)
-        self._turning = screws.own * own[..., None]
+        self._turning = screws.own * local[..., None]
         self._twist = self._turning.sum(axis=2, keepdims=True)  # of each tool seen from the base, (N, T, 1, 6)
         self._carried = screws.shared * shared[..., None]
         self._minus = np.broadcast_to(-screws.shared[:, None], screws.own.shape)  # the part moves, not the tool
@@ -42,9 +42,9 @@ class JacobianChanges:
     @classmethod
     def of(cls, job: Job, screws: TaskScrews, qd: Array) -> "JacobianChanges":
         """Those at joint speeds at the nodes, shape (N, nq)."""
-        own, holder = ways(job)
+        local, holder = ways(job)
         shared = np.zeros(screws.shared.shape[:2]) if holder is None else holder.axis_rates(qd)
-        return cls(job, screws, np.stack([way.axis_rates(qd) for way in own], axis=1), shared)
+        return cls(job, screws, np.stack([way.axis_rates(qd) for way in local], axis=1), shared)
 
     @property
     def jacobian(self) -> Array:
@@ -57,15 +57,15 @@ class JacobianChanges:
         behind = twist - np.cumsum(self._turning, axis=2)
         before = np.cumsum(carried, axis=1) - carried
         turned, whole = bracket_matrix(twist[:, :, 0]), carried.sum(axis=1)
-        own = bracket(screws.own, behind)
+        local = bracket(screws.own, behind)
         shared = self._minus @ turned + bracket(screws.shared, before)[:, None]
         held = screws.held @ bracket_matrix(whole)
         layout = screws.based @ turned + held[:, None] * self._is_carried[:, None, None]
         if not self._is_whole:
             spin = twist[..., 3:] - self._is_carried[:, None, None] * whole[:, None, None, 3:]
-            for part, tips in zip((own, shared, layout), self._tips(), strict=True):
+            for part, tips in zip((local, shared, layout), self._tips(), strict=True):
                 part[..., :3] += cross(spin, tips)
-        return self._columns(own, shared, layout)
+        return self._columns(local, shared, layout)
 
     def forces(self, multipliers: Array) -> Array:
         """Change of ``J^T lambda`` per unit of each joint and direction, shape (N, nq, nq + p)."""
@@ -80,7 +80,7 @@ class JacobianChanges:
         by_own = (power @ np.swapaxes(screws.own, -1, -2)) * below
         by_shared, by_layout = -power @ np.swapaxes(screws.shared, -1, -2)[:, None], _products(power, screws.based)
         shared = (held_power @ np.swapaxes(screws.shared, -1, -2)) * below.T, _products(held_power, screws.held)
-        found = np.zeros((nodes, self._nq, self._nq + screws.held.shape[1]))
+        forces = np.zeros((nodes, self._nq, self._nq + screws.held.shape[1]))
         tips = None if self._is_whole else self._tips()
         for place, way in enumerate(self._ways):
             blocks = [by_own[:, place], by_shared[:, place], by_layout[:, place]]
@@ -88,37 +88,39 @@ class JacobianChanges:
                 pull = cross(y[:, place, None, :3], screws.own[:, place, :, 3:])
                 blocks = [block + _products(pull, part[:, place]) for block, part in zip(blocks, tips, strict=True)]
             if self._has_own[place]:
-                self._put(found, way, place, blocks)
+                self._put(forces, way, place, blocks)
             if tips is not None and self._is_carried[place] and self._holder is not None:
                 pull = -cross(y[:, place, None, :3], screws.shared[..., 3:])
-                self._put(found, self._holder, place, [_products(pull, part[:, place]) for part in tips])
+                self._put(forces, self._holder, place, [_products(pull, part[:, place]) for part in tips])
         if self._holder is not None:
             way = self._holder
-            found[:, way.columns, way.columns] += way.to_joints.T @ shared[0] @ way.to_joints
-            found[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
-        return found
+            forces[:, way.columns, way.columns] += way.to_joints.T @ shared[0] @ way.to_joints
+            forces[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
+        return forces
 
-    def _put(self, found: Array, rows: "Way", place: int, blocks: list[Array]) -> None:
+    def _put(self, changes: Array, rows: "Way", place: int, blocks: list[Array]) -> None:
         """Add blocks by the own axes, the shared axes and the directions to the rows of a robot's joints."""
-        own, shared, layout = (rows.to_joints.T @ block for block in blocks)
+        local, shared, layout = (rows.to_joints.T @ block for block in blocks)
         if self._has_own[place]:
             way = self._ways[place]
-            found[:, rows.columns, way.columns] += own @ way.to_joints
+            changes[:, rows.columns, way.columns] += local @ way.to_joints
         if self._is_carried[place] and self._holder is not None:
-            found[:, rows.columns, self._holder.columns] += shared @ self._holder.to_joints
-        found[:, rows.columns, self._nq :] += layout
+            changes[:, rows.columns, self._holder.columns] += shared @ self._holder.to_joints
+        changes[:, rows.columns, self._nq :] += layout
 
-    def _columns(self, own: Array, shared: Array, layout: Array) -> Array:
+    def _columns(self, local: Array, shared: Array, layout: Array) -> Array:
         """Twists by own axes and shared axes, (N, T, levels, 6), and directions, (N, T, p, 6), as (N, 6 T, nq + p)."""
         nodes, count = layout.shape[0], layout.shape[2]
-        found = np.zeros((nodes, len(self._ways), 6, self._nq + count))
+        columns = np.zeros((nodes, len(self._ways), 6, self._nq + count))
         for place, way in enumerate(self._ways):
             if self._has_own[place]:
-                found[:, place, :, way.columns] += np.swapaxes(own[:, place], 1, 2) @ way.to_joints
+                columns[:, place, :, way.columns] += np.swapaxes(local[:, place], 1, 2) @ way.to_joints
             if self._is_carried[place] and self._holder is not None:
-                found[:, place, :, self._holder.columns] += np.swapaxes(shared[:, place], 1, 2) @ self._holder.to_joints
-        found[..., self._nq :] += np.swapaxes(layout, 2, 3)
-        return self.in_rows(found).reshape(nodes, -1, self._nq + count)
+                columns[:, place, :, self._holder.columns] += (
+                    np.swapaxes(shared[:, place], 1, 2) @ self._holder.to_joints
+                )
+        columns[..., self._nq :] += np.swapaxes(layout, 2, 3)
+        return self.in_rows(columns).reshape(nodes, -1, self._nq + count)
 
     def in_rows(self, twists: Array) -> Array:
         """The constrained components of twists at the origin of R, shape (N, T, 6, n)."""
@@ -128,8 +130,8 @@ class JacobianChanges:
         """Displacement of the tips seen from R per unit of own axes, shared axes and directions, (N, T, ..., 3)."""
         screws = self._screws
         moved = (screws.own, self._minus, screws.based + screws.tooled)
-        own, shared, layout = (part[..., :3] + cross(part[..., 3:], screws.tip[:, :, None]) for part in moved)
-        return own, shared, layout
+        local, shared, layout = (part[..., :3] + cross(part[..., 3:], screws.tip[:, :, None]) for part in moved)
+        return local, shared, layout
 
 
 class Way:
@@ -153,22 +155,22 @@ class Way:
 
 def ways(job: Job) -> tuple[list[Way], Way | None]:
     """Those of the robot of each relation, and of the positioner."""
-    found = job.constraints
-    return [Way.of(job, int(robot)) for robot in found.operators], (
-        None if found.carrier is None else Way.of(job, found.carrier)
+    constraints = job.constraints
+    return [Way.of(job, int(robot)) for robot in constraints.operators], (
+        None if constraints.carrier is None else Way.of(job, constraints.carrier)
     )
 
 
 def constrained_rows(job: Job, tip: Array) -> Array:
     """Matrices that take the constrained components from twists at the origin of R, shape (N, T, 6, 6)."""
-    found = job.constraints
+    constraints = job.constraints
     rows = np.zeros((*tip.shape[:2], 6, 6))
     rows[..., :, :] = np.eye(6)
     rows[..., :3, 3:] = -np.cross(tip[..., None, :], np.eye(3)).swapaxes(-1, -2)
-    free = found.is_spin_free
+    free = constraints.is_spin_free
     R = np.moveaxis(job.X[:3, :3], (0, 1, 2, 3), (2, 3, 1, 0))[:, free]
     rows[:, free, 3:, 3:] = np.swapaxes(R, -1, -2)
-    return rows * found.kept[:, :, None]
+    return rows * constraints.kept[:, :, None]
 
 
 def _products(first: Array, second: Array) -> Array:

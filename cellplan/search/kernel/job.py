@@ -72,8 +72,10 @@ class Job:
         _, V = desired_motion(schedule.paths, closures(cell, moving))(times, begins, ends)
         is_double = np.append(np.diff(times) == 0.0, False)
         is_smooth = np.abs(V[..., 1:] - V[..., :-1]).max(axis=(0, 1)) <= SAME_TWIST
-        kept = ~(is_double & np.append(is_smooth, False))
-        return cls.at_nodes(cell, schedule, moving=moving, nodes=(times[kept], begins[kept], ends[kept]))
+        is_distinct = ~(is_double & np.append(is_smooth, False))
+        return cls.at_nodes(
+            cell, schedule, moving=moving, nodes=(times[is_distinct], begins[is_distinct], ends[is_distinct])
+        )
 
     @classmethod
     def at_nodes(

@@ -135,12 +135,12 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
     start, at = layouts.start.T, np.ascontiguousarray(np.moveaxis(q, 2, 0))
     with np.errstate(all="ignore"):
         first = repeated((job.X[..., :1], job.V[..., :1]), count)
-        own = layouts.placement(job)
-        start, arrived = settled(job.tasks, first, own, start, mobile=job.settling, accuracy=START_TOL)
+        placement = layouts.placement(job)
+        start, arrived = settled(job.tasks, first, placement, start, mobile=job.settling, accuracy=START_TOL)
         passes = _Passes(
             job=job,
             start=start[:, :, None],
-            placement=own.repeated(nodes),
+            placement=placement.repeated(nodes),
             desired=repeated((job.X, job.V), count),
             weights=np.repeat(layouts.weights.T, nodes, axis=1),
             rates=rates,
@@ -186,10 +186,10 @@ class _Passes:
 
 def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
     """Changes of the joints, shape (nq, K, N), and what the other speeds there add to them later, by Heun's rule."""
-    found = np.ascontiguousarray(np.moveaxis(change, 2, 0))
-    added, speed = np.zeros_like(found[0]), rates[0] @ found[0]
+    changed = np.ascontiguousarray(np.moveaxis(change, 2, 0))
+    added, speed = np.zeros_like(changed[0]), rates[0] @ changed[0]
     for node, step in enumerate(np.diff(job.times).tolist(), start=1):
-        at, rate = found[node], rates[node]
+        at, rate = changed[node], rates[node]
         at += added
         ahead = rate @ (at + step * speed)
         speed += ahead
@@ -197,7 +197,7 @@ def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
         added += speed
         at += speed
         speed = rate @ at
-    return np.moveaxis(found, 0, 2)
+    return np.moveaxis(changed, 0, 2)
 
 
 def _completed(job: Job, layouts: Layouts, at: Array, speeds: Array, *, is_settled: NDArray[np.bool_]) -> Motions:

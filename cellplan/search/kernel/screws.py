@@ -55,30 +55,34 @@ class TaskScrews:
     @classmethod
     def of(cls, job: Job, layout: Layouts, q: Array, directions: Directions) -> "TaskScrews":
         """Those of one layout at configurations in [rad] or [m], shape (N, nq)."""
-        chains, found = job.tasks.chains, job.constraints
+        chains, constraints = job.tasks.chains, job.constraints
         state = chains.state(np.ascontiguousarray(q.T), layout.placement(job))
         axes, points, tips = (np.ascontiguousarray(part.T) for part in (state.axes, state.points, state.p_WT))
         R_WT = np.ascontiguousarray(np.swapaxes(state.R_WT.T, -1, -2))
         R_WP, p_WP = _part_poses(job, R_WT, tips)
-        on_part, own, turning = found.is_on_part[:, None], found.operators, chains.is_turning.T[:, :, None]
+        on_part, operators, turning = (
+            constraints.is_on_part[:, None],
+            constraints.operators,
+            chains.is_turning.T[:, :, None],
+        )
         R = np.where(on_part[:, :, None], R_WP[:, None], np.eye(3))
         p = np.where(on_part, p_WP[:, None], np.zeros(3))
         bases, tools = np.swapaxes(directions.base, 1, 2), np.swapaxes(directions.tool, 1, 2)
         R_FW = layout.X_FT[0, :, :3, :3] @ np.swapaxes(R_WT, -1, -2)
         shared, held = np.zeros((*axes[:, 0].shape[:2], 6)), np.zeros((len(q), directions.count, 6))
-        based, tooled = np.zeros((2, len(q), len(own), directions.count, 6))
+        based, tooled = np.zeros((2, len(q), len(operators), directions.count, 6))
         if directions.count:
-            based += bases[own] @ _adjoint(R, p - layout.X_WB[0, own, :3, 3])
-            tooled += tools[own] @ _adjoint(R, p - tips[:, own], R_FW[:, own])
-        if (holder := found.carrier) is not None:
+            based += bases[operators] @ _adjoint(R, p - layout.X_WB[0, operators, :3, 3])
+            tooled += tools[operators] @ _adjoint(R, p - tips[:, operators], R_FW[:, operators])
+        if (holder := constraints.carrier) is not None:
             shared = unit_screws(axes[:, holder], points[:, holder], turning[holder], R_WP, p_WP)
             held += tools[holder] @ _adjoint(R_WP, p_WP - tips[:, holder], R_FW[:, holder])
             moved = bases[holder] @ _adjoint(R_WP, p_WP - layout.X_WB[0, holder, :3, 3]) + held
-            based[:, found.carrier_signs < 0.0] -= moved[:, None]
+            based[:, constraints.carrier_signs < 0.0] -= moved[:, None]
         return cls(
-            own=unit_screws(axes[:, own], points[:, own], turning[own], R, p),
+            own=unit_screws(axes[:, operators], points[:, operators], turning[operators], R, p),
             shared=shared,
-            tip=((tips[:, own] - p)[..., None, :] @ R)[..., 0, :],
+            tip=((tips[:, operators] - p)[..., None, :] @ R)[..., 0, :],
             based=based,
             tooled=tooled,
             held=held,

@@ -43,8 +43,8 @@ class SingularValues:
     def of(cls, job: Job, layout: Layouts, q: Array, directions: Callable[[], Directions]) -> "SingularValues":
         """Those of one layout at joint positions in [rad] or [m], shape (N, nq)."""
         screws = TaskScrews.of(job, layout, q, Directions.none(job, 0))
-        found = [_least(J, kept) for J, kept in _jacobians(job, screws)]
-        values = np.stack([*found, np.zeros(len(q))], axis=1)[:, :-1]
+        least = [_least(J, is_constrained) for J, is_constrained in _jacobians(job, screws)]
+        values = np.stack([*least, np.zeros(len(q))], axis=1)[:, :-1]
         return cls(job=job, layout=layout, q=q, directions=directions, values=values)
 
     @property
@@ -62,25 +62,25 @@ class SingularValues:
         """
         used, place = np.unique(nodes, return_inverse=True)
         by_joints, by_layout = self._partial(used.astype(np.intp))
-        found: Array = (by_joints[place, subjects][:, None] @ by[nodes])[:, 0]
-        found[:, by.shape[2] - by_layout.shape[2] :] += by_layout[place, subjects]
-        return found
+        derivatives: Array = (by_joints[place, subjects][:, None] @ by[nodes])[:, 0]
+        derivatives[:, by.shape[2] - by_layout.shape[2] :] += by_layout[place, subjects]
+        return derivatives
 
     def _partial(self, nodes: Indices) -> tuple[Array, Array]:
         """Derivatives by the joints, shape (U, A, nq), and by the directions at given joints, shape (U, A, p)."""
         directions, nq = self.directions(), self.q.shape[1]
         job = replace(self.job, X=self.job.X[..., nodes])
         screws = TaskScrews.of(job, self.layout, self.q[nodes], directions)
-        own, _ = ways(job)
+        local, _ = ways(job)
         left, rates = np.zeros((*screws.tip.shape[:2], 6)), np.zeros(screws.own.shape[:3])
-        for place, (J, kept) in zip(arms(job), _jacobians(job, screws), strict=True):
-            last = _count(J, kept) - 1
+        for place, (J, is_constrained) in zip(arms(job), _jacobians(job, screws), strict=True):
+            last = _count(J, is_constrained) - 1
             u, _, v = np.linalg.svd(J)
-            left[:, place], rates[:, place] = u[:, :, last], v[:, last] @ own[place].to_joints.T
+            left[:, place], rates[:, place] = u[:, :, last], v[:, last] @ local[place].to_joints.T
         changes = JacobianChanges(job, screws, rates, np.zeros(screws.shared.shape[:2]), at_tips=True)
         twists = changes.twists().reshape(*left.shape, -1)[:, list(arms(job))]
-        found = (left[:, list(arms(job)), None] @ twists)[:, :, 0]
-        return found[..., :nq], found[..., nq:]
+        partial = (left[:, list(arms(job)), None] @ twists)[:, :, 0]
+        return partial[..., :nq], partial[..., nq:]
 
 
 def arms(job: Job) -> tuple[int, ...]:
@@ -101,32 +101,35 @@ def usual_values(job: Job) -> Array:
     state = chains.state(np.ascontiguousarray(q.T), Layouts.of([cell], np.zeros((1, cell.joint_count))).placement(job))
     axes, points, tips = (np.ascontiguousarray(part.T) for part in (state.axes, state.points, state.p_WT))
     R_WT, turning = np.swapaxes(state.R_WT.T, -1, -2), chains.is_turning.T[:, :, None]
-    own, _ = ways(job)
-    found = []
+    local, _ = ways(job)
+    values = []
     for place in arms(job):
         robot = int(job.constraints.operators[place])
         J = unit_screws(axes[:, robot], points[:, robot], turning[robot], R_WT[:, robot], tips[:, robot])
-        found.append(np.median(_least(np.swapaxes(J, 1, 2) @ own[place].to_joints, job.constraints.kept[place])))
-    return np.array(found)
+        values.append(np.median(_least(np.swapaxes(J, 1, 2) @ local[place].to_joints, job.constraints.kept[place])))
+    return np.array(values)
 
 
 def _jacobians(job: Job, screws: TaskScrews) -> list[tuple[Array, Flags]]:
     """The Jacobian of each arm, the rows that are left open 0, shape (N, 6, n), and which rows are constrained."""
-    rows, (own, _) = constrained_rows(job, screws.tip), ways(job)
+    rows, (local, _) = constrained_rows(job, screws.tip), ways(job)
     return [
-        (rows[:, place] @ (np.swapaxes(screws.own[:, place], 1, 2) @ own[place].to_joints), job.constraints.kept[place])
+        (
+            rows[:, place] @ (np.swapaxes(screws.own[:, place], 1, 2) @ local[place].to_joints),
+            job.constraints.kept[place],
+        )
         for place in arms(job)
     ]
 
 
-def _least(J: Array, kept: Flags) -> Array:
+def _least(J: Array, is_constrained: Flags) -> Array:
     """Least of the ``min(m, n)`` singular values of matrices (N, 6, n), m of whose rows count, shape (N,)."""
-    rows = J[:, kept]
+    rows = J[:, is_constrained]
     turned = np.swapaxes(rows, 1, 2)
     square = rows @ turned if rows.shape[1] <= rows.shape[2] else turned @ rows
     return np.sqrt(np.maximum(np.linalg.eigvalsh(square)[:, 0], 0.0)).astype(np.float64)
 
 
-def _count(J: Array, kept: Flags) -> int:
+def _count(J: Array, is_constrained: Flags) -> int:
     """Number of singular values that count."""
-    return min(int(kept.sum()), J.shape[2])
+    return min(int(is_constrained.sum()), J.shape[2])

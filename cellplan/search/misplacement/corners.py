@@ -45,15 +45,15 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
         effort: Where distances are asked, and within which distance beyond the demand.
     """
     motions = run(problem.job, problem.variables.layouts(d, np.tile(start, (len(d), 1))))
-    found = []
+    corners = []
     for place, is_followed in enumerate(motions.is_followed.tolist()):
         if not is_followed:
-            found.append(_lost(problem, d[place], start))
+            corners.append(_lost(problem, d[place], start))
             continue
         q, qd = motions.q[place], motions.qd[place]
         point = Point(x=d[place], start=q[0], q=q, qd=qd, qdd=problem.job.rates @ qd)
-        found.append(_measured(problem, Measures.of(problem, point, demands, effort)))
-    return found
+        corners.append(_measured(problem, Measures.of(problem, point, demands, effort)))
+    return corners
 
 
 def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:

@@ -104,10 +104,10 @@ class BaseDisplacements:
 
     def base_twists(self, d: Array) -> Array:
         """What each displacement does to each base: velocity of its origin, angular velocity, (robots, 6, m)."""
-        found = np.zeros((len(self.variables.base.robots), 6, len(d)))
+        twists = np.zeros((len(self.variables.base.robots), 6, len(d)))
         for column, (robot, component) in enumerate(zip(self.robots, self.components, strict=True)):
-            found[robot, TWIST_ROWS[component], column] = 1.0
-        return found
+            twists[robot, TWIST_ROWS[component], column] = 1.0
+        return twists
 
     def beside(self, d: Array, step: float) -> tuple[Beside, ...]:  # noqa: ARG002 - of the protocol
         """Nothing: a displaced base changes no tool and no grasp."""
@@ -146,5 +146,5 @@ def _stands_on_plane(cell: Cell, robot: Robot) -> bool:
     """Whether the origin of a base without a column lies in a plane of the environment: it cannot be lower."""
     if robot.pedestal is not None:
         return False
-    planes = [each.X_WS for each in cell.obstacles if isinstance(each.shape, HalfSpace)]
+    planes = [obstacle.X_WS for obstacle in cell.obstacles if isinstance(obstacle.shape, HalfSpace)]
     return any(abs(float(X[:3, 2] @ (robot.X_WB[:3, 3] - X[:3, 3]))) <= ON_PLANE for X in planes)

@@ -45,10 +45,10 @@ class GuardedProblem(LayoutProblem):
     def __post_init__(self) -> None:
         """Note which arms are guarded."""
         LayoutProblem.__post_init__(self)
-        kept, robots = self.job.constraints.kept.sum(axis=1), self.job.cell.robots
+        constrained, robots = self.job.constraints.kept.sum(axis=1), self.job.cell.robots
         joints = [len(robots[int(robot)].model.joints) for robot in self.job.constraints.operators]
-        found = [count for count, place in enumerate(arms(self.job)) if joints[place] >= kept[place]]
-        object.__setattr__(self, "guards", np.array(found, dtype=np.intp))
+        redundant = [count for count, place in enumerate(arms(self.job)) if joints[place] >= constrained[place]]
+        object.__setattr__(self, "guards", np.array(redundant, dtype=np.intp))
 
     @classmethod
     def like(
@@ -77,24 +77,26 @@ class GuardedProblem(LayoutProblem):
         if not len(self.guards):
             return bodies
         at, subjects = np.repeat(nodes, len(self.guards)), np.tile(self.guards, len(nodes))
-        found = _Found(bodies=bodies, arms=self.arms(point), nodes=at, subjects=subjects)
+        measured = _Found(bodies=bodies, arms=self.arms(point), nodes=at, subjects=subjects)
         pairs = len(self.bodies.pairs) + np.tile(np.arange(len(self.guards)), len(nodes))
         return Distances(
             pairs=np.append(bodies.pairs, pairs).astype(np.intp),
             nodes=np.append(bodies.nodes, at).astype(np.intp),
-            values=np.append(bodies.values, LENGTH * found.arms.values[at, subjects]),
+            values=np.append(bodies.values, LENGTH * measured.arms.values[at, subjects]),
             demands=np.append(bodies.demands, np.zeros(len(at))),
             is_own=np.append(bodies.is_own, np.ones(len(at), dtype=bool)).astype(bool),
-            found=found,
+            found=measured,
         )
 
-    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        if not isinstance(found.found, _Found):
-            return LayoutProblem.distance_derivatives(self, point, found, by_joints)
-        own = found.found
-        bodies = LayoutProblem.distance_derivatives(self, point, own.bodies, by_joints)
-        return np.concatenate([bodies, LENGTH * own.arms.derivatives(own.nodes, own.subjects, by_joints.q)])
+        if not isinstance(distances.found, _Found):
+            return LayoutProblem.distance_derivatives(self, point, distances, by_joints)
+        measured = distances.found
+        bodies = LayoutProblem.distance_derivatives(self, point, measured.bodies, by_joints)
+        return np.concatenate(
+            [bodies, LENGTH * measured.arms.derivatives(measured.nodes, measured.subjects, by_joints.q)]
+        )
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""

@@ -90,10 +90,10 @@ class RobustSearch:
         if point is None:
             return None
         of = self.displaced(x)
-        found = worst(of, replace(point, x=of.given), self.demands, self.effort)
+        worst_case = worst(of, replace(point, x=of.given), self.demands, self.effort)
         if not self._scenarios:
-            self._begin(of, found, point.start)
-        demands = replace(self.demands, beyond=found.distances + self._beyond)
+            self._begin(of, worst_case, point.start)
+        demands = replace(self.demands, beyond=worst_case.distances + self._beyond)
         scenarios = ScenarioProblem.of(self.problem, self.displacements, np.array(self._scenarios))
         improved = improve(scenarios, x, point.start, demands, self.effort)
         if improved is None and len(self._scenarios) > 1:  # one is out of reach by now
@@ -109,34 +109,34 @@ class RobustSearch:
             for corner in robust.corners
             if corner.cycle >= (1.0 - NEAR) * robust.cycle or corner.margins.min() < NEAR_ANGLE
         ]
-        known = {each.tobytes() for each in self._scenarios}
+        known = {scenario.tobytes() for scenario in self._scenarios}
         other = RobustSearch(problem=problem, displacements=self.displacements, demands=self.demands, effort=effort)
         other._beyond = self._beyond.copy()
         other._scenarios = [robust.problem.given, *(d for d in near if d.tobytes() in known)]
         return other
 
-    def cornered(self, found: Improved, signs: Array) -> Robust | None:
+    def cornered(self, improved: Improved, signs: Array) -> Robust | None:
         """A layout with all its corners planned anew: the worst by derivatives, the ends, seeded ones of signs (C, m).
 
         None without a motion.
         """
-        of = self.displaced(found.x)
-        point = self.problem.evaluate(found.x, found.start)
+        of = self.displaced(improved.x)
+        point = self.problem.evaluate(improved.x, improved.start)
         if point is None:
             return None
         listed = worst(of, replace(point, x=of.given), self.demands, self.effort).corners
         ends = np.concatenate([np.diag(of.upper), -np.diag(of.upper)])
         d = np.concatenate([of.given[None], listed, ends, signs * of.upper])
-        nominal, *corners = judged(of, d, found.start, self.demands, replace(self.effort, within=WITHIN))
+        nominal, *corners = judged(of, d, improved.start, self.demands, replace(self.effort, within=WITHIN))
         return Robust(
-            found=replace(found, point=point),
+            found=replace(improved, point=point),
             corners=tuple(corners),
             worst_ones=len(listed),
             ends=len(ends),
             nominal=nominal.cycle,
             cycle=max(nominal.cycle, *(corner.cycle for corner in corners)),
             problem=of,
-            displacements=self.displacements.at(found.x),
+            displacements=self.displacements.at(improved.x),
         )
 
     def learn(self, robust: Robust) -> bool:
@@ -151,17 +151,17 @@ class RobustSearch:
         most = robust.found.cycle
         if self.demands.objective is not Objective.CYCLE and self.demands.duration is not None:
             most = self.demands.duration
-        added = self._add(sorted(followed, key=lambda each: -_missed(each, most)), most)
+        added = self._add(sorted(followed, key=lambda scenario: -_missed(scenario, most)), most)
         return added or len(followed) < len(corners) or bool((lacks > 0.0).any())
 
-    def _begin(self, of: GuardedProblem, found: Worst, start: Array) -> None:
+    def _begin(self, of: GuardedProblem, worst_case: Worst, start: Array) -> None:
         """Take the layout in place and the worst corners as scenarios, as far as tools can follow there."""
-        planned = judged(of, found.corners, start, self.demands, replace(self.effort, keys=1, within=0.0))
-        self._scenarios = [of.given, *(each.d for each in planned if np.isfinite(each.cycle))]
+        planned = judged(of, worst_case.corners, start, self.demands, replace(self.effort, keys=1, within=0.0))
+        self._scenarios = [of.given, *(scenario.d for scenario in planned if np.isfinite(scenario.cycle))]
 
     def _add(self, corners: Sequence[Corner], most: float) -> bool:
         """Make corners scenarios that miss a margin or last longer than the others, the worst ones first."""
-        known, before = {each.tobytes() for each in self._scenarios}, len(self._scenarios)
+        known, before = {scenario.tobytes() for scenario in self._scenarios}, len(self._scenarios)
         for corner in corners:
             if _missed(corner, most) > 0.0 and corner.d.tobytes() not in known:
                 self._scenarios.append(corner.d)
@@ -182,15 +182,15 @@ def robust_layout(
     """
     (x, start), best = begin, None
     for _ in range(rounds):
-        found = search.once(x, start)
-        robust = None if found is None else search.cornered(found, signs)
-        if found is None or robust is None:
+        improved = search.once(x, start)
+        robust = None if improved is None else search.cornered(improved, signs)
+        if improved is None or robust is None:
             break
         if best is None or _rank(robust, search.demands) < _rank(best, search.demands):
             best = robust
         if not search.learn(robust):
             break
-        x, start = found.x, found.start
+        x, start = improved.x, improved.start
     return best
 
 

@@ -68,12 +68,15 @@ class ScenarioProblem(GuardedProblem):
         q, qd = (part.reshape(count, -1, nq) for part in (point.q, point.qd))
         layouts = self.displacements.at(point.x).layouts(self.d, q[:, 0])
         directions = self.variables.directions(point.x)
-        found = [
+        derivatives = [
             differentiate(self.job, layouts.of_places(slice(place, place + 1)), q[place], qd[place], directions)
             for place in range(count)
         ]
-        by_q, by_qd = np.concatenate([each.q for each in found]), np.concatenate([each.qd for each in found])
+        by_q, by_qd = (
+            np.concatenate([derivative.q for derivative in derivatives]),
+            np.concatenate([derivative.qd for derivative in derivatives]),
+        )
         qdd = None
         if self.is_accelerating:
             qdd = (self.job.rates @ by_qd.reshape(count, q.shape[1], -1)).reshape(by_qd.shape)
-        return PointDerivatives(q=by_q, qd=by_qd, qdd=qdd, rates=found[0].rates)
+        return PointDerivatives(q=by_q, qd=by_qd, qdd=qdd, rates=derivatives[0].rates)

@@ -41,19 +41,19 @@ def tolerances(
     """
     amounts, count = problem.upper, len(problem.upper)
     directions = np.concatenate([np.diag(amounts), -np.diag(amounts)])
-    kept, missed, first = np.zeros(2 * count), np.full(2 * count, np.inf), [""] * (2 * count)
+    tolerated, missed, first = np.zeros(2 * count), np.full(2 * count, np.inf), [""] * (2 * count)
     at, starts = np.full(2 * count, FARTHEST), np.tile(start, (2 * count, 1))
     for _ in range(1 + HALVINGS):
-        asked = np.flatnonzero(~(kept == FARTHEST))
-        if not asked.size:
+        failing = np.flatnonzero(~(tolerated == FARTHEST))
+        if not failing.size:
             break
-        corners = judged(problem, at[asked, None] * directions[asked], start, demands, effort)
-        for row, corner in zip(asked.tolist(), corners, strict=True):
+        corners = judged(problem, at[failing, None] * directions[failing], start, demands, effort)
+        for row, corner in zip(failing.tolist(), corners, strict=True):
             if corner.keeps(cycle):
-                kept[row], starts[row] = at[row], corner.start
+                tolerated[row], starts[row] = at[row], corner.start
             else:
                 missed[row], first[row] = at[row], corner.first
-        at = 0.5 * (kept + np.minimum(missed, FARTHEST))
+        at = 0.5 * (tolerated + np.minimum(missed, FARTHEST))
     size = np.tile(amounts, 2)
     return tuple(
         Tolerance(
@@ -61,7 +61,7 @@ def tolerances(
             sign=1.0 if row < count else -1.0,
             unit=directions[row] / size[row],
             start=starts[row],
-            kept=float(kept[row] * size[row]),
+            kept=float(tolerated[row] * size[row]),
             missed=float(missed[row] * size[row]),
             first=first[row],
         )

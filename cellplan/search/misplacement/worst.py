@@ -47,36 +47,36 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
     qdd = np.zeros_like(qd) if by.qdd is None else np.abs(by.qdd) @ amounts
     rows = measures.distances
     taken = problem.kept_from_fold(np.abs(apart) @ amounts, rows.values, rows.pairs)
-    found = Worst(
+    worst_case = Worst(
         margins=q,
         speeds=qd / problem.limits.velocity,
         accelerations=qdd / problem.acceleration,
         distances=_of_pairs(problem, measures, taken),
         corners=np.zeros((0, len(amounts))),
     )
-    signs = [*_of_joints(problem, measures, by, found), *_of_distances(measures, apart, taken)]
+    signs = [*_of_joints(problem, measures, by, worst_case), *_of_distances(measures, apart, taken)]
     corners = np.unique(np.array(signs).reshape(-1, len(amounts)), axis=0)
-    return replace(found, corners=corners * amounts)
+    return replace(worst_case, corners=corners * amounts)
 
 
 def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Array:
     """What is taken from each pair where that leaves least; from pairs that are not near the median of the others."""
-    found, rows = np.full(problem.pair_count, np.median(taken) if len(taken) else 0.0), measures.distances
+    distances, rows = np.full(problem.pair_count, np.median(taken) if len(taken) else 0.0), measures.distances
     for row in np.argsort(measures.lacks + taken, kind="stable").tolist():
-        found[rows.pairs[row]] = taken[row]
-    return found
+        distances[rows.pairs[row]] = taken[row]
+    return distances
 
 
-def _of_joints(problem: GuardedProblem, measures: Measures, by: PointDerivatives, found: Worst) -> Iterator[Array]:
+def _of_joints(problem: GuardedProblem, measures: Measures, by: PointDerivatives, worst_case: Worst) -> Iterator[Array]:
     """Signs of the displacements that take most from margins, speeds and accelerations."""
     point = measures.point
     units = np.where(problem.limits.is_revolute, np.radians(1.0), 0.01)
     sides = [(measures.lower.value, -1.0), (measures.upper.value, 1.0)]
     for value, sign in sides:
-        yield from _leading((value + found.margins) / units, by.q * sign)
-    loads = [((measures.speeds.value + found.speeds), by.qd * np.sign(point.qd)[..., None])]
+        yield from _leading((value + worst_case.margins) / units, by.q * sign)
+    loads = [((measures.speeds.value + worst_case.speeds), by.qd * np.sign(point.qd)[..., None])]
     if by.qdd is not None:
-        loads.append((measures.accelerations.value + found.accelerations, by.qdd * np.sign(point.qdd)[..., None]))
+        loads.append((measures.accelerations.value + worst_case.accelerations, by.qdd * np.sign(point.qdd)[..., None]))
     for value, gradients in loads:
         yield from _leading(value, gradients)
 

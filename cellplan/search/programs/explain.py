@@ -52,10 +52,10 @@ def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) ->
     """What binds at a point; None where the program there has no solution."""
     measures = Measures.of(problem, point, demands, effort)
     program = Program.of(Linear.of(problem, measures), demands, effort.room, NEAR).priced(1.0)
-    found = program.solve()
-    if found is None:
+    step = program.solve()
+    if step is None:
         return None
-    solved, unit = found.solved, _unit(measures, demands)
+    solved, unit = step.solved, _unit(measures, demands)
     binding, gradient, at = list[Binding](), np.zeros(len(point.x)), 0
     for rows in program.rows:
         multipliers = solved.multipliers[at : at + len(rows.lacks)]
@@ -66,7 +66,7 @@ def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) ->
     if demands.objective is Objective.CHANGE:
         gradient = np.sign(point.x - problem.given) * problem.cost * problem.scale
     return Explanation(
-        binding=tuple(sorted(binding, key=lambda each: -each.share)),
+        binding=tuple(sorted(binding, key=lambda binding: -binding.share)),
         by_variable=gradient * unit / problem.scale,
         held=solved.of_bounds[: len(point.x)] * unit / problem.scale,
     )
@@ -91,14 +91,14 @@ def _bound(problem: Problem, measures: Measures, rows: Rows, multipliers: Array,
         Kind.UPPER_LIMIT: ANGLE,
         Kind.SINGULAR: SINGULAR,
     }
-    found = list[Binding]()
+    bindings = list[Binding]()
     if rows.kind is Kind.DURATION:
         return []
     for row in np.flatnonzero(multipliers > COUNTS).tolist():
         subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)
         if size == ANGLE and not problem.limits.is_revolute[subject]:
             size = LENGTH
-        found.append(
+        bindings.append(
             Binding(
                 kind=rows.kind,
                 names=_names(problem, rows.kind, subject, measures),
@@ -107,7 +107,7 @@ def _bound(problem: Problem, measures: Measures, rows: Rows, multipliers: Array,
                 gain=None if rows.aim or isinstance(rows, PacedRows) else float(multipliers[row]) * unit / size,
             )
         )
-    return found
+    return bindings
 
 
 def _names(problem: Problem, kind: Kind, subject: int, measures: Measures) -> tuple[str, str]:

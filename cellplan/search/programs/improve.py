@@ -119,7 +119,7 @@ class _Climb:
             self._note(there or here, is_taken=there is not None)
             if there is not None:
                 here, linear = there, None
-                best = min(best, here, key=lambda each: each.rank)
+                best = min(best, here, key=lambda improved: improved.rank)
         return self._result(best)
 
     def _is_done(self, here: _State) -> bool:
@@ -144,21 +144,21 @@ class _Climb:
         self._price = program.price
         bends: Array | None = None
         for _ in range(1 + CORRECTIONS):
-            found = program.solve(bends)
-            if found is None:
+            step = program.solve(bends)
+            if step is None:
                 break
-            there = self._at(here, linear, found.z)
+            there = self._at(here, linear, step.z)
             gain = -np.inf if there is None else self._gain(here, there)
             if there is None:
                 break
-            if gain > max(BORNE_OUT * found.expected, LEAST):
-                if gain > GOOD * found.expected:
+            if gain > max(BORNE_OUT * step.expected, LEAST):
+                if gain > GOOD * step.expected:
                     self._trust = min(WIDEST, GROWS * self._trust)
                 return there
-            seen = (each.bends(here.measures, there.measures, found.z) for each in program.rows)
+            seen = (row.bends(here.measures, there.measures, step.z) for row in program.rows)
             bends = np.concatenate([np.zeros(0), *seen])
         count = len(here.measures.point.x)
-        reach = self._trust if found is None else float(np.abs(found.z[:count]).max(initial=0.0))
+        reach = self._trust if step is None else float(np.abs(step.z[:count]).max(initial=0.0))
         self._trust = SHRINKS * min(self._trust, reach)
         return None
 

@@ -71,20 +71,20 @@ class LayoutProblem:
     def derivatives(self, point: Point) -> PointDerivatives:
         """See ``Problem``."""
         layout = self.variables.layouts(point.x[None], point.start[None])
-        found = differentiate(self.job, layout, point.q, point.qd, self.variables.directions(point.x))
-        nodes, nq, count = found.qd.shape
+        motion = differentiate(self.job, layout, point.q, point.qd, self.variables.directions(point.x))
+        nodes, nq, count = motion.qd.shape
         qdd = None
         if self.is_accelerating:
-            qdd = (self.job.rates @ found.qd.reshape(nodes, -1)).reshape(nodes, nq, count)
-        return PointDerivatives(q=found.q, qd=found.qd, qdd=qdd, rates=found.rates)
+            qdd = (self.job.rates @ motion.qd.reshape(nodes, -1)).reshape(nodes, nq, count)
+        return PointDerivatives(q=motion.q, qd=motion.qd, qdd=qdd, rates=motion.rates)
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``."""
         return distances_at(self.bodies, point.x, point.q, nodes, within)
 
-    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        pairs = NearPairs.of(found)
+        pairs = NearPairs.of(distances)
         return self.bodies.derivatives(pairs.near, point.x, by_joints.q[pairs.nodes])
 
     def arms(self, point: Point) -> SingularValues:

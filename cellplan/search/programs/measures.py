@@ -95,27 +95,27 @@ class Measures:
             pace=pace,
         )
 
-    def missed(self, problem: Problem, demands: Demands, room: Room) -> "Missed":
+    def missed(self, problem: Problem, demands: Demands, reserve: Room) -> "Missed":
         """What every joint and pair misses at its worst."""
         units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
-        joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + room.margin) / units
-        lacks, allowed = [joints.ravel()], [np.tile(0.5 * room.margin / units, 2)]
+        joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + reserve.margin) / units
+        lacks, allowed = [joints.ravel()], [np.tile(0.5 * reserve.margin / units, 2)]
         worst = np.full(int(self.distances.pairs.max(initial=-1)) + 1, -np.inf)
-        asked = rooms(self.distances, room)
-        np.maximum.at(worst, self.distances.pairs, (self.lacks + asked) / LENGTH)
+        reserved = rooms(self.distances, reserve)
+        np.maximum.at(worst, self.distances.pairs, (self.lacks + reserved) / LENGTH)
         most = np.zeros_like(worst)
-        most[self.distances.pairs] = 0.5 * asked / LENGTH
+        most[self.distances.pairs] = 0.5 * reserved / LENGTH
         lacks.append(worst)
         allowed.append(most)
-        lacks.append((self.singular.value.max(axis=0) + room.singular) / SINGULAR)
-        allowed.append(np.full(len(lacks[-1]), 0.5 * room.singular / SINGULAR))
+        lacks.append((self.singular.value.max(axis=0) + reserve.singular) / SINGULAR)
+        allowed.append(np.full(len(lacks[-1]), 0.5 * reserve.singular / SINGULAR))
         if demands.duration is not None and demands.objective is not Objective.CYCLE:
-            whole = demands.duration / self.span / (1.0 + room.time)
+            whole = demands.duration / self.span / (1.0 + reserve.time)
             loads = np.array([self.factor])
             if self.pace is None:
                 loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
             lacks.append((loads / whole - 1.0) / SHARE)
-            allowed.append(np.full(len(loads), 0.5 * room.time / SHARE))
+            allowed.append(np.full(len(loads), 0.5 * reserve.time / SHARE))
         return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
 
     def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
@@ -134,11 +134,11 @@ class Measures:
             case Kind.DURATION:
                 return np.full(len(nodes), self.factor)
             case _:
-                found = self.distances
-                places = zip(found.pairs.tolist(), found.nodes.tolist(), strict=True)
+                distances = self.distances
+                places = zip(distances.pairs.tolist(), distances.nodes.tolist(), strict=True)
                 known = dict(zip(places, self.lacks.tolist(), strict=True))
-                asked = zip(subjects.tolist(), nodes.tolist(), strict=True)
-                return np.array([known.get(key, np.nan) for key in asked])
+                queries = zip(subjects.tolist(), nodes.tolist(), strict=True)
+                return np.array([known.get(key, np.nan) for key in queries])
 
     def objective(self, problem: Problem, demands: Demands) -> float:
         """What is to be small: the cycle in [s], the cost of the change, or the least room between bodies, negative."""
@@ -199,8 +199,8 @@ def _missing(arms: ArmValues | None, demands: Demands, nodes: int) -> Array:
     """Shares of the singular values that are demanded, which are missed, shape (N, A)."""
     if arms is None or demands.singular is None:
         return np.zeros((nodes, 0))
-    asked = demands.singular > 0.0
-    return np.where(asked, 1.0 - arms.values / np.where(asked, demands.singular, 1.0), -FARTHEST)
+    is_demanded = demands.singular > 0.0
+    return np.where(is_demanded, 1.0 - arms.values / np.where(is_demanded, demands.singular, 1.0), -FARTHEST)
 
 
 def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, float]:
@@ -212,13 +212,13 @@ def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, 
     return speeds, accelerations, factor
 
 
-def rooms(distances: Distances, room: Room) -> Array:
+def rooms(distances: Distances, reserve: Room) -> Array:
     """What is asked of near pairs beyond their demands in [m], shape (M,)."""
-    return np.where(distances.is_own, room.own, room.distance)
+    return np.where(distances.is_own, reserve.own, reserve.distance)
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
     """Nodes at which distances are asked: the ones nearest to even times, and to the times given."""
     times = problem.times
-    asked = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
-    return np.unique(np.abs(times[:, None] - asked).argmin(axis=0)).astype(np.intp)
+    instants = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
+    return np.unique(np.abs(times[:, None] - instants).argmin(axis=0)).astype(np.intp)

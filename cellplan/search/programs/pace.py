@@ -35,20 +35,20 @@ class Stretch:
 
     def directions(self, qd: Array) -> Array:
         """Derivatives of the joints by the length, of all (N, ...) the (M, ...); at a rest those beside it go on."""
-        found = _each(qd[self.nodes], 1.0 / self.rates)
+        directions = _each(qd[self.nodes], 1.0 / self.rates)
         for is_resting, (end, near, far), steps in zip(
             self.at_rest, BESIDE, (self.steps, self.steps[::-1]), strict=True
         ):
             if is_resting:
                 share = steps[0] / steps[1]
-                found[end] = (1.0 + share) * found[near] - share * found[far]
-        return found
+                directions[end] = (1.0 + share) * directions[near] - share * directions[far]
+        return directions
 
     def curvatures(self, directions: Array, qdd: Array) -> Array:
         """Second derivatives by the length, shape (M, ...); 0 at a rest, where nothing comes of them."""
-        found = _each(qdd[self.nodes] - _each(directions, self.bends), 1.0 / self.rates**2)
-        found[[end for end, is_resting in zip((0, -1), self.at_rest, strict=True) if is_resting]] = 0.0
-        return found
+        curvatures = _each(qdd[self.nodes] - _each(directions, self.bends), 1.0 / self.rates**2)
+        curvatures[[end for end, is_resting in zip((0, -1), self.at_rest, strict=True) if is_resting]] = 0.0
+        return curvatures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,21 +84,21 @@ class Pace:
         velocity, limited = problem.limits.velocity, np.isfinite(problem.acceleration)
         stretches = _stretches(problem.times, point, velocity)
         squares, shares, seconds = [np.zeros(0)], [np.zeros(0)], 0.0
-        for each in stretches:
-            directions = each.directions(point.qd)
-            found = 1.0 / (np.abs(directions) / velocity).max(axis=1) ** 2
+        for stretch in stretches:
+            directions = stretch.directions(point.qd)
+            initial = 1.0 / (np.abs(directions) / velocity).max(axis=1) ** 2
             if limited.any():
                 along, bent = (
                     part[:, limited] / problem.acceleration[limited]
-                    for part in (directions, each.curvatures(directions, point.qdd))
+                    for part in (directions, stretch.curvatures(directions, point.qdd))
                 )
-                found = largest_squares(each.steps, along, bent, found)
-            found[[0, -1]] = 0.0
-            speeds = np.sqrt(found)
+                initial = largest_squares(stretch.steps, along, bent, initial)
+            initial[[0, -1]] = 0.0
+            speeds = np.sqrt(initial)
             both = speeds[1:] + speeds[:-1]
-            times, per_speed = 2.0 * each.steps / both, 2.0 * each.steps / both**2
+            times, per_speed = 2.0 * stretch.steps / both, 2.0 * stretch.steps / both**2
             seconds += float(times.sum())
-            squares.append(found)
+            squares.append(initial)
             shares.append(speeds * (np.append(per_speed, 0.0) + np.append(0.0, per_speed)))
         return cls(
             stretches=stretches,
@@ -117,13 +117,13 @@ class Pace:
     @property
     def nodes(self) -> Indices:
         """Nodes of all places, shape (P,)."""
-        return np.concatenate([np.zeros(0, dtype=np.intp), *(each.nodes for each in self.stretches)])
+        return np.concatenate([np.zeros(0, dtype=np.intp), *(stretch.nodes for stretch in self.stretches)])
 
     def places(self, squares: Array) -> Places:
         """Where loads are limited, at some squares c, shape (P,)."""
-        ends = np.cumsum([0, *(len(each.nodes) for each in self.stretches)])
+        ends = np.cumsum([0, *(len(stretch.nodes) for stretch in self.stretches)])
         left = np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(a, b - 1) for a, b in pairwise(ends))])
-        steps = np.concatenate([np.zeros(0), *(each.steps for each in self.stretches)])
+        steps = np.concatenate([np.zeros(0), *(stretch.steps for stretch in self.stretches)])
         inner, before, after = self.inner, squares[left], squares[left + 1]
         u, halves = (after - before) / (2.0 * steps), np.stack([-before, after], axis=1) / (2.0 * steps[:, None])
         none, speeds = np.zeros(len(left)), np.sqrt(squares[inner])
@@ -148,28 +148,28 @@ class Pace:
             qd: Speeds over the nominal time, or their derivatives, shape (N, ...).
             qdd: Accelerations likewise; None where nothing limits them.
         """
-        first = [each.directions(qd) for each in self.stretches]
+        first = [stretch.directions(qd) for stretch in self.stretches]
         empty = np.zeros((0, *qd.shape[1:]))
         directions = np.concatenate([empty, *first])
         if qdd is None:
             return directions, np.zeros_like(directions)
         both = zip(self.stretches, first, strict=True)
-        return directions, np.concatenate([empty, *(each.curvatures(part, qdd) for each, part in both)])
+        return directions, np.concatenate([empty, *(stretch.curvatures(part, qdd) for stretch, part in both)])
 
     def loads(self, qd: Array, qdd: Array, squares: Array) -> Array:
         """Loads of a path over the lengths of this one as shares of their limits, with signs, shape (E, nq)."""
         places, (directions, curvatures) = self.places(squares), self.shapes(qd, qdd)
-        found = _each(directions[places.at], places.by_direction) + _each(curvatures[places.at], places.by_curvature)
+        loads = _each(directions[places.at], places.by_direction) + _each(curvatures[places.at], places.by_curvature)
         limits: Array = np.where(places.is_speed[:, None], self.velocity, self.acceleration)
-        return found / limits
+        return loads / limits
 
     def reached(self, qd: Array, qdd: Array) -> tuple[Array, Array]:
         """Largest speeds and accelerations at the nodes as shares of their limits, shape (N, nq) each."""
         loads, places = np.abs(self.loads(qd, qdd, self.squares)), self.places(self.squares)
-        nodes, found = self.nodes[places.at], (np.zeros(qd.shape), np.zeros(qd.shape))
-        for kept, largest in zip((places.is_speed, ~places.is_speed), found, strict=True):
-            np.maximum.at(largest, nodes[kept], loads[kept])
-        return found
+        nodes, largest_loads = self.nodes[places.at], (np.zeros(qd.shape), np.zeros(qd.shape))
+        for selected, largest in zip((places.is_speed, ~places.is_speed), largest_loads, strict=True):
+            np.maximum.at(largest, nodes[selected], loads[selected])
+        return largest_loads
 
     def derivatives(
         self, shapes: tuple[Array, Array], by: tuple[Array, Array], rows: Indices, joints: Indices
@@ -184,16 +184,16 @@ class Pace:
         """
         places, inner, count = self.places(self.squares), self.inner, by[0].shape[-1]
         at = places.at[rows]
-        found = np.zeros((len(rows), count + len(self.squares)))
-        found[:, :count] = _each(by[0][at, joints], places.by_direction[rows])
-        found[:, :count] += _each(by[1][at, joints], places.by_curvature[rows])
-        own = np.stack([part[at, joints] for part in shapes], axis=1)
-        per_square = np.einsum("rk,rks->rs", own, places.changes[rows])
+        derivatives = np.zeros((len(rows), count + len(self.squares)))
+        derivatives[:, :count] = _each(by[0][at, joints], places.by_direction[rows])
+        derivatives[:, :count] += _each(by[1][at, joints], places.by_curvature[rows])
+        by_shape = np.stack([part[at, joints] for part in shapes], axis=1)
+        per_square = np.einsum("rk,rks->rs", by_shape, places.changes[rows])
         for side in range(2):
-            np.add.at(found, (np.arange(len(rows)), count + places.around[rows, side]), per_square[:, side])
+            np.add.at(derivatives, (np.arange(len(rows)), count + places.around[rows, side]), per_square[:, side])
         limits = np.where(places.is_speed[rows], self.velocity[joints], self.acceleration[joints])
-        kept: Array = np.concatenate([found[:, :count], found[:, count + inner]], axis=1)
-        return kept / limits[:, None]
+        by_variables: Array = np.concatenate([derivatives[:, :count], derivatives[:, count + inner]], axis=1)
+        return by_variables / limits[:, None]
 
 
 def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ...]:
@@ -207,14 +207,14 @@ def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ..
     turned = np.linalg.norm(np.diff(speeds / safe[:, None], axis=0, append=0.0), axis=1) > KINK
     is_corner = twice & np.append(~rests[1:] & ~rests[:-1], False) & turned
     ends = np.unique([0, *np.flatnonzero(rests), *(np.flatnonzero(is_corner) + 1), len(times) - 1])
-    found = []
+    stretches = []
     for first, last in pairwise(ends.tolist()):
         nodes = np.arange(first, last + 1 - is_corner[last - 1])
         nodes = nodes[~np.append(twice[nodes[:-1]], False)]
         if len(nodes) >= FEWEST_NODES:
             width, rate, bend = np.diff(times[nodes]), rates[nodes], bends[nodes]
             steps = width * (rate[1:] + rate[:-1]) / 2.0 + width**2 * (bend[:-1] - bend[1:]) / 12.0
-            found.append(
+            stretches.append(
                 Stretch(
                     nodes=nodes,
                     rates=safe[nodes],
@@ -223,10 +223,10 @@ def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ..
                     at_rest=(bool(rests[first]), bool(rests[nodes[-1]])),
                 )
             )
-    return tuple(found)
+    return tuple(stretches)
 
 
 def _each(values: Array, factors: Array) -> Array:
     """Values (M, ...) times a factor of each row (M,)."""
-    found: Array = values * factors.reshape(-1, *(1,) * (values.ndim - 1))
-    return found
+    scaled: Array = values * factors.reshape(-1, *(1,) * (values.ndim - 1))
+    return scaled

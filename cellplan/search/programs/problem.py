@@ -108,7 +108,7 @@ class Problem(Varied, Protocol):
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """Pairs of bodies that are less than ``within`` in [m] beyond what is demanded of them, at some nodes."""
 
-    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """Derivatives of distances by the variables, shape (M, n)."""
 
     def arms(self, point: Point) -> ArmValues:

@@ -54,7 +54,7 @@ class Program:
     price: float = 1.0  # what a slack of one unit costs
 
     @classmethod
-    def of(cls, linear: Linear, demands: Demands, room: Room, trust: float) -> "Program":
+    def of(cls, linear: Linear, demands: Demands, reserve: Room, trust: float) -> "Program":
         """The program of a point, for a trust region of some radius in usual steps."""
         problem, x = linear.problem, linear.measures.point.x
         lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)
@@ -67,7 +67,7 @@ class Program:
             is_aim = demands.objective is Objective.CYCLE
             curved = np.append(curved, is_aim * CURVATURE * pace.shares[inner])
         return cls(
-            rows=linear.rows(demands, room, np.maximum(-lower, upper)),
+            rows=linear.rows(demands, reserve, np.maximum(-lower, upper)),
             box=(lower, upper),
             demands=demands,
             changed=((x - problem.given) * problem.cost, problem.cost * problem.scale),
@@ -78,11 +78,11 @@ class Program:
         """The same at the least price, from a given one on, at which slack is nearly as small as it can be."""
         program = replace(self, price=price)
         while program.price < DEAREST:
-            found, dearer = program.solve(), replace(program, price=HIGHER * program.price)
-            if found is None or found.left <= MISSED:
+            step, dearer = program.solve(), replace(program, price=HIGHER * program.price)
+            if step is None or step.left <= MISSED:
                 break
             least_left = replace(program, price=DEAREST).solve()
-            if least_left is None or found.left - least_left.left <= SPARED * (found.before - least_left.left):
+            if least_left is None or step.left - least_left.left <= SPARED * (step.before - least_left.left):
                 break
             program = dearer
         return program
@@ -93,9 +93,9 @@ class Program:
         Args:
             corrections: Added to the lacks of all rows, shape (M,): what a step was seen to miss beyond its rows.
         """
-        count, lacks = len(self.box[0]), self._stacked([each.lacks for each in self.rows])
-        gradients = np.concatenate([np.zeros((0, count)), *(each.gradients for each in self.rows)])
-        aims = np.repeat([each.aim for each in self.rows], [len(each.lacks) for each in self.rows])
+        count, lacks = len(self.box[0]), self._stacked([row.lacks for row in self.rows])
+        gradients = np.concatenate([np.zeros((0, count)), *(row.gradients for row in self.rows)])
+        aims = np.repeat([row.aim for row in self.rows], [len(row.lacks) for row in self.rows])
         family, most, free = self._families((lacks > 0.0) & (aims == 0.0), lacks)
         slacks, costs = len(most), self._costs
         A = np.zeros((len(lacks) + 2 * costs, count + 1 + 2 * slacks + costs))
@@ -103,8 +103,8 @@ class Program:
         is_loose = np.flatnonzero(family >= 0)
         for first in (count + 1, count + 1 + slacks):
             A[is_loose, first + family[is_loose]] = -1.0
-        asked = lacks if corrections is None else lacks + corrections
-        top = np.concatenate([-asked, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
+        targets = lacks if corrections is None else lacks + corrections
+        top = np.concatenate([-targets, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
         prices = np.repeat([IN_ROOM * self.price, self.price, 1.0], [slacks, slacks, costs])
         cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
@@ -143,15 +143,15 @@ class Program:
 
         Rows about one joint or one pair share theirs.
         """
-        kinds = np.repeat(np.arange(len(self.rows)), [len(each.lacks) for each in self.rows])
-        subjects = np.concatenate([np.zeros(0, dtype=np.intp), *(each.subjects for each in self.rows)])
+        kinds = np.repeat(np.arange(len(self.rows)), [len(row.lacks) for row in self.rows])
+        subjects = np.concatenate([np.zeros(0, dtype=np.intp), *(row.subjects for row in self.rows)])
         family = np.full(len(lacks), -1, dtype=np.intp)
         labels = np.stack([kinds, subjects], axis=1)[is_loose]
-        found, which = np.unique(labels, axis=0, return_inverse=True) if len(labels) else (labels, np.zeros(0, int))
+        families, which = np.unique(labels, axis=0, return_inverse=True) if len(labels) else (labels, np.zeros(0, int))
         family[is_loose] = which
-        most, free = np.zeros(len(found)), np.zeros(len(found))
+        most, free = np.zeros(len(families)), np.zeros(len(families))
         np.maximum.at(most, which, lacks[is_loose])
-        free[which] = self._stacked([each.allowed for each in self.rows])[is_loose]
+        free[which] = self._stacked([row.allowed for row in self.rows])[is_loose]
         return family, most, np.minimum(free, most)
 
     def _changes(self, block: Array, first: int) -> list[Array]:

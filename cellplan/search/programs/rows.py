@@ -38,19 +38,19 @@ class Rows:
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
         """By how much more than the rows say a step z was seen to change the lacks, shape (M,); 0 where not seen."""
-        before, after = (each.values(self.kind, self.subjects, self.nodes) for each in (here, there))
+        before, after = (linear.values(self.kind, self.subjects, self.nodes) for linear in (here, there))
         return np.nan_to_num((after - before) / self.units - self.gradients @ z)
 
-    def of(self, kept: Flags) -> Self:
+    def of(self, is_selected: Flags) -> Self:
         """Some of them."""
         return replace(
             self,
-            subjects=self.subjects[kept],
-            nodes=self.nodes[kept],
-            lacks=self.lacks[kept],
-            gradients=self.gradients[kept],
-            allowed=self.allowed[kept],
-            units=self.units[kept],
+            subjects=self.subjects[is_selected],
+            nodes=self.nodes[is_selected],
+            lacks=self.lacks[is_selected],
+            gradients=self.gradients[is_selected],
+            allowed=self.allowed[is_selected],
+            units=self.units[is_selected],
         )
 
     def widened(self, count: int) -> Self:
@@ -74,9 +74,9 @@ class PacedRows(Rows):
         loads = pace.loads(there.point.qd, there.point.qdd, squares)[self.places, self.subjects]
         return (self.signs * loads - 1.0) / self.units - (self.lacks + self.gradients @ z)
 
-    def of(self, kept: Flags) -> Self:
+    def of(self, is_selected: Flags) -> Self:
         """See ``Rows``."""
-        return replace(Rows.of(self, kept), places=self.places[kept], signs=self.signs[kept])
+        return replace(Rows.of(self, is_selected), places=self.places[is_selected], signs=self.signs[is_selected])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -92,15 +92,15 @@ class Linear:
     def of(cls, problem: Problem, measures: Measures) -> "Linear":
         """Take all derivatives at a point."""
         point = measures.point
-        found = problem.derivatives(point)
+        derivatives = problem.derivatives(point)
         return cls(
             problem=problem,
             measures=measures,
-            derivatives=found,
-            distances=problem.distance_derivatives(point, measures.distances, found),
+            derivatives=derivatives,
+            distances=problem.distance_derivatives(point, measures.distances, derivatives),
         )
 
-    def rows(self, demands: Demands, room: Room, box: Array) -> list[Rows]:
+    def rows(self, demands: Demands, reserve: Room, box: Array) -> list[Rows]:
         """All rows that a step within a box can bind; the ones that bound the objective first.
 
         Args:
@@ -109,25 +109,25 @@ class Linear:
             box: Largest steps of the variables, then of the squares of a retimed motion, relative, (n + m,).
         """
         count = len(self.problem.scale)
-        parts = [*self._margins(room, box[:count]), self._apart(room), *self._regular(demands, room)]
+        parts = [*self._margins(reserve, box[:count]), self._apart(reserve), *self._regular(demands, reserve)]
         if demands.objective is Objective.CLEARANCE:
             parts.append(self._aimed_apart())
-        pace, duration = self.measures.pace, self._duration(demands, room)
+        pace, duration = self.measures.pace, self._duration(demands, reserve)
         if pace is None:
-            first = [] if duration is None else [*self._timing(duration, demands, room)]
+            first = [] if duration is None else [*self._timing(duration, demands, reserve)]
         else:
             parts = [rows.widened(len(box) - count) for rows in parts]
-            first = [] if duration is None else [self._lasting(pace, duration, demands, room), *self._paced(pace)]
+            first = [] if duration is None else [self._lasting(pace, duration, demands, reserve), *self._paced(pace)]
         return [rows.that_can_bind(box) for rows in (*first, *parts) if len(rows.lacks)]
 
-    def _duration(self, demands: Demands, room: Room) -> float | None:
+    def _duration(self, demands: Demands, reserve: Room) -> float | None:
         """How many times as long as the nodes the motion may last; None where it may last as long as it takes."""
         if demands.objective is Objective.CYCLE:
             return self.measures.factor
         span = float(self.problem.times[-1] - self.problem.times[0])
-        return None if demands.duration is None else demands.duration / span / (1.0 + room.time)
+        return None if demands.duration is None else demands.duration / span / (1.0 + reserve.time)
 
-    def _lasting(self, pace: Pace, whole: float, demands: Demands, room: Room) -> Rows:
+    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Room) -> Rows:
         """The duration of a retimed motion: the objective itself, or bounded by a given one."""
         is_aim = demands.objective is Objective.CYCLE
         share, unit, count = self.measures.factor / whole, 1.0 if is_aim else SHARE, len(self.problem.scale)
@@ -138,7 +138,7 @@ class Linear:
             nodes=np.zeros(1, dtype=np.intp),
             lacks=np.array([(share - 1.0) / unit]),
             gradients=np.concatenate([np.zeros(count), -saved])[None],
-            allowed=np.full(1, 0.0 if is_aim else 0.5 * room.time / unit),
+            allowed=np.full(1, 0.0 if is_aim else 0.5 * reserve.time / unit),
             units=np.full(1, whole * unit),
             aim=1.0 if is_aim else 0.0,
         )
@@ -169,15 +169,15 @@ class Linear:
                 signs=signs,
             )
 
-    def _timing(self, whole: float, demands: Demands, room: Room) -> Iterator[Rows]:
+    def _timing(self, whole: float, demands: Demands, reserve: Room) -> Iterator[Rows]:
         """Speeds and accelerations under the laws: the objective itself, or bounds at a given duration."""
         measures, problem = self.measures, self.problem
         is_aim = demands.objective is Objective.CYCLE
         unit = 1.0 if is_aim else SHARE
-        found = [(Kind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
+        quantities = [(Kind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
         if self.derivatives.qdd is not None:
-            found.append((Kind.ACCELERATION, measures.accelerations, self.derivatives.qdd, problem.acceleration))
-        for kind, crests, by, limits in found:
+            quantities.append((Kind.ACCELERATION, measures.accelerations, self.derivatives.qdd, problem.acceleration))
+        for kind, crests, by, limits in quantities:
             value = np.sqrt(crests.value) if kind is Kind.ACCELERATION else crests.value
             nodes, columns = np.nonzero(value > 0.5 * whole)
             gradients = crests.derivatives(nodes, columns, by) / limits[columns, None]
@@ -190,12 +190,12 @@ class Linear:
                 nodes=nodes,
                 lacks=(at / whole - 1.0) / unit,
                 gradients=gradients * problem.scale / (whole * unit),
-                allowed=np.full(len(at), 0.0 if is_aim else 0.5 * room.time / unit),
+                allowed=np.full(len(at), 0.0 if is_aim else 0.5 * reserve.time / unit),
                 units=np.full(len(at), whole * unit),
                 aim=1.0 if is_aim else 0.0,
             )
 
-    def _margins(self, room: Room, box: Array) -> Iterator[Rows]:
+    def _margins(self, reserve: Room, box: Array) -> Iterator[Rows]:
         """Distances of the joints from their limits."""
         problem, dq = self.problem, self.derivatives.q
         reach = np.abs(dq) @ (problem.scale * box)
@@ -205,32 +205,32 @@ class Linear:
             (Kind.UPPER_LIMIT, self.measures.upper, 1.0),
         )
         for kind, crests, sign in sides:
-            nodes, columns = np.nonzero(crests.value + room.margin + 1.5 * reach > 0.0)
+            nodes, columns = np.nonzero(crests.value + reserve.margin + 1.5 * reach > 0.0)
             gradients = sign * crests.derivatives(nodes, columns, dq) / units[columns, None]
             yield Rows(
                 kind=kind,
                 subjects=columns,
                 nodes=nodes,
-                lacks=(crests.value[nodes, columns] + room.margin) / units[columns],
+                lacks=(crests.value[nodes, columns] + reserve.margin) / units[columns],
                 gradients=gradients * problem.scale,
-                allowed=0.5 * room.margin / units[columns],
+                allowed=0.5 * reserve.margin / units[columns],
                 units=units[columns],
             )
 
-    def _apart(self, room: Room) -> Rows:
+    def _apart(self, reserve: Room) -> Rows:
         """Distances of near pairs."""
         distances = self.measures.distances
         return Rows(
             kind=Kind.DISTANCE,
             subjects=distances.pairs,
             nodes=distances.nodes,
-            lacks=(self.measures.lacks + rooms(distances, room)) / LENGTH,
+            lacks=(self.measures.lacks + rooms(distances, reserve)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
-            allowed=0.5 * rooms(distances, room) / LENGTH,
+            allowed=0.5 * rooms(distances, reserve) / LENGTH,
             units=np.full(len(distances.pairs), LENGTH),
         )
 
-    def _regular(self, demands: Demands, room: Room) -> Iterator[Rows]:
+    def _regular(self, demands: Demands, reserve: Room) -> Iterator[Rows]:
         """Least singular values of the arms."""
         arms, crests = self.measures.arms, self.measures.singular
         nodes, subjects = (part.astype(np.intp) for part in np.nonzero(crests.value > -NEAR_SINGULAR))
@@ -245,9 +245,9 @@ class Linear:
             kind=Kind.SINGULAR,
             subjects=subjects,
             nodes=nodes,
-            lacks=(crests.value[nodes, subjects] + room.singular) / SINGULAR,
+            lacks=(crests.value[nodes, subjects] + reserve.singular) / SINGULAR,
             gradients=-gradients * self.problem.scale / (demands.singular[subjects, None] * SINGULAR),
-            allowed=np.full(len(nodes), 0.5 * room.singular / SINGULAR),
+            allowed=np.full(len(nodes), 0.5 * reserve.singular / SINGULAR),
             units=np.full(len(nodes), SINGULAR),
         )
 

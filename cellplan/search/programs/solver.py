@@ -47,8 +47,8 @@ def least(cost: Array, weights: Array, rows: Array, highest: Array, bounds: tupl
         np.concatenate([lower, np.full(len(top), -UNBOUNDED)]),
         np.zeros(len(cost) + len(top), dtype=np.intc),
     )
-    found = np.asarray(at)
-    if flag != SOLVED or not np.all(scaled @ found - top <= PROVED * (1.0 + np.linalg.norm(found))):
+    solution = np.asarray(at)
+    if flag != SOLVED or not np.all(scaled @ solution - top <= PROVED * (1.0 + np.linalg.norm(solution))):
         return None
     multipliers = np.asarray(info["lam"])
-    return Solved(at=found, multipliers=multipliers[len(cost) :] / lengths, of_bounds=multipliers[: len(cost)])
+    return Solved(at=solution, multipliers=multipliers[len(cost) :] / lengths, of_bounds=multipliers[: len(cost)])

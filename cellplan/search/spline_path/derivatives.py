@@ -37,32 +37,32 @@ def path_derivatives(
     changes = JacobianChanges.of(job, screws, qd)
     J, nq = changes.jacobian.reshape(len(q), -1, q.shape[1]), q.shape[1]
     blocks = J.reshape(len(q), -1, 6, nq)
-    own = [blocks[:, task][..., columns] for task, columns in enumerate(nodes.operators)]
-    inverses = np.linalg.inv(np.stack(own, axis=1)) if own else np.zeros((len(q), 0, 6, 6))
+    local = [blocks[:, task][..., columns] for task, columns in enumerate(nodes.operators)]
+    inverses = np.linalg.inv(np.stack(local, axis=1)) if local else np.zeros((len(q), 0, 6, 6))
     moved = changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
-    beside, twists = -moved.reshape(len(q), J.shape[1], directions.count), changes.twists()
+    driven, twists = -moved.reshape(len(q), J.shape[1], directions.count), changes.twists()
     coefficients = nodes.count * (c.stop - c.start)
-    found = np.zeros((3 if is_accelerating else 2, len(q), nq, coefficients + directions.count))
-    for order, shares in enumerate(nodes.shares[: len(found)]):
-        _by_spline(found[order], shares, c)
-    _add(found[0], nodes, inverses, np.concatenate([-_times(J[..., c], nodes.shares[0]), beside], axis=2))
-    turned = twists[..., :nq] @ found[0]
+    derivatives = np.zeros((3 if is_accelerating else 2, len(q), nq, coefficients + directions.count))
+    for order, shares in enumerate(nodes.shares[: len(derivatives)]):
+        _by_spline(derivatives[order], shares, c)
+    _add(derivatives[0], nodes, inverses, np.concatenate([-_times(J[..., c], nodes.shares[0]), driven], axis=2))
+    turned = twists[..., :nq] @ derivatives[0]
     turned[..., coefficients:] += twists[..., nq:]
     turned[..., :coefficients] += _times(J[..., c], nodes.shares[1])
-    _add(found[1], nodes, inverses, -turned)
+    _add(derivatives[1], nodes, inverses, -turned)
     if not is_accelerating:
-        return PointDerivatives(q=found[0], qd=found[1], qdd=None)
+        return PointDerivatives(q=derivatives[0], qd=derivatives[1], qdd=None)
     others = np.ones(nq, dtype=bool)
     others[c] = False
-    found[2][:, others] = np.tensordot(nodes.rates, found[1][:, others], axes=1)
-    return PointDerivatives(q=found[0], qd=found[1], qdd=found[2])
+    derivatives[2][:, others] = np.tensordot(nodes.rates, derivatives[1][:, others], axes=1)
+    return PointDerivatives(q=derivatives[0], qd=derivatives[1], qdd=derivatives[2])
 
 
-def _by_spline(found: Array, shares: Array, columns: slice) -> None:
+def _by_spline(derivatives: Array, shares: Array, columns: slice) -> None:
     """Fill in what the coefficients, one configuration after the other, do to the joints of the positioner."""
     count = columns.stop - columns.start
     for joint in range(count):
-        found[:, columns.start + joint, joint : shares.shape[1] * count : count] = shares
+        derivatives[:, columns.start + joint, joint : shares.shape[1] * count : count] = shares
 
 
 def _times(C: Array, shares: Array) -> Array:
@@ -70,8 +70,8 @@ def _times(C: Array, shares: Array) -> Array:
     return (C[:, :, None, :] * shares[:, None, :, None]).reshape(*C.shape[:2], -1)
 
 
-def _add(found: Array, nodes: PathNodes, inverses: Array, twists: Array) -> None:
+def _add(derivatives: Array, nodes: PathNodes, inverses: Array, twists: Array) -> None:
     """Fill in what twists of the tools, shape (N, 6 T, p), ask of the joints of the operators."""
     solved = inverses @ twists.reshape(len(twists), -1, 6, twists.shape[2])
     for task, columns in enumerate(nodes.operators):
-        found[:, columns] = solved[:, task]
+        derivatives[:, columns] = solved[:, task]

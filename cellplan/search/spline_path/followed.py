@@ -45,8 +45,8 @@ def followed(nodes: PathNodes, placement: Placement, coefficients: Array, q: Arr
         else:
             return None
         qd = linear.speeds(drift)
-    found, speeds = np.ascontiguousarray(at.T), np.ascontiguousarray(qd.T)
-    return (found, speeds) if _is_one_motion(job.times, found, speeds) else None
+    positions, speeds = np.ascontiguousarray(at.T), np.ascontiguousarray(qd.T)
+    return (positions, speeds) if _is_one_motion(job.times, positions, speeds) else None
 
 
 def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start: Array) -> Array | None:
@@ -63,7 +63,7 @@ def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start
     """
     job, times = nodes.job, nodes.job.times
     given, rates = (share @ coefficients for share in nodes.shares[:2])
-    found, every = np.empty((len(times), len(start))), np.ones(len(start))
+    positions, every = np.empty((len(times), len(start))), np.ones(len(start))
     at, drift = start[:, None].copy(), np.zeros((len(start), 1))
     still = np.zeros_like(at)
     with np.errstate(all="ignore"):
@@ -80,10 +80,10 @@ def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start
                     break
             if not longest <= FOUND:
                 return None
-            found[node] = at[:, 0]
+            positions[node] = at[:, 0]
             if node + 1 < len(times):
                 at = at + (times[node + 1] - times[node]) * linear.speeds(drift)
-    return found
+    return positions
 
 
 def _is_one_motion(times: Array, q: Array, qd: Array) -> bool:

@@ -95,25 +95,27 @@ def _operators(job: Job) -> Indices:
     Raises:
         InputError: A task leaves components open, or its robot has a joint too many or too few.
     """
-    found = []
-    for relation, kept, operator in zip(job.relations, job.constraints.kept, job.constraints.operators, strict=True):
+    operators = []
+    for relation, is_constrained, operator in zip(
+        job.relations, job.constraints.kept, job.constraints.operators, strict=True
+    ):
         robot = job.cell.robots[operator]
         columns = job.cell.columns(robot.name)
-        if not kept.all() or columns.stop - columns.start != 6:
+        if not is_constrained.all() or columns.stop - columns.start != 6:
             where = job.cell.origin.at(f"robots.{robot.name}")
             raise InputError(
                 f"{where}: expected a robot of six joints whose task '{relation.name}' states all six components, for "
                 "a search of joint paths; its motion would not follow from that of the positioner alone"
             )
-        found.append(np.arange(columns.start, columns.stop))
-    return np.array(found, dtype=np.intp).reshape(-1, 6)
+        operators.append(np.arange(columns.start, columns.stop))
+    return np.array(operators, dtype=np.intp).reshape(-1, 6)
 
 
 def _breaks(jumps: Array, knots: Array) -> Array:
     """Times in [s] at which stretches meet; a knot of the spline next to a jump is left out."""
     near = SHORT * float(jumps[-1] - jumps[0]) / (len(jumps) + len(knots))
-    own = knots[np.abs(knots[:, None] - jumps).min(axis=1, initial=np.inf) > near]
-    return distinct(np.concatenate([jumps, own]))
+    inner = knots[np.abs(knots[:, None] - jumps).min(axis=1, initial=np.inf) > near]
+    return distinct(np.concatenate([jumps, inner]))
 
 
 def _panels(breaks: Array, count: int) -> tuple[Array, Array, Array, Array]:

@@ -58,14 +58,14 @@ class PathProblem:
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""
-        own, others = self._split(x)
-        coefficients = self.path.spline(own).coefficients
+        spline, others = self._split(x)
+        coefficients = self.path.spline(spline).coefficients
         placement = self.layout.layouts(others[None], start[None]).placement(self.nodes.job)
         q = continued(self.nodes, placement, coefficients, start) if near is None else near.q
-        found = None if q is None else followed(self.nodes, placement, coefficients, q)
-        if found is None:
+        motion = None if q is None else followed(self.nodes, placement, coefficients, q)
+        if motion is None:
             return None
-        q, qd = found
+        q, qd = motion
         qdd = self.nodes.rates @ qd
         qdd[:, self.nodes.columns] = self.nodes.shares[2] @ coefficients
         return Point(x=x, start=q[0], q=q, qd=qd, qdd=qdd)
@@ -86,14 +86,14 @@ class PathProblem:
         """See ``Problem``."""
         return distances_at(self.bodies, self._split(point.x)[1], point.q, nodes, within)
 
-    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
+    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        pairs, own, (_, others) = NearPairs.of(found), len(self.path.names), self._split(point.x)
+        pairs, count, (_, others) = NearPairs.of(distances), len(self.path.names), self._split(point.x)
         near, dq = pairs.near, by_joints.q[pairs.nodes]
-        by_path = (near.by_joints[:, None] @ dq[near.keys][..., :own])[:, 0]
+        by_path = (near.by_joints[:, None] @ dq[near.keys][..., :count])[:, 0]
         if not len(others):
             return by_path
-        return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., own:])], axis=1)
+        return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., count:])], axis=1)
 
     def arms(self, point: Point) -> SingularValues:
         """See ``Problem``."""
@@ -112,17 +112,17 @@ class PathProblem:
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the cell file, by address: the path in place of the start posture of its robot."""
-        own, others = self._split(x)
-        found, robot = self.layout.values(others, start), f"robots.{self.path.robot}"
+        spline, others = self._split(x)
+        values, robot = self.layout.values(others, start), f"robots.{self.path.robot}"
         for key in ("start", "start_deg"):
-            found[f"{robot}.{key}"] = None
-        found[f"{robot}.path"] = self.path.written(self.nodes.job.cell, own)
-        return found
+            values[f"{robot}.{key}"] = None
+        values[f"{robot}.path"] = self.path.written(self.nodes.job.cell, spline)
+        return values
 
     def _split(self, x: Array) -> tuple[Array, Array]:
         """The coefficients, and the variables of the layout."""
-        own = len(self.path.names)
-        return x[:own], x[own:]
+        count = len(self.path.names)
+        return x[:count], x[count:]
 
     def _layout_at(self, point: Point) -> Layouts:
         """The layout at a point."""

@@ -36,8 +36,8 @@ class PathVariables:
         turning = np.array([joint.is_revolute for joint in model.joints])
         scale = np.where(turning, USUAL_ANGLE, USUAL_LENGTH)
         with np.errstate(invalid="ignore"):
-            room = np.where(np.isfinite(model.upper - model.lower), BEYOND * (model.upper - model.lower), FARTHEST)
-        lower, upper = np.maximum(model.lower, -FARTHEST) - room, np.minimum(model.upper, FARTHEST) + room
+            beyond = np.where(np.isfinite(model.upper - model.lower), BEYOND * (model.upper - model.lower), FARTHEST)
+        lower, upper = np.maximum(model.lower, -FARTHEST) - beyond, np.minimum(model.upper, FARTHEST) + beyond
         lower = np.minimum(lower, given.coefficients.min(axis=0))
         upper = np.maximum(upper, given.coefficients.max(axis=0))
         key = "coefficients_deg" if turning.all() else "coefficients"

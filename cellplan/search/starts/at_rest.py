@@ -71,12 +71,12 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     columns, arm = cell.columns(cell.robots[cell.carrier].name), problem.arms[cell.carrier]
     placed = Placed(q=layouts.start[:, columns], X_WB=layouts.X_WB[:, cell.carrier], X_FT=layouts.X_FT[:, cell.carrier])
     usable = np.ones(len(x), dtype=bool)
-    own = problem.goal(cell.carrier, np.eye(4))
-    if own is not None:
-        placed, usable = reached(arm, own, problem.bounds(cell.carrier), placed)
+    goal = problem.goal(cell.carrier, np.eye(4))
+    if goal is not None:
+        placed, usable = reached(arm, goal, problem.bounds(cell.carrier), placed)
         drops["does not reach its own path"] += int(np.sum(~usable))
-    room = np.minimum(placed.q - arm.lower, arm.upper - placed.q) - problem.margin[columns]
-    usable[1:] &= room[1:].min(axis=1) >= 0.0
+    margin = np.minimum(placed.q - arm.lower, arm.upper - placed.q) - problem.margin[columns]
+    usable[1:] &= margin[1:].min(axis=1) >= 0.0
     drops["at a joint limit"] += int(np.sum(~usable)) - drops["does not reach its own path"]
     X_WB, start = layouts.X_WB.copy(), layouts.start.copy()
     X_WB[:, cell.carrier], start[:, columns] = placed.X_WB, placed.q
@@ -90,9 +90,9 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     x = problem.with_starts(
         _with_bases(problem, cell.carrier, x, X_WB[:, cell.carrier], layouts.X_WB[:, cell.carrier]), start
     )
-    found = [Setting(x=x[i], start=start[i], X_WB=X_WB[i], X_WP=X_WP[i]) for i in usable.tolist()]
-    ability = _abilities(problem, found, rng)
-    return [found[i] for i in np.argsort(-ability, kind="stable")[:count].tolist()], drops
+    settings = [Setting(x=x[i], start=start[i], X_WB=X_WB[i], X_WP=X_WP[i]) for i in usable.tolist()]
+    ability = _abilities(problem, settings, rng)
+    return [settings[i] for i in np.argsort(-ability, kind="stable")[:count].tolist()], drops
 
 
 def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) -> list[Setting]:
@@ -101,12 +101,12 @@ def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) 
     layouts = variables.layouts(variables.given[None], problem.start[None])
     x = drawn_within(variables, places, MATCHED if len(places) else 1, rng)
     x[0] = variables.given
-    found = [
-        Setting(x=each, start=problem.start, X_WB=layouts.X_WB[0], X_WP=variables.placed(each).part.X_CP) for each in x
+    settings = [
+        Setting(x=row, start=problem.start, X_WB=layouts.X_WB[0], X_WP=variables.placed(row).part.X_CP) for row in x
     ]
-    if len(found) == 1:
-        return found
-    return [found[i] for i in np.argsort(-_abilities(problem, found, rng), kind="stable")[:count].tolist()]
+    if len(settings) == 1:
+        return settings
+    return [settings[i] for i in np.argsort(-_abilities(problem, settings, rng), kind="stable")[:count].tolist()]
 
 
 def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
@@ -125,16 +125,16 @@ def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
     return x
 
 
-def _abilities(problem: StartProblem, found: list[Setting], rng: np.random.Generator) -> Array:
+def _abilities(problem: StartProblem, settings: list[Setting], rng: np.random.Generator) -> Array:
     """How much of what each operator can do suits the start of its path, for the worst operator, shape (S,)."""
-    ability = np.full(len(found), np.inf)
+    ability = np.full(len(settings), np.inf)
     for robot in problem.operators:
         if problem.freedom.leaders[robot] != robot:
             continue  # where it may stand depends on the one that it follows
         arm, bounds = problem.arms[robot], problem.bounds(robot)
-        draws = _draws(problem, robot, found[0], MATCHES, rng)[1]
+        draws = _draws(problem, robot, settings[0], MATCHES, rng)[1]
         X_BT, is_tied = arm.flanges(draws.q) @ draws.X_FT, bool(len(problem.freedom.shared))
-        for place, setting in enumerate(found):
+        for place, setting in enumerate(settings):
             goal = problem.goal(robot, setting.X_WP)
             if goal is not None:
                 X_WB = np.broadcast_to(setting.X_WB[robot], draws.X_WB.shape) if is_tied else draws.X_WB
@@ -148,9 +148,9 @@ def _draws(
 ) -> tuple[Array, Placed]:
     """Variables, shape (count, n), and configurations, bases and tools of an operator drawn within their bounds."""
     arm, model = problem.arms[robot], problem.cell.robots[robot]
-    own = problem.drawn_columns(robot)
+    columns = problem.drawn_columns(robot)
     x = np.tile(setting.x, (TEMPLATES, 1))
-    x[:, own] = drawn_within(problem.variables, own, TEMPLATES, rng)[:, own]
+    x[:, columns] = drawn_within(problem.variables, columns, TEMPLATES, rng)[:, columns]
     layouts = problem.placed_layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
     row = np.arange(count) % TEMPLATES
     margin = problem.margin[problem.cell.columns(model.name)]
@@ -189,20 +189,20 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     q, has_followed = followed(arm, goal, at)
     drops["loses its path"] = int(np.sum(~has_followed))
     x, at, q = x[has_followed], at.of_places(has_followed), q[has_followed]
-    room = np.minimum(q - arm.lower, arm.upper - q) - problem.margin[problem.cell.columns(goal.relation.robot)]
-    roomy = room.min(axis=(1, 2), initial=np.inf) >= 0.0
+    margin = np.minimum(q - arm.lower, arm.upper - q) - problem.margin[problem.cell.columns(goal.relation.robot)]
+    roomy = margin.min(axis=(1, 2), initial=np.inf) >= 0.0
     drops["joint limit"] = int(np.sum(~roomy))
     order = np.flatnonzero(roomy)
-    cost = _costs(problem, robot, q[roomy], room[roomy])
+    cost = _costs(problem, robot, q[roomy], margin[roomy])
     ranked = np.argsort(cost, kind="stable")
-    kept = _free(problem, robot, setting, at.X_WB[order][ranked], q[order][ranked], drops)
-    rows = order[ranked[kept]]
+    free = _free(problem, robot, setting, at.X_WB[order][ranked], q[order][ranked], drops)
+    rows = order[ranked[free]]
     return Pool(
         x=x[rows],
         columns=problem.freedom.own[robot],
         q=q[rows, 0],
         joints=np.arange(problem.cell.joint_count)[problem.cell.columns(goal.relation.robot)],
-        cost=cost[ranked[kept]],
+        cost=cost[ranked[free]],
         drops=drops,
     )
 
@@ -215,7 +215,7 @@ def _unreached(goal: Goal, arm: FreeArm, at: Placed) -> str:
     return f"does not reach the start of its path{far}"
 
 
-def _costs(problem: StartProblem, robot: int, q: Array, room: Array) -> Array:
+def _costs(problem: StartProblem, robot: int, q: Array, margins: Array) -> Array:
     """Logarithm of how long the joints need for the path, and what is missing of a wide margin, shape (B,)."""
     if not len(q):
         return np.zeros(0)
@@ -226,13 +226,13 @@ def _costs(problem: StartProblem, robot: int, q: Array, room: Array) -> Array:
         np.sqrt(np.abs(rates @ speeds) / problem.acceleration[columns]),
     )
     longest = np.maximum(*(share.max(axis=(1, 2)) for share in shares))
-    found: Array = np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - room.min(axis=(1, 2)) / ROOMY)
-    return found
+    costs: Array = np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - margins.min(axis=(1, 2)) / ROOMY)
+    return costs
 
 
 def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: Array, drops: Counter[str]) -> Indices:
     """The first ``KEPT`` of some draws that keep their distance from all but other operators."""
-    kept, columns = list[int](), problem.cell.columns(problem.cell.robots[robot].name)
+    indices, columns = list[int](), problem.cell.columns(problem.cell.robots[robot].name)
     nodes = np.unique([round(share * (q.shape[1] - 1)) for share in LOOKED_AT])
     for first in range(0, len(q), CONTACTS_AT_ONCE):
         group = np.arange(first, min(first + CONTACTS_AT_ONCE, len(q)))
@@ -246,26 +246,26 @@ def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: A
             node = int(np.argmax(worst[place]))
             pair = short.pair[place * len(nodes) + node]
             if pair is None:
-                kept.append(index)
+                indices.append(index)
             else:
                 drops[f"{pair[0]} too near {pair[1]}"] += 1
-        if len(kept) >= KEPT:
+        if len(indices) >= KEPT:
             break
-    return np.array(kept[:KEPT], dtype=np.intp)
+    return np.array(indices[:KEPT], dtype=np.intp)
 
 
 def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, drawn: Array) -> Array:
     """Variables of bases that were moved from where they were drawn, shape (B, n)."""
-    found, columns = x.copy(), problem.freedom.base[robot]
+    changed, columns = x.copy(), problem.freedom.base[robot]
     for component in np.flatnonzero(columns[:3] != FIXED).tolist():
-        found[:, columns[component]] += X_WB[:, component, 3] - drawn[:, component, 3]
+        changed[:, columns[component]] += X_WB[:, component, 3] - drawn[:, component, 3]
     if columns[3] != FIXED:
         turn = X_WB[:, :3, :3] @ np.swapaxes(drawn[:, :3, :3], 1, 2)
-        angle = found[:, columns[3]] + np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+        angle = changed[:, columns[3]] + np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
         lower, upper = problem.variables.lower[columns[3]], problem.variables.upper[columns[3]]
         middle = 0.5 * (lower + upper) if np.isfinite(lower + upper) else 0.0
-        found[:, columns[3]] = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
-    return found
+        changed[:, columns[3]] = middle + (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
+    return changed
 
 
 def _within(problem: StartProblem, robot: int, x: Array) -> Flags:

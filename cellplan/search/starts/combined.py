@@ -41,15 +41,15 @@ def combined(
     problem: StartProblem, setting: Setting, pools: Sequence[Pool], rng: np.random.Generator
 ) -> tuple[Array, Array, Indices]:
     """Variables, shape (C, n), and start postures, (C, nq), of combinations, and their picks, (C, pools)."""
-    sizes = [len(each.q) for each in pools]
-    picks = np.stack([_picked(each.cost, rng) for each in pools], axis=1)
+    sizes = [len(pool.q) for pool in pools]
+    picks = np.stack([_picked(pool.cost, rng) for pool in pools], axis=1)
     if np.prod(sizes) <= COMBINATIONS:
         picks = np.stack([part.ravel() for part in np.meshgrid(*(np.arange(size) for size in sizes))], axis=1)
     picks = np.unique(picks, axis=0)
     x, start = np.tile(setting.x, (len(picks), 1)), np.tile(setting.start, (len(picks), 1))
-    for column, each in enumerate(pools):
-        x[:, each.columns] = each.x[picks[:, column]][:, each.columns]
-        start[:, each.joints] = each.q[picks[:, column]]
+    for column, pool in enumerate(pools):
+        x[:, pool.columns] = pool.x[picks[:, column]][:, pool.columns]
+        start[:, pool.joints] = pool.q[picks[:, column]]
     return problem.with_starts(x, start), start, picks
 
 

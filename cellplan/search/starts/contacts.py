@@ -43,18 +43,18 @@ class Contacts:
             robots: Names of the robots.
             against: Names of further robots, whose pairs with each other do not count.
         """
-        own = set(robots)
-        known, anyone = {*own, *against, None}, {body.name: body.robot for body in scene.bodies}
+        members = set(robots)
+        known, anyone = {*members, *against, None}, {body.name: body.robot for body in scene.bodies}
         self._pairs, watched = layout_pairs(scene)
         is_design = [pair.rule is Rule.CONTACT for pair in scene.pairs] + [
             _is_column(scene, pair) for pair in scene.mounted
         ]
         owners = [{anyone[name] for name in pair.names} for pair in self._pairs]
-        kept = [
-            not design and not (pair.is_own and pair.is_fixed) and known >= each and bool(own & each)
-            for pair, design, each in zip(self._pairs, is_design, owners, strict=True)
+        is_watched = [
+            not design and not (pair.is_own and pair.is_fixed) and known >= owner and bool(members & owner)
+            for pair, design, owner in zip(self._pairs, is_design, owners, strict=True)
         ]
-        watched = among(watched, np.array(kept, dtype=bool))
+        watched = among(watched, np.array(is_watched, dtype=bool))
         watched = replace(
             watched, once=np.zeros(len(watched.rows), dtype=bool)
         )  # every configuration is another layout
@@ -82,12 +82,12 @@ class Contacts:
         if not len(rows):
             return worst, names
         D = self._table.forest.displacements(q, np.swapaxes(X_WB, 0, 1))
-        found = self._table.find(self._engine, D, float(self._demands[rows].max()))
-        short = self._demands[found.rows] - found.distances
+        nearby = self._table.find(self._engine, D, float(self._demands[rows].max()))
+        short = self._demands[nearby.rows] - nearby.distances
         for place in np.argsort(short, kind="stable").tolist():
-            sample = int(found.samples[place])
+            sample = int(nearby.samples[place])
             worst[sample] = short[place]
-            names[sample] = self._pairs[found.rows[place]].names if short[place] > 0.0 else None
+            names[sample] = self._pairs[nearby.rows[place]].names if short[place] > 0.0 else None
         return worst, names
 
 

@@ -62,32 +62,34 @@ class Freedom:
             moved[:, index] = np.any([*by_pose, np.any(starts[:, cell.columns(robot.name)], axis=1)], axis=0)
         is_part = np.array([name.startswith("part.at") for name in variables.names], dtype=bool)
         leader = _leaders(cell, variables.names, np.where(is_part[:, None], False, moved))
-        own = tuple(np.flatnonzero(leader == index) for index in range(len(cell.robots)))
+        led_columns = tuple(np.flatnonzero(leader == index) for index in range(len(cell.robots)))
         columns = np.full(cell.joint_count, FIXED)
         for column in np.flatnonzero(leader != FIXED).tolist():
             changed = np.flatnonzero(starts[column])
             if len(changed) == 1:
                 columns[changed[0]] = column
-        base = [_base_columns(robot.name, variables.names, own[i]) for i, robot in enumerate(cell.robots)]
+        base = [_base_columns(robot.name, variables.names, led_columns[i]) for i, robot in enumerate(cell.robots)]
         led = [set(leader[moved[:, index] & ~is_part]) - {FIXED, index} for index in range(len(cell.robots))]
         return cls(
-            own=own,
+            own=led_columns,
             base=np.array(base, dtype=np.intp),
             columns=columns,
             shared=np.flatnonzero((leader == FIXED) & ~is_part & (moved.sum(axis=1) > 1)),
             part=np.flatnonzero(is_part),
-            leaders=tuple(int(min(each, default=index)) for index, each in enumerate(led)),
+            leaders=tuple(int(min(followed, default=index)) for index, followed in enumerate(led)),
         )
 
     def groups(self, operators: Sequence[int]) -> list[tuple[int, ...]]:
         """Operators by what ties them to each other, those that lead first."""
-        found = dict[int, list[int]]()
+        groups = dict[int, list[int]]()
         for robot in operators:
             first = robot
             for _ in self.leaders:
                 first = self.leaders[first]
-            found.setdefault(first, []).append(robot)
-        return [tuple(sorted(each, key=lambda robot: (self.leaders[robot] != robot, robot))) for each in found.values()]
+            groups.setdefault(first, []).append(robot)
+        return [
+            tuple(sorted(group, key=lambda robot: (self.leaders[robot] != robot, robot))) for group in groups.values()
+        ]
 
 
 def _leaders(cell: Cell, names: Sequence[str], moved: Flags) -> Indices:
@@ -103,9 +105,9 @@ def _leaders(cell: Cell, names: Sequence[str], moved: Flags) -> Indices:
     return leader
 
 
-def _base_columns(robot: str, names: Sequence[str], own: Indices) -> list[int]:
+def _base_columns(robot: str, names: Sequence[str], columns: Indices) -> list[int]:
     """Columns of the components of a robot's base."""
-    places = {names[column]: column for column in own.tolist()}
+    places = {names[column]: column for column in columns.tolist()}
     return [places.get(f"robots.{robot}.base.{component}", FIXED) for component in COMPONENTS]
 
 

@@ -118,8 +118,8 @@ class StartGenerator:
             return many, starts
         followed = run(problem.job, problem.variables.layouts(many, starts))
         is_other = np.abs(followed.q[:, 0] - start).max(axis=1) > SAME_POSTURE
-        kept = followed.is_followed & is_other
-        return many[kept], followed.q[kept, 0]
+        is_new = followed.is_followed & is_other
+        return many[is_new], followed.q[is_new, 0]
 
     def _of_layout(self, origin: Origin, text: str, x: Array, start: Array) -> Starts:
         """One layout as it is, else with other branches of inverse kinematics of the operators."""
@@ -144,11 +144,11 @@ class StartGenerator:
             if reason:
                 reasons.append(reason)
                 continue
-            found = judged(here, *combined(here, setting, found_bases, rng))
-            if len(found.x):
+            judgement = judged(here, *combined(here, setting, found_bases, rng))
+            if len(judgement.x):
                 text = f"sampled with the part at rest, draw {number}"
-                return Starts(found=self._starts(Origin.SAMPLED, text, found), reason="".join(reasons[:1]))
-            reasons.append(f"no combination follows all paths: {words(found.drops)}")
+                return Starts(found=self._starts(Origin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
+            reasons.append(f"no combination follows all paths: {words(judgement.drops)}")
         return Starts(found=(), reason="".join(reasons[:1]))
 
     def _random(self, rng: np.random.Generator, number: int) -> Starts:
@@ -160,22 +160,25 @@ class StartGenerator:
         x, start = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
         if not len(x):
             return Starts(found=(), reason=_most_frequent([part[2] for part in parts]))
-        found = judged(problem, x, start)
+        judgement = judged(problem, x, start)
         text = f"drawn within the bounds, draw {number}"
-        return Starts(found=self._starts(Origin.RANDOM, text, found), reason="" if len(found.x) else words(found.drops))
+        return Starts(
+            found=self._starts(Origin.RANDOM, text, judgement),
+            reason="" if len(judgement.x) else words(judgement.drops),
+        )
 
-    def _starts(self, origin: Origin, text: str, found: Judged) -> tuple[Start, ...]:
+    def _starts(self, origin: Origin, text: str, judgement: Judged) -> tuple[Start, ...]:
         """Candidates as starts, spread."""
         return tuple(
             Start(
-                x=found.x[i],
-                start=found.start[i],
+                x=judgement.x[i],
+                start=judgement.start[i],
                 origin=origin,
                 text=text,
-                violation=float(found.violation[i]),
-                cycle=float(found.cycle[i]),
+                violation=float(judgement.violation[i]),
+                cycle=float(judgement.cycle[i]),
             )
-            for i in _spread(found.violation, found.picks).tolist()
+            for i in _spread(judgement.violation, judgement.picks).tolist()
         )
 
 
@@ -191,5 +194,5 @@ def _spread(violation: Array, picks: Indices) -> Indices:
 
 def _most_frequent(reasons: Sequence[str]) -> str:
     """The reason that comes most often, and how often."""
-    (reason, count), *_ = sorted(Counter(reasons).items(), key=lambda each: (-each[1], each[0]))
+    (reason, count), *_ = sorted(Counter(reasons).items(), key=lambda entry: (-entry[1], entry[0]))
     return f"{reason} (in {count} of {len(reasons)} layouts)"

@@ -22,7 +22,7 @@ def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> 
         setting: Where the part rests.
         rng: Random numbers.
     """
-    found = list[Pool]()
+    pools = list[Pool]()
     for first, *others in problem.freedom.groups(problem.operators):
         together = _finer(problem, first, setting, rng)
         robot = first
@@ -33,40 +33,40 @@ def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> 
         if not len(together.q):
             drops, name = together.drops, problem.cell.robots[robot].name
             return [], f"'{name}' follows its path from none of {drops.total()} bases: {words(drops)}"
-        found.append(together)
-    return found, ""
+        pools.append(together)
+    return pools, ""
 
 
 def _finer(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
     """The pool of one operator, its path at more nodes where no base follows."""
-    found = pool(problem, robot, setting, rng)
-    if len(found.q):
-        return found
+    finer = pool(problem, robot, setting, rng)
+    if len(finer.q):
+        return finer
     return pool(replace(problem, at_rest=problem.at_rest_fine), robot, setting, rng)
 
 
 def _beside(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
     """A pool with one operator more, whose base follows from those of the pool."""
     x, q, cost, drops = list(led.x[:0]), list(led.q[:0]), list[float](), Counter[str]()
-    own = led
+    follower = led
     for row in range(min(len(led.q), LEADING)):
         there, start = setting.x.copy(), setting.start.copy()
         there[led.columns], start[led.joints] = led.x[row, led.columns], led.q[row]
         X_WB = problem.placed_layouts(there[None], start[None]).X_WB[0]
-        own = pool(problem, robot, replace(setting, x=there, start=start, X_WB=X_WB), rng)
-        drops += own.drops
-        kept = slice(0, FOLLOWING)
-        x += list(own.x[kept])
-        q += [np.append(led.q[row], each) for each in own.q[kept]]
-        cost += (led.cost[row] + own.cost[kept]).tolist()
+        follower = pool(problem, robot, replace(setting, x=there, start=start, X_WB=X_WB), rng)
+        drops += follower.drops
+        first = slice(0, FOLLOWING)
+        x += list(follower.x[first])
+        q += [np.append(led.q[row], posture) for posture in follower.q[first]]
+        cost += (led.cost[row] + follower.cost[first]).tolist()
         if len(x) >= KEPT:
             break
     order = np.argsort(cost, kind="stable")[:KEPT].astype(np.intp)
     return Pool(
         x=np.array(x).reshape(-1, led.x.shape[1])[order],
-        columns=np.append(led.columns, own.columns),
+        columns=np.append(led.columns, follower.columns),
         q=np.array(q).reshape(len(x), -1)[order],
-        joints=np.append(led.joints, own.joints),
+        joints=np.append(led.joints, follower.joints),
         cost=np.array(cost)[order],
         drops=drops,
     )
@@ -74,5 +74,7 @@ def _beside(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng:
 
 def words(drops: Counter[str]) -> str:
     """The most frequent reasons in words."""
-    shown = sorted(((count, reason) for reason, count in drops.items() if count), key=lambda each: (-each[0], each[1]))
+    shown = sorted(
+        ((count, reason) for reason, count in drops.items() if count), key=lambda entry: (-entry[0], entry[1])
+    )
     return ", ".join(f"{reason} ({count})" for count, reason in shown[:SHOWN]) or "nothing was drawn"

@@ -42,9 +42,9 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
     q = np.where(np.all(on_nearest_turns(model, near) == near, axis=1)[:, None], near, on_nearest_turns(model, near))
     q = _distinct(q)
     path, has_followed = followed(arm, goal, Placed(q=q, X_WB=X_WB[: len(q)], X_FT=X_FT[: len(q)]))
-    room = joint_margin_shares(model, path[has_followed]).min(axis=(1, 2), initial=np.inf)
-    order = np.argsort(-room, kind="stable")
-    return q[has_followed][order[room[order] >= 0.0]][:BRANCHES]
+    margin = joint_margin_shares(model, path[has_followed]).min(axis=(1, 2), initial=np.inf)
+    order = np.argsort(-margin, kind="stable")
+    return q[has_followed][order[margin[order] >= 0.0]][:BRANCHES]
 
 
 def branch_starts(
@@ -66,14 +66,16 @@ def branch_starts(
     nothing = np.zeros((0, len(x))), np.zeros((0, len(start)))
     start = problem.variables.layouts(x[None], start[None]).start[0]
     choices = []
-    operators = [each for each in problem.operators if robots is None or problem.cell.robots[each].name in robots]
+    operators = [
+        operator for operator in problem.operators if robots is None or problem.cell.robots[operator].name in robots
+    ]
     for robot in operators:
-        found = branches(problem, robot, x, start, rng)
-        if not len(found):
+        postures = branches(problem, robot, x, start, rng)
+        if not len(postures):
             name = problem.cell.robots[robot].name
             return *nothing, f"'{name}' follows its path from no configuration with the part at rest"
-        choices.append(found)
-    while np.prod([len(each) for each in choices]) > COMBINATIONS:
+        choices.append(postures)
+    while np.prod([len(choice) for choice in choices]) > COMBINATIONS:
         longest = max(range(len(choices)), key=lambda place: len(choices[place]))
         choices[longest] = choices[longest][:-1]
     rows = []
@@ -92,5 +94,5 @@ def _distinct(q: Array) -> Array:
         return q
     q = q[np.lexsort(np.round(q / SAME_POSTURE).T[::-1])]
     is_new = np.append(True, np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_POSTURE)
-    found: Array = q[is_new]
-    return found
+    distinct: Array = q[is_new]
+    return distinct

@@ -75,7 +75,7 @@ class StartProblem:
         schedule, moving = schedule_paths(cell, [paths[name] for name in phase.tasks]), tuple(phase.moving)
         middles = [0.5 * np.add(*finite_limits(robot.model)) for robot in cell.robots]
         starts = [
-            middle if each.start is None else each.start for each, middle in zip(cell.robots, middles, strict=True)
+            middle if robot.start is None else robot.start for robot, middle in zip(cell.robots, middles, strict=True)
         ]
         start = np.concatenate(starts)
         return cls(
@@ -147,8 +147,8 @@ class StartProblem:
         columns = self.cell.columns(self.cell.positioners[0])
         X_BF = self.arms[self.cell.carrier].flanges(layouts.start[:1, columns])[0]
         X_WB, X_FT = (part[0, self.cell.carrier] for part in (layouts.X_WB, layouts.X_FT))
-        found: Array = X_WB @ X_BF @ X_FT @ self.cell.part.X_CP
-        return found
+        pose: Array = X_WB @ X_BF @ X_FT @ self.cell.part.X_CP
+        return pose
 
     def bounds(self, robot: int) -> BaseBounds:
         """How far the base of a robot may be moved."""
@@ -158,14 +158,14 @@ class StartProblem:
 
     def drawn_columns(self, robot: int) -> Indices:
         """Columns of what is drawn for an operator: all its own but the positions of its joints at the start."""
-        own = self.freedom.own[robot]
-        return own[~np.isin(own, self.freedom.columns)]
+        columns = self.freedom.own[robot]
+        return columns[~np.isin(columns, self.freedom.columns)]
 
     def with_starts(self, x: Array, start: Array) -> Array:
         """Variables, shape (K, n), with those that are positions of joints at the start taken from these, (K, nq)."""
-        found, columns = x.copy(), self.freedom.columns
-        found[:, columns[columns != FIXED]] = start[:, columns != FIXED]
-        return found
+        changed, columns = x.copy(), self.freedom.columns
+        changed[:, columns[columns != FIXED]] = start[:, columns != FIXED]
+        return changed
 
 
 def _contacts(cell: Cell, scene: Scene) -> dict[str, Any]:

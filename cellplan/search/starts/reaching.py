@@ -166,9 +166,9 @@ def followed(arm: FreeArm, goal: Goal, draws: Placed) -> tuple[Array, Flags]:
         if node > 1:
             here += q[at, node - 1] - q[at, node - 2]
         here, is_near = _corrected(arm, goal, node, replace(draws.of_places(at), q=here))
-        kept = is_near & (np.abs(here - q[at, node - 1]).max(axis=1) < LOST)
-        at = at[kept]
-        q[at, node] = here[kept]
+        is_followed = is_near & (np.abs(here - q[at, node - 1]).max(axis=1) < LOST)
+        at = at[is_followed]
+        q[at, node] = here[is_followed]
     has_followed = np.zeros(count, dtype=bool)
     has_followed[at] = True
     return q, has_followed
@@ -206,12 +206,12 @@ def _linearised(arm: FreeArm, goal: Goal, node: int, draws: Placed, is_free: Fla
 
 def _by_base(goal: Goal, X_WB: Array, X_BT: Array) -> Array:
     """Twists of the tools in the axes of R for x, y, z and yaw of their bases, shape (B, 6, 4)."""
-    found = np.zeros((len(X_WB), 6, 4))
+    twists = np.zeros((len(X_WB), 6, 4))
     away = (X_WB[:, :3, :3] @ X_BT[:, :3, 3, None])[:, :, 0]
-    found[:, :3, :3] = np.eye(3)
-    found[:, :3, 3], found[:, 3:, 3] = np.cross(UP, away), UP
+    twists[:, :3, :3] = np.eye(3)
+    twists[:, :3, 3], twists[:, 3:, 3] = np.cross(UP, away), UP
     to_R = goal.X_WR[:3, :3].T
-    return np.concatenate([to_R @ found[:, :3], to_R @ found[:, 3:]], axis=1)
+    return np.concatenate([to_R @ twists[:, :3], to_R @ twists[:, 3:]], axis=1)
 
 
 def _damped(J: Array, error: Array) -> Array:

@@ -19,15 +19,15 @@ def cells_beside(state: State, cell: Cell, tied: Tied, step: float) -> Iterator[
         tied: The numbers.
         step: In [m] or [rad].
     """
-    for each, by in zip(tied.ranges, tied.factors, strict=True):
-        if each.kind not in {VariableKind.TOOL, VariableKind.GRASP, VariableKind.PART}:
+    for variable, by in zip(tied.ranges, tied.factors, strict=True):
+        if variable.kind not in {VariableKind.TOOL, VariableKind.GRASP, VariableKind.PART}:
             continue
-        values = state.numbers(cell, [each])
-        sides = [state.changed(cell, [each], values + change) for change in (step, -step)]
-        if each.kind is VariableKind.TOOL:
-            forward, back = (_with_tool(side, cell, cell.index(each.name)) for side in sides)
-            yield Beside(robot=each.name, by=by, sides=(forward, back))
-        if each.kind is not VariableKind.TOOL or cell.index(each.name) == cell.carrier:
+        values = state.numbers(cell, [variable])
+        sides = [state.changed(cell, [variable], values + change) for change in (step, -step)]
+        if variable.kind is VariableKind.TOOL:
+            forward, back = (_with_tool(side, cell, cell.index(variable.name)) for side in sides)
+            yield Beside(robot=variable.name, by=by, sides=(forward, back))
+        if variable.kind is not VariableKind.TOOL or cell.index(variable.name) == cell.carrier:
             forward, back = (side.cell(cell, tied.ranges) for side in sides)
             yield Beside(robot=None, by=by, sides=(forward, back))
 

@@ -37,8 +37,10 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     Returns:
         Values by address for ``Cell.with_values``, and sentences about what they do.
     """
-    varied = {each.name for each in settings.ranges if each.kind is VariableKind.BASE}
-    tilted = {each.name for each in settings.ranges if each.kind is VariableKind.BASE and each.index in {3, 4}}
+    varied = {variable.name for variable in settings.ranges if variable.kind is VariableKind.BASE}
+    tilted = {
+        variable.name for variable in settings.ranges if variable.kind is VariableKind.BASE and variable.index in {3, 4}
+    }
     named = {body for pair in cell.checks.exclusions for body in pair.bodies}
     values, remarks = dict[str, object](), list[str]()
     for obstacle in cell.obstacles:
@@ -74,29 +76,35 @@ def with_room_below(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0
     Raises:
         InputError: That leaves no height.
     """
-    found, shortest = [], SHORTEST + spare
-    for each in ranges:
-        mount = cell.robot(each.name).pedestal if each.kind is VariableKind.BASE and each.index == 2 else None
-        lower, upper = each.lower, each.upper
+    extended, shortest = [], SHORTEST + spare
+    for variable in ranges:
+        mount = (
+            cell.robot(variable.name).pedestal if variable.kind is VariableKind.BASE and variable.index == 2 else None
+        )
+        lower, upper = variable.lower, variable.upper
         if isinstance(mount, Hanger):
             upper = min(upper, mount.ceiling - shortest)
         elif isinstance(mount, Pedestal | Wedge):
             lower = max(lower, mount.floor + shortest)
         if isinstance(mount, Wedge):
-            lower = max(lower, mount.floor + shortest + _slope(cell, each.name, ranges) * _outer_radius(mount))
+            lower = max(lower, mount.floor + shortest + _slope(cell, variable.name, ranges) * _outer_radius(mount))
         if not lower < upper:
-            where = cell.origin.at(f"layout.vary.{each.address.removeprefix('robots.').removesuffix('.z_mm')}")
-            raise InputError(f"{where}: expected heights that leave a column at the base of '{each.name}'")
-        found.append(replace(each, lower=lower, upper=upper))
-    return tuple(found)
+            where = cell.origin.at(f"layout.vary.{variable.address.removeprefix('robots.').removesuffix('.z_mm')}")
+            raise InputError(f"{where}: expected heights that leave a column at the base of '{variable.name}'")
+        extended.append(replace(variable, lower=lower, upper=upper))
+    return tuple(extended)
 
 
 def _slope(cell: Cell, robot: str, ranges: Sequence[VaryRange]) -> float:
     """Steepest slope of a base at any roll and pitch that it may have."""
     R = cell.robot(robot).X_WB[:3, :3]
     steepest = math.acos(min(1.0, max(-1.0, float(R[2, 2]))))
-    own = [each for each in ranges if each.kind is VariableKind.BASE and each.name == robot and each.index in {3, 4}]
-    widest = sum(max(abs(each.lower), abs(each.upper)) for each in own)
+    tilts = [
+        variable
+        for variable in ranges
+        if variable.kind is VariableKind.BASE and variable.name == robot and variable.index in {3, 4}
+    ]
+    widest = sum(max(abs(tilt.lower), abs(tilt.upper)) for tilt in tilts)
     return math.tan(min(max(widest, steepest), STEEPEST))
 
 
@@ -137,9 +145,9 @@ def _ends(obstacle: Obstacle) -> tuple[float, float] | None:
 def _column(robot: Robot, obstacle: Obstacle) -> dict[str, Any] | None:
     """The pedestal as a cell file writes it; None where it would not be the same body."""
     ends, shape = _ends(obstacle), obstacle.shape
-    beside = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
+    offset = robot.X_WB[:2, 3] - obstacle.X_WS[:2, 3]
     leans = math.acos(min(1.0, max(-1.0, float(robot.X_WB[2, 2])))) > MOST_LEAN
-    if ends is None or leans or float(np.hypot(*beside)) > CENTRED:
+    if ends is None or leans or float(np.hypot(*offset)) > CENTRED:
         return None
     floor = {"floor_z_mm": written_quantity(ends[0], is_angle=False)}
     if isinstance(shape, Cylinder):
@@ -152,14 +160,14 @@ def _sides(X_WB: Array, X_WS: Array, box: Box) -> list[float] | None:
     """Edge lengths in [mm] of an upright box along the x and y of a base; None where they are turned."""
     heading = math.atan2(float(X_WB[1, 0]), float(X_WB[0, 0]))
     x = np.array([math.cos(heading), math.sin(heading), 0.0])
-    found = []
+    sides = []
     for axis in (x, np.array([-x[1], x[0], 0.0])):
         along = np.abs(X_WS[:3, :3].T @ axis)
         side = int(np.argmax(along))
         if along[side] < math.cos(ALIGNED):
             return None
-        found.append(_mm(box.size[side]))
-    return found
+        sides.append(_mm(box.size[side]))
+    return sides
 
 
 def _mm(length: float) -> float:

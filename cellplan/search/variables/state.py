@@ -48,53 +48,53 @@ class State:
     def changed(self, cell: Cell, ranges: Sequence[VaryRange], numbers: Array) -> "State":
         """The layout with other numbers, of a weight its logarithm, shape (m,)."""
         bases, grasps, part, spins, weights, starts = (
-            each.copy() for each in (self.bases, self.grasps, self.part, self.spins, self.weights, self.starts)
+            group.copy() for group in (self.bases, self.grasps, self.part, self.spins, self.weights, self.starts)
         )
         rods = list(self.rods)
         tasks = [task.name for task in cell.tasks]
-        for each, number in zip(ranges, numbers.tolist(), strict=True):
-            match each.kind:
+        for variable, number in zip(ranges, numbers.tolist(), strict=True):
+            match variable.kind:
                 case VariableKind.BASE:
-                    bases[cell.index(each.name), each.index] = number
+                    bases[cell.index(variable.name), variable.index] = number
                 case VariableKind.GRASP:
-                    grasps[cell.positioners.index(each.name), each.index] = number
+                    grasps[cell.positioners.index(variable.name), variable.index] = number
                 case VariableKind.PART:
-                    part[each.index] = number
+                    part[variable.index] = number
                 case VariableKind.TOOL:
-                    at = cell.index(each.name)
-                    rods[at] = _with_number(rods[at], each.index, number)
+                    at = cell.index(variable.name)
+                    rods[at] = _with_number(rods[at], variable.index, number)
                 case VariableKind.SPIN:
-                    spins[tasks.index(each.name)] = number
+                    spins[tasks.index(variable.name)] = number
                 case VariableKind.WEIGHT:
-                    weights[cell.columns(each.name)][each.index] = math.exp(number)
+                    weights[cell.columns(variable.name)][variable.index] = math.exp(number)
                 case VariableKind.START:
-                    starts[cell.columns(each.name)][each.index] = number
+                    starts[cell.columns(variable.name)][variable.index] = number
         return State(
             bases=bases, grasps=grasps, part=part, rods=tuple(rods), spins=spins, weights=weights, starts=starts
         )
 
     def numbers(self, cell: Cell, ranges: Sequence[VaryRange]) -> Array:
         """The numbers of the layout, of a weight its logarithm; NaN for what the cell does not have, shape (m,)."""
-        tasks, found = [task.name for task in cell.tasks], np.full(len(ranges), np.nan)
-        for row, each in enumerate(ranges):
-            match each.kind:
+        tasks, numbers = [task.name for task in cell.tasks], np.full(len(ranges), np.nan)
+        for row, variable in enumerate(ranges):
+            match variable.kind:
                 case VariableKind.BASE:
-                    found[row] = self.bases[cell.index(each.name), each.index]
-                case VariableKind.GRASP if each.name in cell.positioners:
-                    found[row] = self.grasps[cell.positioners.index(each.name), each.index]
+                    numbers[row] = self.bases[cell.index(variable.name), variable.index]
+                case VariableKind.GRASP if variable.name in cell.positioners:
+                    numbers[row] = self.grasps[cell.positioners.index(variable.name), variable.index]
                 case VariableKind.PART:
-                    found[row] = self.part[each.index]
+                    numbers[row] = self.part[variable.index]
                 case VariableKind.TOOL:
-                    rod = self.rods[cell.index(each.name)]
-                    found[row] = np.nan if rod is None else (rod.length, rod.tilt, rod.roll)[each.index]
-                case VariableKind.SPIN if each.name in tasks:
-                    found[row] = self.spins[tasks.index(each.name)]
+                    rod = self.rods[cell.index(variable.name)]
+                    numbers[row] = np.nan if rod is None else (rod.length, rod.tilt, rod.roll)[variable.index]
+                case VariableKind.SPIN if variable.name in tasks:
+                    numbers[row] = self.spins[tasks.index(variable.name)]
                 case VariableKind.WEIGHT:
-                    found[row] = math.log(self.weights[cell.columns(each.name)][each.index])
+                    numbers[row] = math.log(self.weights[cell.columns(variable.name)][variable.index])
                 case VariableKind.START:
-                    start = cell.robot(each.name).start
-                    found[row] = np.nan if start is None else start[each.index]
-        return found
+                    start = cell.robot(variable.name).start
+                    numbers[row] = np.nan if start is None else start[variable.index]
+        return numbers
 
     def cell(self, cell: Cell, ranges: Sequence[VaryRange]) -> Cell:
         """The cell with this layout, neither rounded nor validated; starts as far as they are among the numbers."""
@@ -154,11 +154,11 @@ class State:
 
 def concerned(cell: Cell, ranges: Sequence[VaryRange], *kinds: VariableKind) -> list[int]:
     """Indices of the robots that numbers of some kinds belong to; a part at rest concerns them all."""
-    found = [each for each in ranges if each.kind in kinds]
-    if any(each.kind is VariableKind.PART for each in found):
+    chosen = [variable for variable in ranges if variable.kind in kinds]
+    if any(variable.kind is VariableKind.PART for variable in chosen):
         return list(range(len(cell.robots)))
     doing = {task.name: task.robot for task in cell.tasks}
-    names = {doing[each.name] if each.kind is VariableKind.SPIN else each.name for each in found}
+    names = {doing[variable.name] if variable.kind is VariableKind.SPIN else variable.name for variable in chosen}
     return [index for index, robot in enumerate(cell.robots) if robot.name in names]
 
 
@@ -183,5 +183,5 @@ def _with_number(rod: Rod | None, index: int, number: float) -> Rod:
 
 def _with_rod(tool: Tool, rod: Rod) -> Tool:
     """A tool with another rod; its further solids stay."""
-    own = rod.bodies()
-    return replace(tool, X_FT=rod.X_FT, bodies=(*own, *tool.bodies[len(own) :]), rod=rod)
+    bodies = rod.bodies()
+    return replace(tool, X_FT=rod.X_FT, bodies=(*bodies, *tool.bodies[len(bodies) :]), rod=rod)

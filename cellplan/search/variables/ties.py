@@ -41,24 +41,24 @@ class Tied:
         """Those of a layout."""
         ranges = settings.ranges
         led = _leaders(settings)
-        leaders = [each.address for each in ranges if led[each.address][0] == each.address]
+        leaders = [variable.address for variable in ranges if led[variable.address][0] == variable.address]
         factors, terms = np.zeros((len(ranges), len(leaders))), np.zeros(len(ranges))
         lower, upper = np.full(len(leaders), -np.inf), np.full(len(leaders), np.inf)
         cost, scale, given = np.zeros(len(leaders)), np.zeros(len(leaders)), np.zeros(len(leaders))
         remarks = list[str]()
-        for row, each in enumerate(ranges):
-            leader, factor, term = led[each.address]
+        for row, variable in enumerate(ranges):
+            leader, factor, term = led[variable.address]
             column = leaders.index(leader)
             factors[row, column], terms[row] = factor, term
-            low, high = number_of(each, each.lower), number_of(each, each.upper)
-            if leader == each.address or not _is_full_turn(each):
+            low, high = number_of(variable, variable.lower), number_of(variable, variable.upper)
+            if leader == variable.address or not _is_full_turn(variable):
                 ends = sorted(((low - term) / factor, (high - term) / factor))
                 lower[column], upper[column] = max(lower[column], ends[0]), min(upper[column], ends[1])
-            cost[column] += settings.cost.get(each.address, 1.0) / _costly(each)
+            cost[column] += settings.cost.get(variable.address, 1.0) / _costly(variable)
         for column, address in enumerate(leaders):
-            each = next(it for it in ranges if it.address == address)
-            scale[column] = min(_usual(each), (upper[column] - lower[column]) / STEPS)
-            given[column], remark = _brought_in(each, float(lower[column]), float(upper[column]))
+            variable = next(it for it in ranges if it.address == address)
+            scale[column] = min(_usual(variable), (upper[column] - lower[column]) / STEPS)
+            given[column], remark = _brought_in(variable, float(lower[column]), float(upper[column]))
             remarks += [remark] if remark else []
         return cls(
             ranges=ranges,
@@ -75,23 +75,23 @@ class Tied:
 
     def values(self, numbers: Array) -> Array:
         """Variables with given numbers, brought into their bounds; as in the file where a number is NaN, shape (n,)."""
-        found = self.given.copy()
-        for row, each in enumerate(self.ranges):
-            if each.address in self.names and np.isfinite(numbers[row]):
-                column = self.names.index(each.address)
+        values = self.given.copy()
+        for row, variable in enumerate(self.ranges):
+            if variable.address in self.names and np.isfinite(numbers[row]):
+                column = self.names.index(variable.address)
                 lower, upper = float(self.lower[column]), float(self.upper[column])
-                found[column] = min(max(into_turn(each, float(numbers[row]), lower, upper), lower), upper)
-        return found
+                values[column] = min(max(into_turn(variable, float(numbers[row]), lower, upper), lower), upper)
+        return values
 
 
-def number_of(each: VaryRange, value: float) -> float:
+def number_of(variable: VaryRange, value: float) -> float:
     """A number of the file as a variable has it: the logarithm of a weight, all others as they are."""
-    return math.log(value) if each.kind is VariableKind.WEIGHT else value
+    return math.log(value) if variable.kind is VariableKind.WEIGHT else value
 
 
-def into_turn(each: VaryRange, value: float, lower: float, upper: float) -> float:
+def into_turn(variable: VaryRange, value: float, lower: float, upper: float) -> float:
     """An angle of a pose or a tool, by whole turns between bounds where that is possible; others as they are."""
-    if not each.is_angle or each.kind is VariableKind.START or lower <= value <= upper:
+    if not variable.is_angle or variable.kind is VariableKind.START or lower <= value <= upper:
         return value
     moved = value + FULL_TURN * math.ceil((lower - TURN_ROOM - value) / FULL_TURN)
     return moved if moved <= upper + TURN_ROOM else value
@@ -99,54 +99,58 @@ def into_turn(each: VaryRange, value: float, lower: float, upper: float) -> floa
 
 def _leaders(settings: LayoutSettings) -> dict[str, tuple[str, float, float]]:
     """The number that each one follows, with a factor and a term; itself for those that follow none."""
-    led = {each.address: (each.address, 1.0, 0.0) for each in settings.ranges}
+    led = {variable.address: (variable.address, 1.0, 0.0) for variable in settings.ranges}
     for members in settings.equal:
         led |= dict.fromkeys(members, (members[0], 1.0, 0.0))
-    bases = {(each.name, each.index): each.address for each in settings.ranges if each.kind is VariableKind.BASE}
+    bases = {
+        (variable.name, variable.index): variable.address
+        for variable in settings.ranges
+        if variable.kind is VariableKind.BASE
+    }
     for pair in settings.mirrored:
         for index in range(6):
             first, second = (bases.get((robot, index)) for robot in pair.robots)
             if first is None or second is None:
                 continue
             factor, term = mirror_image(pair, index)
-            leader, own, shift = led[first]
-            led[second] = (leader, factor * own, factor * shift + term)
+            leader, slope, shift = led[first]
+            led[second] = (leader, factor * slope, factor * shift + term)
     return led
 
 
-def _is_full_turn(each: VaryRange) -> bool:
+def _is_full_turn(variable: VaryRange) -> bool:
     """Whether a range holds every direction, so that it bounds nothing."""
-    is_turning = each.is_angle and each.kind is not VariableKind.START
-    return is_turning and each.upper - each.lower >= FULL_TURN - TURN_ROOM
+    is_turning = variable.is_angle and variable.kind is not VariableKind.START
+    return is_turning and variable.upper - variable.lower >= FULL_TURN - TURN_ROOM
 
 
-def _usual(each: VaryRange) -> float:
+def _usual(variable: VaryRange) -> float:
     """A usual step."""
-    if each.kind is VariableKind.WEIGHT:
+    if variable.kind is VariableKind.WEIGHT:
         return USUAL_FACTOR
-    return USUAL_ANGLE if each.is_angle else USUAL_LENGTH
+    return USUAL_ANGLE if variable.is_angle else USUAL_LENGTH
 
 
-def _costly(each: VaryRange) -> float:
+def _costly(variable: VaryRange) -> float:
     """A change that costs 1 unless the file says otherwise."""
-    return COSTLY_FACTOR if each.kind is VariableKind.WEIGHT else _usual(each)
+    return COSTLY_FACTOR if variable.kind is VariableKind.WEIGHT else _usual(variable)
 
 
-def _brought_in(each: VaryRange, lower: float, upper: float) -> tuple[float, str | None]:
+def _brought_in(variable: VaryRange, lower: float, upper: float) -> tuple[float, str | None]:
     """The value in the file between its bounds, and what there is to say about it."""
-    if each.given is None:
+    if variable.given is None:
         return 0.5 * (lower + upper), None
-    value = into_turn(each, number_of(each, each.given), lower, upper)
+    value = into_turn(variable, number_of(variable, variable.given), lower, upper)
     inside = min(max(value, lower), upper)
     if abs(inside - value) <= TURN_ROOM:
         return inside, None
-    if each.kind is VariableKind.WEIGHT:
+    if variable.kind is VariableKind.WEIGHT:
         shown = [f"{math.exp(number):g}" for number in (value, lower, upper)]
     else:
-        unit, scale = ("deg", math.degrees(1.0)) if each.is_angle else ("mm", 1000.0)
+        unit, scale = ("deg", math.degrees(1.0)) if variable.is_angle else ("mm", 1000.0)
         shown = [f"{number * scale:.6g} {unit}" for number in (value, lower, upper)]
     end = shown[1] if value < lower else shown[2]
     return (
         inside,
-        f"{each.address}: {shown[0]} is outside its range {shown[1]} to {shown[2]}: the search starts at {end}",
+        f"{variable.address}: {shown[0]} is outside its range {shown[1]} to {shown[2]}: the search starts at {end}",
     )

@@ -18,12 +18,12 @@ def pose_twists(rpy: Array) -> Array:
         rpy: Roll, pitch and yaw in [rad], shape (3,).
     """
     turned = rotation_about(Z, rpy[2])
-    found = np.zeros((6, 6))
-    found[:3, :3] = np.eye(3)
-    found[3, 3:] = turned @ rotation_about(Y, rpy[1]) @ X
-    found[4, 3:] = turned @ Y
-    found[5, 3:] = Z
-    return found
+    twists = np.zeros((6, 6))
+    twists[:3, :3] = np.eye(3)
+    twists[3, 3:] = turned @ rotation_about(Y, rpy[1]) @ X
+    twists[4, 3:] = turned @ Y
+    twists[5, 3:] = Z
+    return twists
 
 
 def rod_twists(rod: Rod) -> Array:
@@ -31,11 +31,11 @@ def rod_twists(rod: Rod) -> Array:
 
     A change of the length moves the tip.
     """
-    found = np.zeros((3, 6))
-    found[0, :3] = rod.X_FT[:3, 2]
-    found[1, 3:] = rotation_about(Z, rod.roll) @ Y
-    found[2, 3:] = Z
-    return found
+    twists = np.zeros((3, 6))
+    twists[0, :3] = rod.X_FT[:3, 2]
+    twists[1, 3:] = rotation_about(Z, rod.roll) @ Y
+    twists[2, 3:] = Z
+    return twists
 
 
 def carried(twists: Array, X: Array) -> Array:

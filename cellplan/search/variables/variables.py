@@ -102,7 +102,7 @@ class Variables:
             x: Values of the variables, shape (K, n).
             start: Start postures in [rad] or [m], shape (K, nq); those among the variables are taken from x.
         """
-        base, states = self.base, [self.state(each) for each in x]
+        base, states = self.base, [self.state(row) for row in x]
         chosen = np.array([state.starts for state in states])
         X_WB = np.tile(np.array([robot.X_WB for robot in base.robots]), (len(x), 1, 1, 1))
         X_FT = np.tile(np.array([robot.tool.X_FT for robot in base.robots]), (len(x), 1, 1, 1))
@@ -122,10 +122,10 @@ class Variables:
         """What each variable does to a candidate for the kernel, at values of shape (n,)."""
         state, cell, ranges, factors = self.state(x), self.base, self.tied.ranges, self.tied.factors
         start, weights = np.zeros((cell.joint_count, len(ranges))), np.zeros((cell.joint_count, len(ranges)))
-        for column, each in enumerate(ranges):
-            if each.kind in {VariableKind.START, VariableKind.WEIGHT}:
-                joint = cell.columns(each.name).start + each.index
-                is_start = each.kind is VariableKind.START
+        for column, variable in enumerate(ranges):
+            if variable.kind in {VariableKind.START, VariableKind.WEIGHT}:
+                joint = cell.columns(variable.name).start + variable.index
+                is_start = variable.kind is VariableKind.START
                 (start if is_start else weights)[joint, column] = 1.0 if is_start else state.weights[joint]
         return Directions(
             base=effective_base_twists(state, cell, ranges) @ factors,
@@ -154,17 +154,17 @@ class Variables:
             x: Values of the variables, shape (n,).
             start: Start postures in [rad] or [m], shape (nq,); those among the variables are taken from x.
         """
-        found = dict[str, object](self.conversion)
+        values = dict[str, object](self.conversion)
         numbers = self.tied.factors @ x + self.tied.terms
         state = self.state(x)
-        for each, number in zip(self.tied.ranges, numbers.tolist(), strict=True):
-            if each.kind is VariableKind.WEIGHT:
-                found[f"robots.{each.name}.weights"] = [
-                    written_weight(weight) for weight in state.weights[self.base.columns(each.name)].tolist()
+        for variable, number in zip(self.tied.ranges, numbers.tolist(), strict=True):
+            if variable.kind is VariableKind.WEIGHT:
+                values[f"robots.{variable.name}.weights"] = [
+                    written_weight(weight) for weight in state.weights[self.base.columns(variable.name)].tolist()
                 ]
-            elif each.kind is not VariableKind.START:
-                found[each.address] = written_number(each, number)
-        return found | written_starts(self.base, self.settings, np.where(np.isnan(state.starts), start, state.starts))
+            elif variable.kind is not VariableKind.START:
+                values[variable.address] = written_number(variable, number)
+        return values | written_starts(self.base, self.settings, np.where(np.isnan(state.starts), start, state.starts))
 
     def cell(self, x: Array, start: Array) -> Cell:
         """The cell of the file with these values, as ``solve`` will have it; see ``values``."""

@@ -13,9 +13,9 @@ ANGLE_DIGITS: Final = 6  # of a degree
 WEIGHT_DIGITS: Final = 6  # significant ones
 
 
-def written_number(each: VaryRange, number: float) -> float:
+def written_number(variable: VaryRange, number: float) -> float:
     """A length or an angle as the file has it: millimetres or degrees."""
-    return written_quantity(number, is_angle=each.is_angle)
+    return written_quantity(number, is_angle=variable.is_angle)
 
 
 def written_weight(weight: float) -> float:
@@ -31,11 +31,11 @@ def written_quantity(value: float, *, is_angle: bool) -> float:
 def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[str, Any]:
     """Start postures, shape (nq,), of all robots at work, by address; that of a holder that has one stays."""
     working = {task.robot for task in cell.tasks} | set(cell.positioners)
-    kept = {name for name in cell.positioners[:1] if cell.robot(name).start is not None}
-    kept -= {each.name for each in settings.ranges if each.kind is VariableKind.START}
+    given = {name for name in cell.positioners[:1] if cell.robot(name).start is not None}
+    given -= {variable.name for variable in settings.ranges if variable.kind is VariableKind.START}
     values = dict[str, Any]()
     for robot in cell.robots:
-        if robot.name in working and robot.name not in kept:
+        if robot.name in working and robot.name not in given:
             values |= written_start(cell, robot, start[cell.columns(robot.name)])
     return values
 

@@ -55,7 +55,7 @@ def dense_velocities(case: Case, k: int, q: Array) -> Array:
     inverse = WeightedInverse(tasks.J, tasks.weights)
     speeds = inverse.speeds(tasks.twist, 0.0)
     if tasks.secondary is not None:
-        speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), beside=speeds)
+        speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
     return speeds
 
 

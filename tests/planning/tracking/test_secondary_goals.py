@@ -323,7 +323,7 @@ def test_no_step_of_a_whole_motion_is_noticed_by_a_task(kind: GoalKind) -> None:
     for k in range(0, len(motion.q), 5):
         tasks = problem.first_order(k, motion.q[k])
         left = WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)
-        largest = max(largest, float(np.abs(tasks.J @ tasks.bounded(left, beside=np.zeros(6))).max()))
+        largest = max(largest, float(np.abs(tasks.J @ tasks.bounded(left, velocities=np.zeros(6))).max()))
     assert largest <= UNNOTICED
 
 

@@ -83,9 +83,9 @@ class ConfigurationSearch:
         expansion, used = self._repeat(expansion, bounds, improve, self._rounds)
         if expansion.cost > self._target and used < self._rounds:
             disturbed = self.cost.expand(bounds.clipped(expansion.q + self._disturbance(k)))
-            found, more = self._repeat(disturbed, bounds, improve, self._rounds - used)
+            improved, more = self._repeat(disturbed, bounds, improve, self._rounds - used)
             used += more
-            expansion = found if found.cost < (1.0 - MIN_GAIN_FRACTION) * expansion.cost else expansion
+            expansion = improved if improved.cost < (1.0 - MIN_GAIN_FRACTION) * expansion.cost else expansion
         left = np.sqrt(expansion.cost) / self._problem.step(k) if expansion.cost > self._target else 0.0
         return Advance(q=expansion.q, iterations=used, slack=float(left))
 

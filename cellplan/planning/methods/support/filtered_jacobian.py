@@ -112,7 +112,7 @@ class FilteredMotion:
             settled = relaxation.after(self._settings.gain * share * step, theta) * moves[:, None]
             B = self._law(settled, J)
             at_work = B @ xdot / root
-            speeds = at_work + tasks.bounded(lateral, beside=at_work)
+            speeds = at_work + tasks.bounded(lateral, velocities=at_work)
             fastest = float(np.max(np.abs(speeds), initial=0.0))
             swing = self._problem.gain * float(np.linalg.norm(J @ B, 2))
             if fastest * share * step <= LONGEST_MOVE and swing * share * step <= FARTHEST:

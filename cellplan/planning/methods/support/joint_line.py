@@ -75,7 +75,7 @@ class JointLines:
         ``(ae - 2 an) t^4 + 2 (2 nn - aa - ne) t^3 + 6 an t^2 + 2 (aa - ne) t - ae``, and ``theta = pi`` if the first
         coefficient vanishes.
         """
-        ae, ne, aa, nn, an = (float(each[i]) for each in (self.ae, self.ne, self.aa, self.nn, self.an))
+        ae, ne, aa, nn, an = (float(coefficients[i]) for coefficients in (self.ae, self.ne, self.aa, self.nn, self.an))
         roots = np.roots([ae - 2 * an, 2 * (2 * nn - aa - ne), 6 * an, 2 * (aa - ne), -ae])
         angles = 2.0 * np.arctan(roots.real)  # whatever is no root is only tried in vain
         tried: Array = np.clip(np.concatenate([angles, [-np.pi, np.pi]]), lowest, highest)

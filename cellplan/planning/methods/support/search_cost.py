@@ -220,10 +220,10 @@ def _cross(u: Array, v: Array) -> Array:
 
 def _refusal(cell: Cell, task: Relation) -> str:
     """Why a task's set of rotations cannot be searched for, and what could."""
-    asked = ", ".join(COMPONENTS[axis] for axis in task.axes)
+    components = ", ".join(COMPONENTS[axis] for axis in task.axes)
     where = cell.origin.at("part.held_by") if isinstance(task, Grasp) else task.where("axes")
     return (
         f"{where}: method '{cell.solver.method}' expected all of rx, ry, rz, none "
         "of them, free: [spin], or the one about which all joints turn (planar cells), "
-        f"got {asked}; another method can take it"
+        f"got {components}; another method can take it"
     )

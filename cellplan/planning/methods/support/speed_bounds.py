@@ -81,7 +81,7 @@ class JointBounds:
         )
 
 
-def braking_speed(room: Array, acceleration: Array, dt: float) -> Array:
+def braking_speed(distance: Array, acceleration: Array, dt: float) -> Array:
     r"""Largest speed of the next step after which a joint can still stop within the room it has.
 
     Braking takes ``a dt`` off the speed from step to step, so a joint that moves at ``v`` goes on for
@@ -95,12 +95,12 @@ def braking_speed(room: Array, acceleration: Array, dt: float) -> Array:
         acceleration: Accelerations in [rad/s^2] or [m/s^2], shape (nq,); infinite where a joint may stop at once.
         dt: Length of a step in [s].
     """
-    brakes = np.isfinite(room) & np.isfinite(acceleration)
-    a, d = np.where(brakes, acceleration, 1.0), np.where(brakes, room, 0.0)
+    brakes = np.isfinite(distance) & np.isfinite(acceleration)
+    a, d = np.where(brakes, acceleration, 1.0), np.where(brakes, distance, 0.0)
     n = np.floor(0.5 * (np.sqrt(1.0 + 8.0 * d / (a * dt**2)) - 1.0))
-    return np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, room / dt)
+    return np.where(brakes, d / ((n + 1.0) * dt) + 0.5 * n * a * dt, distance / dt)
 
 
-def _less(limits: Array, room: float) -> Array:
+def _less(limits: Array, distance: float) -> Array:
     """Limits with room for rounding, half of them at least."""
-    return np.maximum(limits - room, 0.5 * limits)
+    return np.maximum(limits - distance, 0.5 * limits)
