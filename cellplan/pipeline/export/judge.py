@@ -36,6 +36,7 @@ class Deviation:
     largest: float  # in the unit
     unit: str  # ``deg`` or ``mm``
     at_s: float  # its instant in the run in [s]
+    phase: str = ""  # the phase of that; empty for a program of one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,7 +211,11 @@ def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
             row, (unit, scale) = int(np.argmax(off[:, index])), joint.display_unit
             at_s = max(0.0, float(times[row]) - played.lead)
             yield Deviation(
-                subject=f"{name}/{joint.name}", largest=scale * float(off[row, index]), unit=unit, at_s=at_s
+                subject=f"{name}/{joint.name}",
+                largest=scale * float(off[row, index]),
+                unit=unit,
+                at_s=at_s,
+                phase=played.phase_at(float(times[row])),
             )
     for stretch in played.stretches():
         scene = scenes[stretch.place]
@@ -224,7 +229,8 @@ def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
             for kind, (unit, scale) in enumerate((MILLIMETRES, DEGREES)):
                 row = int(np.argmax(errors[:, kind]))
                 at_s = float(times[inside][row]) - played.lead
-                yield Deviation(subject=name, largest=scale * float(errors[row, kind]), unit=unit, at_s=at_s)
+                largest, phase = scale * float(errors[row, kind]), stretch.motion.name or ""
+                yield Deviation(subject=name, largest=largest, unit=unit, at_s=at_s, phase=phase)
 
 
 def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
@@ -243,6 +249,7 @@ def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
                     largest=scale * float(margins[step, kind]),
                     unit=unit,
                     at_s=max(0.0, float(times[step]) - played.lead),
+                    phase=stretch.motion.name or "",
                 )
 
 

@@ -1,6 +1,6 @@
 """Speeds and accelerations of played rows: of joints on the rows of each robot, of tools and part at even times."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 import numpy as np
@@ -37,8 +37,8 @@ def position_findings(played: Played) -> Iterator[str]:
             times, q = np.repeat(times[:-1], 2) + 0.0, np.stack([low, high], axis=1).reshape(-1, q.shape[1])
             times = times + np.tile([0.0, 1e-6], len(low))
         uses = joint_uses(robot, times, q)
-        yield from _failed(check for check in check_joints(uses, times, q) if check.name == POSITION)
-        yield from _failed(check_shown(robot, times_of(rows), rows.q))
+        checks = [check for check in check_joints(uses, times, q) if check.name == POSITION]
+        yield from _failed([*checks, *check_shown(robot, times_of(rows), rows.q)], played.phase_at)
 
 
 def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
@@ -54,11 +54,12 @@ def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
         robot = played.run.cell.robot(name)
         times, q = _as_played(played, robot)
         uses = joint_uses(robot, times, q)
-        yield from _failed(check for check in check_joints(uses, times, q) if check.name != POSITION)
+        yield from _failed((each for each in check_joints(uses, times, q) if each.name != POSITION), played.phase_at)
         if accelerations:
             found = MotionAccelerations(joints=tuple(joint_peaks(played.run.cell, robot, times, q, jumps_at=jumps)))
             checks = check_accelerations(played.run.cell, found)
-            yield from _failed(check for check in checks if check.name != JERK or _is_even(times))
+            judged = (check for check in checks if check.name != JERK or _is_even(times))
+            yield from _failed(judged, played.phase_at)
 
 
 def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[str]:
@@ -80,7 +81,7 @@ def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[
         window = own.robot(own.positioners[0]).controller_cycle
         part = part_acceleration(own, times, X_WP, window=window)
         checks += check_accelerations(own, MotionAccelerations(part=part))
-    yield from _failed(checks)
+    yield from _failed(checks, lambda _: stretch.motion.name or "")
 
 
 def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
@@ -107,5 +108,9 @@ def _is_even(times: Array) -> bool:
     return bool(np.ptp(steps) <= EVEN * steps[0])
 
 
-def _failed(checks: Iterable[Check]) -> Iterator[str]:
-    return (check.message for check in checks if not check.passed)
+def _failed(checks: Iterable[Check], phase_at: Callable[[float | None], str]) -> Iterator[str]:
+    """The messages of what fails, each with the phase of its time."""
+    for check in checks:
+        if not check.passed:
+            phase = phase_at(check.at_s)
+            yield f"{check.message}, in {phase}" if phase else check.message

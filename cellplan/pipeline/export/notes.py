@@ -74,12 +74,13 @@ def _deviation(deviation: Deviation) -> str:
     """A deviation with what deviates, unless it is nothing but rounding."""
     if deviation.largest < NOISE:
         return f"{'joints' if '/' in deviation.subject else 'tools'} below {NOISE:g} {deviation.unit}"
-    return f"{deviation.subject} {deviation.largest:.2g} {deviation.unit} at {deviation.at_s:.3f} s"
+    where = f"at {deviation.at_s:.3f} s" + (f", in {deviation.phase}" if deviation.phase else "")
+    return f"{deviation.subject} {deviation.largest:.2g} {deviation.unit} {where}"
 
 
 def deviation_records(judgement: Judgement, *, of_corners: bool = False) -> list[dict[str, object]]:
     """All deviations as records; or by how much more tools may be off at rounded rows."""
     return [
-        {"of": each.subject, "largest": each.largest, "unit": each.unit, "at_s": each.at_s}
+        {"of": each.subject, "largest": each.largest, "unit": each.unit, "at_s": each.at_s, "phase": each.phase or None}
         for each in (judgement.corners if of_corners else judgement.deviations)
     ]

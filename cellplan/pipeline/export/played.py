@@ -145,6 +145,13 @@ class Played:
             if end > begin:
                 yield Stretch(place=place, motion=run.motions[place], begin=float(begin), end=float(end))
 
+    def phase_at(self, at_s: float | None) -> str:
+        """Name of the phase at a time in [s] of the played program; empty for a program of one, or without a time."""
+        if at_s is None or len(self.run.motions) == 1:
+            return ""
+        names = [stretch.motion.name or "" for stretch in self.stretches() if stretch.begin <= at_s + SAME_TIME]
+        return names[-1] if names else ""
+
     def grid(self, begin: float, end: float, *, with_run: bool = True, with_corners: bool = False) -> Array:
         """Times in [s] from begin to end, between which joints move evenly, or on a part of a cubic taken as even.
 

@@ -135,6 +135,7 @@ def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | No
             choices,
             key=lambda it: (
                 bool(TOOL_SIDE.search(it.link)) and is_along(tree, it.link),
+                not any(joint.mimic for joint in tree.path_to(it.link)),  # fingers follow one another, arms seldom
                 is_along(tree, it.link),
                 bool(TOOL_SIDE.search(it.link)),
                 len(it.joints),

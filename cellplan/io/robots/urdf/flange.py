@@ -66,6 +66,13 @@ def flange_remarks(tree: UrdfTree, flange: str, *, is_named: bool) -> Iterator[s
         return
     if not is_along(tree, flange):
         yield f"{file}: flange '{flange}': its z is {_angle(tree, flange):.3g} deg off the axis of '{last.name}'"
+    at = _on_last(tree, flange)
+    inward = -float(at[:3, 3] @ at[:3, 2])
+    if is_along(tree, flange) and inward > SAME_PLACE:
+        yield (
+            f"{file}: flange '{flange}': its z points back to '{last.child}', {1e3 * inward:.4g} mm behind it: tools "
+            f"would stick into the arm"
+        )
     usual = flange if is_named else usual_flange(tree)
     if usual != flange:
         yield f"{file}: flange '{flange}' is taken, as {_lean(tree, usual, last)}"

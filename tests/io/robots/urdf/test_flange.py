@@ -59,6 +59,24 @@ def test_tool0_whose_z_points_out_comes_first(tmp_path: Path) -> None:
     assert robot.remarks == ()
 
 
+@pytest.mark.parametrize("flange", [None, "tool0"])
+def test_a_z_that_points_back_into_the_arm_is_a_remark(tmp_path: Path, flange: str | None) -> None:
+    robot = loaded(tmp_path, frame("tool0", INWARD), flange=flange)
+
+    text = "flange 'tool0': its z points back to 'hand', 100 mm behind it: tools would stick into the arm"
+    assert robot.remarks == (f"arm.urdf: {text}",)
+    assert loaded(tmp_path, frame("tool0", INWARD, "-0.1 0 0")).remarks == ()
+
+
+def test_a_finger_that_follows_another_is_not_proposed_where_another_link_is_there(tmp_path: Path) -> None:
+    lines = arm(frame("hand_frame", OUT))
+    for name, more in (("left", ""), ("right", '<mimic joint="to_left" multiplier="-1"/>')):
+        lines += [f'<link name="{name}"/>', joint(f"to_{name}", "hand", name, f'<axis xyz="0 0 1"/>{LIMIT}{more}')]
+    write_urdf(tmp_path, *lines)
+
+    assert describe_robot(str(tmp_path / "arm.urdf")).flange != "right"
+
+
 def test_a_turn_about_z_against_the_frame_of_the_controller_is_stated(tmp_path: Path) -> None:
     frames = (frame("tool0", OUT), frame("mount", TURNED))
     (remark,) = loaded(tmp_path, *frames, flange="mount").remarks
