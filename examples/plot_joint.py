@@ -1,4 +1,4 @@
-"""Plot the positions of one joint over time, with its limits, from a solved cell; needs cellplan[plots]."""
+"""Plot the positions of one joint over time, with its limits, from a solved cell."""
 
 from pathlib import Path
 

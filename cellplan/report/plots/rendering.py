@@ -1,7 +1,6 @@
 """Figures as files: SVG written here, PNG and PDF by the plotting library where they are requested."""
 
 from collections.abc import Collection, Mapping
-from importlib.util import find_spec
 from typing import Final
 
 from cellplan.errors import InputError
@@ -36,16 +35,11 @@ def pictures(
 
 
 def require_formats(formats: Collection[str]) -> None:
-    """Refuse formats that cannot be written here.
+    """Refuse formats that nobody writes.
 
     Raises:
-        InputError: A format is unknown, or needs the plotting library, which is not installed.
+        InputError: A format is unknown.
     """
     for name in formats:
         if name not in FORMATS:
             raise InputError(f"plots: expected one of {', '.join(FORMATS)}, got '{name}' (SVG is always written)")
-    if formats and find_spec("matplotlib") is None:
-        raise InputError(
-            f"plots as {' and '.join(sorted({*formats})).upper()}: matplotlib is not installed; "
-            "run 'pip install \"cellplan[plots]\"', or use the SVG files, which need no library"
-        )
