@@ -63,11 +63,6 @@ def parameters(node: Function) -> list[ast.arg]:
     return [argument for argument in named if argument.arg not in {"self", "cls"}]
 
 
-def is_command(path: Path, node: Function) -> bool:
-    """The parameters of a command are its options on the command line: there are as many as users need."""
-    return path.parent == PACKAGE / "cli" and node.name == path.stem
-
-
 @cache
 def imported_modules(path: Path) -> set[str]:
     modules = set()
@@ -102,7 +97,7 @@ def oversized(path: Path) -> Iterator[str]:
         if isinstance(node, Function):
             if body_lines(node) > BODY_LINES:
                 yield f"{node.name}: {body_lines(node)} lines"
-            if len(parameters(node)) > PARAMETERS and not is_command(path, node):
+            if len(parameters(node)) > PARAMETERS:
                 yield f"{node.name}: {len(parameters(node))} parameters"
         elif isinstance(node, ast.ClassDef):
             methods = sum(isinstance(child, Function) for child in node.body)

@@ -5,36 +5,37 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Final, NoReturn
 
 import typer
 from typer.completion import get_completion_inspect_parameters
 
 import cellplan
-from cellplan.cli.base_map import base_map
-from cellplan.cli.check import check
-from cellplan.cli.compare import compare
-from cellplan.cli.completion import Install, Show
-from cellplan.cli.errors import OutputError, report_failure
-from cellplan.cli.explain import explain
-from cellplan.cli.export import export
-from cellplan.cli.fastest import fastest
-from cellplan.cli.floor_plan import floor_plan
-from cellplan.cli.given_options import Command
-from cellplan.cli.init import init
-from cellplan.cli.layout import layout
-from cellplan.cli.output import say
+from cellplan.cli.begin.check import check
+from cellplan.cli.begin.explain import explain
+from cellplan.cli.begin.init import init
+from cellplan.cli.begin.robots import robots
+from cellplan.cli.begin.schema import schema
+from cellplan.cli.command import Work, as_command
+from cellplan.cli.improve.base_map import base_map
+from cellplan.cli.improve.compare import compare
+from cellplan.cli.improve.fastest import fastest
+from cellplan.cli.improve.layout import layout
+from cellplan.cli.improve.sweep import sweep
+from cellplan.cli.options.completion import SHELLS, install, one_of, show
+from cellplan.cli.options.given_options import Command
+from cellplan.cli.options.request import option
 from cellplan.cli.overview import FIRST_STEPS, WIDEST, Overview, examples
-from cellplan.cli.recover import recover
-from cellplan.cli.rehearse import rehearse
-from cellplan.cli.robots import robots
-from cellplan.cli.schema import schema
-from cellplan.cli.solve import solve
-from cellplan.cli.sweep import sweep
-from cellplan.cli.verbosity import with_verbosity
-from cellplan.cli.verify import verify
-from cellplan.cli.view import view
+from cellplan.cli.real_cell.recover import recover
+from cellplan.cli.real_cell.rehearse import rehearse
+from cellplan.cli.solve.export import export
+from cellplan.cli.solve.floor_plan import floor_plan
+from cellplan.cli.solve.solve import solve
+from cellplan.cli.solve.verify import verify
+from cellplan.cli.solve.view import view
+from cellplan.cli.terminal.errors import OutputError, report_failure
+from cellplan.cli.terminal.output import say
 from cellplan.errors import ExitStatus
 
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # schemas need none, and the search for them takes 20 ms
@@ -52,7 +53,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": WIDEST},
 )
-COMMANDS: Final[dict[str, dict[str, Callable[..., None]]]] = {
+COMMANDS: Final[dict[str, dict[str, Work]]] = {
     "Begin": {"init": init, "robots": robots, "check": check, "explain": explain, "schema": schema},
     "Solve": {"solve": solve, "view": view, "floorplan": floor_plan, "verify": verify, "export": export},
     "Improve": {"layout": layout, "map": base_map, "fastest": fastest, "sweep": sweep, "compare": compare},
@@ -70,10 +71,28 @@ def _show_version(desired: bool) -> None:
 def program(
     context: typer.Context,
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+        bool, option("--version", "Print the version and exit.", callback=_show_version, is_eager=True)
     ] = False,
-    install_completion: Install = None,
-    show_completion: Show = None,
+    install_completion: Annotated[
+        str | None,
+        option(
+            "--install-completion SHELL",
+            "Let bash, zsh or fish complete commands, options, cells and names; then open a new terminal.",
+            callback=install,
+            is_eager=True,
+            autocompletion=one_of(*SHELLS),
+        ),
+    ] = None,
+    show_completion: Annotated[
+        str | None,
+        option(
+            "--show-completion SHELL",
+            "Print the script for that instead.",
+            callback=show,
+            is_eager=True,
+            autocompletion=one_of(*SHELLS),
+        ),
+    ] = None,
 ) -> None:
     """Offline programming for cooperative robots that work on one moving part."""
     del version, install_completion, show_completion  # their callbacks have ended the program
@@ -84,7 +103,7 @@ def program(
 
 for group, commands in COMMANDS.items():
     for name, command in commands.items():
-        app.command(name, cls=Command, rich_help_panel=group, epilog=examples(name))(with_verbosity(command))
+        app.command(name, cls=Command, rich_help_panel=group, epilog=examples(name))(as_command(command))
 get_completion_inspect_parameters()  # prepares the shells
 
 

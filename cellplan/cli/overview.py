@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from typer.core import TyperGroup
 
-from cellplan.cli.given_options import refuse_ignored
+from cellplan.cli.options.given_options import refuse_ignored
 
 WIDEST: Final = 110  # [columns] of help; longer lines are hard to read
 FIRST_STEPS: Final = """\

@@ -30,7 +30,7 @@ Names = dict[tuple[str, str], object]  # what each name of the package stands fo
 HARMLESS = {  # names whose replacement changes no figure: where plots and trials run, how often a line is printed
     ("cellplan.guard.forked", "processors"),
     ("cellplan.study.session", "Workers"),
-    ("cellplan.cli.progress", "LINE_EVERY_S"),
+    ("cellplan.cli.terminal.progress", "LINE_EVERY_S"),
 }
 
 

@@ -53,7 +53,7 @@ def place(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         shutil.copytree(sound / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr("cellplan.cli.progress.LINE_EVERY_S", math.inf)  # however slow the machine is
+    monkeypatch.setattr("cellplan.cli.terminal.progress.LINE_EVERY_S", math.inf)  # however slow the machine is
     return tmp_path
 
 

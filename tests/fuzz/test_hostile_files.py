@@ -8,7 +8,7 @@ from random import Random
 import pytest
 from fuzz import hostile_files
 
-from cellplan.cli.errors import error_lines
+from cellplan.cli.terminal.errors import error_lines
 from cellplan.errors import InputError, OverrunError
 from cellplan.io.cell.load import load_cell
 

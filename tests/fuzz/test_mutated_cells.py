@@ -14,7 +14,7 @@ from fuzz.cell_mutations import Injury, Place
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cellplan.cli.errors import error_lines
+from cellplan.cli.terminal.errors import error_lines
 from cellplan.errors import InputError, OverrunError
 from cellplan.io.cell.load import load_cell
 from cellplan.io.cell_errors import load_errors

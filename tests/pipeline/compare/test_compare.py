@@ -15,7 +15,7 @@ from builders.study_trials import InThisProcess
 from builders.two_phases import PAIR
 
 from cellplan import CompareJob, compare, load_cell, solve
-from cellplan.cli.compare import exit_status
+from cellplan.cli.improve.compare import exit_status
 from cellplan.cli.main import run
 from cellplan.io.cell.changes import read_setting
 from cellplan.io.input.files import digest

@@ -1,0 +1,1 @@
+"""Commands to begin with: templates, robots, and what a cell says before anything is solved."""

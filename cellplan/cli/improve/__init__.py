@@ -1,0 +1,1 @@
+"""Commands that improve a cell or a program: searches, maps, sweeps, comparisons."""

@@ -1,0 +1,133 @@
+"""``cellplan fastest``: the shortest cycle of a cell, its production curve, and the calmest program for a demand."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.shared import (
+    AllowDirs,
+    AsJson,
+    Budget,
+    CellFile,
+    Distance,
+    HowTimed,
+    Margin,
+    Method,
+    Mode,
+    Quiet,
+    ResumeSearch,
+    Seed,
+    Settings,
+    TaskName,
+    Trials,
+)
+from cellplan.cli.terminal.output import Result
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import ExitStatus, InputError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FastestOptions(Options):
+    """Whose cycle is shortened, and by what."""
+
+    SCHEMA = "cellplan.fastest/1"
+    misplacement: ClassVar[None] = None  # which layout searches have beside these
+    scheduler: ClassVar[None] = None
+
+    cell: CellFile
+    output: Annotated[
+        Path | None, option("-o, --output DIR", "Write record, page, curve and a run folder per program.")
+    ] = None
+    demand: Annotated[
+        str | None, option("--demand N/h", "Parts per hour (or N/min): choose the calmest program for them.")
+    ] = None
+    points: Annotated[
+        int, option("--points N", "Calmer cycles of each law on the production curve.", min=0, max=50)
+    ] = 4
+    mode: Mode = None
+    method: Method = None
+    settings: Settings = ()
+    task: TaskName = None
+    workers: Annotated[
+        int | None,
+        option("--workers N", "Processes for the production curve (default: one for each processor).", min=1),
+    ] = None
+    free: Annotated[
+        str | None,
+        option(
+            "--free WORDS",
+            "Search the shortest cycle over some of start,weights,path,spin, bases and tools as they are: the start "
+            "posture of the positioner, weights of joints, the positioner's joint path, turns of tools about their "
+            "axes. The options below --free belong to it.",
+        ),
+    ] = None
+    timing: HowTimed = "laws"
+    clearance: Distance = None
+    margin: Margin = None
+    budget: Budget = None
+    trials: Trials = None
+    seed: Seed = 0
+    resume: ResumeSearch = False
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+    @property
+    def schema(self) -> str:
+        """Schema of the JSON object; with ``--free`` that of a layout search."""
+        return self.SCHEMA if self.free is None else "cellplan.layout/1"
+
+
+def fastest(options: FastestOptions) -> Result:
+    """Find the shortest cycle that keeps velocity, acceleration and jerk of all joints, and verify it.
+
+    First with the time laws of the cell, all faster by one factor; then along the same path with the best speed that
+    all robots share; then with no tool faster than 250 mm/s. Exit status: 0 every program passed every check, 1 a
+    check failed, 2 bad input, 3 no solution or a demand that cannot be met, 4 internal error. With --free the study
+    folder of cellplan layout is written, with the fastest cell as best.yaml.
+    """
+    if options.free is not None:
+        return _free(options, options.free)
+    from cellplan.guard import processors
+    from cellplan.io.cell.load import load_cell
+    from cellplan.io.run.folder import refuse_unless_replaceable
+    from cellplan.pipeline.fastest.demand import read_demand
+    from cellplan.pipeline.fastest.result import fastest_lines, fastest_record, write_fastest
+    from cellplan.pipeline.fastest.shortest import fastest as shortest
+    from cellplan.pipeline.overrides import require_task, with_overrides
+
+    demand = None if options.demand is None else read_demand(options.demand)
+    given = load_cell(options.cell, allow_dirs=options.allow_dirs)
+    cell = with_overrides(given, options.settings, mode=options.mode, method=options.method)
+    require_task(cell, options.task)
+    folder, workers = options.output, options.workers or processors()
+    if folder is not None:
+        refuse_unless_replaceable(folder)
+    with progress_listener(quiet=options.quiet) as progress:
+        cycles = shortest(
+            cell, task=options.task, demand=demand, points=options.points, workers=workers, progress=progress
+        )
+        record = fastest_record(cycles) if folder is None else write_fastest(cycles, folder, progress=progress)
+    status = ExitStatus.PASSED if cycles.passed else ExitStatus.CHECK_FAILED
+    record, lines = {**record, "exit": int(status)}, fastest_lines(record)
+    if folder is not None:
+        record |= {"folder": str(folder), "report_path": str(folder / "fastest.html")}
+        lines = [*lines, f"report: {folder / 'fastest.html'}", f"curve: {folder / 'curve.csv'}"]
+    return Result(status, lines, record)
+
+
+def _free(options: FastestOptions, text: str) -> Result:
+    """Search the shortest cycle over what the words of ``--free`` name.
+
+    Raises:
+        InputError: There is no word.
+    """
+    from cellplan.cli.improve.layout_search import layout_request, searched
+
+    words = tuple(word.strip() for word in text.split(",") if word.strip())
+    if not words:
+        raise InputError("--free: expected some of start, weights, path, spin, got none")
+    changes = {"motion.mode": options.mode, "solver.method": options.method}
+    settings = (*options.settings, *(f"{key}={value}" for key, value in changes.items() if value))
+    return searched(options, layout_request(options, objective="cycle", free=words, settings=settings))

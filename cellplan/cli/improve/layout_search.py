@@ -1,0 +1,124 @@
+"""Searches of ``cellplan layout`` and ``cellplan fastest --free``: request, work, and what came of it."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from cellplan.cli.improve.fastest import FastestOptions
+from cellplan.cli.improve.layout import LayoutOptions
+from cellplan.cli.terminal.errors import resumable
+from cellplan.cli.terminal.output import Result, result_of_folder
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import ExitStatus, InputError
+from cellplan.guard import processors
+from cellplan.io.cell.load import load_cell
+from cellplan.io.input.findings import did_you_mean, listed, shown
+from cellplan.io.run.folder import refuse_unless_replaceable
+from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
+from cellplan.pipeline.layout.request import LayoutRequest
+from cellplan.pipeline.layout.result import layout_lines
+from cellplan.pipeline.layout.search import refuse_search, search_layout
+from cellplan.pipeline.layout.workers import layout_workers
+from cellplan.pipeline.repair.record import SCHEMA
+from cellplan.pipeline.repair.repair import repair
+from cellplan.pipeline.repair.result import advice_lines, write_repair
+from cellplan.search.programs.objective import Objective, Timing
+from cellplan.study.session import Stop
+
+Choice = TypeVar("Choice", bound=StrEnum)
+Value = TypeVar("Value")
+SearchOptions = LayoutOptions | FastestOptions
+SEARCHED: Final = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}  # any other status: failed
+REPAIRED: Final = {
+    "passes": ExitStatus.PASSED,
+    "repaired": ExitStatus.PASSED,
+    "no_remedy": ExitStatus.CHECK_FAILED,
+    "no_motion": ExitStatus.NO_SOLUTION,
+}
+
+
+def layout_request(options: SearchOptions, *, objective: str, **others: Any) -> LayoutRequest:
+    """What is searched for, as the options say.
+
+    Raises:
+        InputError: A word or a quantity cannot be read.
+    """
+    return options.to(
+        LayoutRequest,
+        objective=_word("--objective", objective, Objective),
+        timing=_word("--timing", options.timing, Timing),
+        clearance=_quantity("--clearance", options.clearance, read_length),
+        margin=_quantity("--margin", options.margin, read_angle),
+        misplacement=_quantity("--misplacement", options.misplacement, read_misplacement),
+        **others,
+    )
+
+
+def searched(options: SearchOptions, request: LayoutRequest) -> Result:
+    """Search, and write the folder.
+
+    Raises:
+        InputError: The cell cannot be searched.
+        InterruptedWorkError: The search was interrupted.
+    """
+    stop = Stop(trials=options.trials, seconds=_quantity("--budget", options.budget, read_time))
+    if options.workers is not None and options.scheduler is not None:
+        raise InputError("--workers: unexpected beside --scheduler, whose workers search; leave one of them out")
+    folder = study_folder(options, "fastest" if request.free else "layout")
+    refuse_search(request, folder, resume=options.resume)
+    with ExitStack() as opened:
+        workers = opened.enter_context(_workers(options, request))
+        progress = opened.enter_context(progress_listener(quiet=options.quiet))
+        opened.enter_context(resumable())
+        record = search_layout(
+            request,
+            folder,
+            stop=None if stop == Stop() else stop,
+            workers=workers,
+            resume=options.resume,
+            progress=progress,
+        ).record
+    status = SEARCHED.get(record["status"], ExitStatus.CHECK_FAILED)
+    lines = layout_lines(record, folder)
+    return result_of_folder(record["schema"], status, lines, folder / "study.html", study=record)
+
+
+def repaired(options: LayoutOptions, request: LayoutRequest) -> Result:
+    """Repair a cell, and write the folder."""
+    folder = study_folder(options, "repair")
+    refuse_unless_replaceable(folder)
+    with progress_listener(quiet=options.quiet) as progress:
+        outcome = repair(request, workers=options.workers or processors(), progress=progress)
+        record = write_repair(outcome, request, folder)
+    lines = advice_lines(record, folder, request.cell)
+    return result_of_folder(SCHEMA, REPAIRED[record["status"]], lines, folder / "advice.html", advice=record)
+
+
+def study_folder(options: SearchOptions, what: str) -> Path:
+    """Where a study is written: beside other results of the cell unless the options say otherwise."""
+    return options.output or (Path("outputs") / f"{load_cell(options.cell, allow_dirs=options.allow_dirs).name}-{what}")
+
+
+def _workers(options: SearchOptions, request: LayoutRequest) -> Executor:
+    """The processes that search, here or of a cluster."""
+    if options.scheduler is None:
+        return layout_workers(options.workers or processors(), request)
+    from cellplan.study.cluster import Cluster
+
+    return Cluster(options.scheduler)
+
+
+def _quantity(option: str, text: str | None, read: Callable[[str, str], Value]) -> Value | None:
+    """A quantity with its unit; None where the option is not given."""
+    return None if text is None else read(option, text)
+
+
+def _word(option: str, text: str, kind: type[Choice]) -> Choice:
+    """One of the words of an option."""
+    known = [str(member) for member in kind]
+    if text not in known:
+        raise InputError(f"{option}: expected one of {listed(known)}, got {shown(text)}{did_you_mean(text, known)}")
+    return kind(text)

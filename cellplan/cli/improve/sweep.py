@@ -1,0 +1,77 @@
+"""``cellplan sweep``: solve every combination of some values of a cell, and compare what comes of them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.shared import (
+    AllowDirs,
+    AsJson,
+    CellFile,
+    KeepRuns,
+    Mode,
+    PlotFormats,
+    Quiet,
+    ResumeStudy,
+    Settings,
+    Solvers,
+    TaskName,
+)
+from cellplan.cli.terminal.errors import resumable
+from cellplan.cli.terminal.output import Result, result_of_folder
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepOptions(Options):
+    """What is varied, and where the study is written."""
+
+    SCHEMA = "cellplan.study/1"
+
+    cell: CellFile
+    vary: Annotated[
+        tuple[str, ...],
+        option(
+            "--vary KEY=…",
+            "Values of a key of the cell file: FROM:TO:STEP or VALUE,VALUE,…; repeated for all combinations.",
+        ),
+    ]
+    output: Annotated[Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-sweep).")] = (
+        None
+    )
+    mode: Mode = None
+    settings: Settings = ()
+    task: TaskName = None
+    workers: Solvers = None
+    resume: ResumeStudy = False
+    keep_runs: KeepRuns = False
+    formats: PlotFormats = ()
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+
+def sweep(options: SweepOptions) -> Result:
+    """Solve every combination of some values and write one table, one page and one line for each variant.
+
+    A variant that fails is a row with its reason. Exit status: 0 at least one variant passed, 1 none did, 2 bad input,
+    130 interrupted (--resume goes on).
+    """
+    from cellplan.guard import processors
+    from cellplan.io.cell.load import load_cell
+    from cellplan.pipeline.sweep import SweepJob
+    from cellplan.pipeline.sweep import sweep as run_sweep
+    from cellplan.pipeline.sweep_result import study_lines
+    from cellplan.study.variants import read_axis
+
+    axes = [read_axis(text) for text in options.vary]
+    name = load_cell(options.cell, allow_dirs=options.allow_dirs).name
+    folder, workers = options.output or Path("outputs") / f"{name}-sweep", options.workers or processors()
+    settings = options.settings if options.mode is None else (f"motion.mode={options.mode}", *options.settings)
+    job = options.to(SweepJob, settings=settings, runs=folder if options.keep_runs else None)
+    with progress_listener(quiet=options.quiet) as progress, resumable():
+        record = run_sweep(job, axes, folder, workers=workers, resume=options.resume, progress=progress)
+    status = ExitStatus.PASSED if record["counts"]["passed"] else ExitStatus.CHECK_FAILED
+    return result_of_folder(options.schema, status, study_lines(record, folder), folder / "study.html", study=record)

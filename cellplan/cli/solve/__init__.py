@@ -1,0 +1,1 @@
+"""Commands from a cell to programs: solved, shown, verified, exported."""

@@ -1,0 +1,132 @@
+"""``cellplan export``: controller programs of a verified run."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cellplan.cli.options.completion import one_of
+from cellplan.cli.options.given_options import require_choice
+from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, RunDir, WithoutCell
+from cellplan.cli.solve.exported import SCHEMA, result_of_one, result_of_several
+from cellplan.cli.terminal.output import Result
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import InputError
+
+if TYPE_CHECKING:
+    from cellplan.pipeline.export.choice import Choice
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportOptions(Options):
+    """What is exported, and where it is written."""
+
+    SCHEMA = SCHEMA
+
+    run: RunDir
+    forms: Annotated[
+        tuple[str, ...],
+        option(
+            "--format NAME",
+            "Format: csv, json or ros2 for any controller; krl, rapid, urscript or val3 for those of a maker; stream: "
+            "rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: every one that "
+            "can take the run.",
+            autocompletion=one_of("cellplan.pipeline.export.program:EXPORTERS", "all"),
+        ),
+    ]
+    output: Annotated[
+        Path | None,
+        option("-o, --output DIR", "Folder (default: RUN/programs/<format>); for several formats DIR/<format> each."),
+    ] = None
+    robots: Annotated[
+        tuple[str, ...],
+        option("--robot NAME", "Only this robot; may be repeated (default: all whose controller plays the format)."),
+    ] = ()
+    targets: Annotated[
+        str,
+        option(
+            "--targets KIND",
+            "What rows state: joints, or part: tool poses on the part.",
+            autocompletion=one_of("cellplan.model.exported:Targets"),
+        ),
+    ] = "joints"
+    promise: Annotated[
+        str | None,
+        option(
+            "--promise WORD",
+            "Only this promise: timed, synchronised or sequence (default: the best that holds).",
+            autocompletion=one_of("cellplan.model.exported:Promise"),
+        ),
+    ] = None
+    split: Annotated[int | None, option("--split N", "Most rows of a file or routine (default: of the format).")] = None
+    thin_mm: Annotated[
+        float | None, option("--thin-mm MM", "How far a tool may be off where rows are left out (default: 0.05).")
+    ] = None
+    thin_deg: Annotated[
+        float | None, option("--thin-deg DEG", "How far a turning joint may be off there (default: 0.05).")
+    ] = None
+    cell: OriginalCell = None
+    without_cell: WithoutCell = False
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+
+def export(options: ExportOptions) -> Result:
+    """Write controller programs, from a verified run only.
+
+    The run is verified first, and the rounded numbers of the programs after that. Exit status: 0 written, 1 a check
+    fails, 2 bad input, or a run that is changed or stale, 4 internal error. One format is written only if it is 0. Of
+    several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
+    """
+    from cellplan.io.run.folder import PROGRAMS
+    from cellplan.pipeline.export.program import default_folder, export_program, refuse_choice
+    from cellplan.pipeline.export.several import (
+        NothingFitsError,
+        chosen_formats,
+        export_programs,
+        refuse_unfit_run,
+        refuse_unless_writable,
+    )
+    from cellplan.pipeline.export.stored import read_stored_export
+    from cellplan.pipeline.gate.open_gate import open_gate
+
+    formats = chosen_formats(options.forms)
+    require_choice(options.cell, without_cell=options.without_cell)
+    choice = _choice(options)
+    single = next(iter(formats)) if list(formats.values()) == [True] else None
+    if single:
+        refuse_choice(single, choice)
+    folder = options.output or (default_folder(options.run, single) if single else options.run / PROGRAMS)
+    refuse_unless_writable([folder] if single else [folder / name for name in formats], options.run)
+    unfit = partial(refuse_unfit_run, formats=formats, choice=choice, folder=folder)
+    with progress_listener(quiet=options.quiet) as progress:
+        try:
+            run = open_gate(
+                options.run, cell=options.cell, allow_dirs=options.allow_dirs, refuse=unfit, progress=progress
+            )
+        except NothingFitsError as nothing:
+            return result_of_several(nothing.run, folder, nothing.refused)
+        if single:
+            files = export_program(run, folder, form=single, choice=choice, progress=progress)
+            return result_of_one(run, folder, single, files=list(files), record=read_stored_export(folder).record)
+        exports = export_programs(run, folder, formats=options.forms, choice=choice, progress=progress)
+        return result_of_several(run, folder, exports, run.remarks)
+
+
+def _choice(options: ExportOptions) -> "Choice":
+    """What of the run is exported, and how.
+
+    Raises:
+        InputError: There is no such kind of row, or no such promise.
+    """
+    from cellplan.model.exported import Promise, Targets
+    from cellplan.pipeline.export.choice import Choice
+
+    targets = {str(kind): kind for kind in Targets}
+    promises = {None: None} | {promise.split()[0]: promise for promise in Promise}
+    for name, word, known in (("targets", options.targets, targets), ("promise", options.promise, promises)):
+        if word not in known:
+            raise InputError(f"--{name}: expected one of {', '.join(filter(None, known))}, got '{word}'")
+    return options.to(Choice, targets=targets[options.targets], promise=promises[options.promise])

@@ -1,0 +1,76 @@
+"""``cellplan floorplan``: the cell from above, to scale, as SVG or DXF."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cellplan.cli.options.request import Options, argument, option
+from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, Settings
+from cellplan.cli.terminal.output import say, say_json
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import ExitStatus, InputError
+
+FORMATS = ("svg", "dxf")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorPlanOptions(Options):
+    """What is drawn, and where it is written."""
+
+    SCHEMA = "cellplan.floorplan/1"
+
+    path: Annotated[Path, argument("RUN|CELL", "Run folder or cell file.")]
+    output: Annotated[
+        Path | None,
+        option("-o, --output FILE", "The drawing (default: outputs/<cell name>-floor-plan.FORMAT)."),
+    ] = None
+    form: Annotated[
+        str | None, option("--format FORMAT", "svg or dxf (default: that of FILE by its ending, or svg).")
+    ] = None
+    cell: OriginalCell = None
+    settings: Settings = ()
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+
+def floor_plan(options: FloorPlanOptions) -> None:
+    """Draw the floor plan: outlines, reach, swept areas, paths, and dimensions between the bases in millimetres.
+
+    Of a run it shows what its motion sweeps; of a cell that was not solved the start. DXF needs the package ezdxf, as
+    pip install 'cellplan[dxf]' brings it. Exit status: 0 the drawing was written, 2 bad input, 4 internal error.
+    """
+    from cellplan.pipeline.floor_plan_file import (
+        FloorPlanRequest,
+        PlanFormat,
+        requested_floor_plan,
+        target_of,
+        write_floor_plan,
+    )
+
+    request = options.to(FloorPlanRequest, form=PlanFormat(_format(options.form, options.output)))
+    with progress_listener(quiet=options.quiet) as progress:
+        plan = requested_floor_plan(request, progress=progress)
+    target = target_of(request, plan.cell)
+    size = write_floor_plan(plan, target, request.form)
+    if options.as_json:
+        about = {"cell": plan.cell, "drawing": str(target), "format": str(request.form), "bytes": size}
+        say_json({"schema": options.schema, "status": "written", "exit": int(ExitStatus.PASSED), **about})
+    else:
+        say(f"{plan.cell}: {target} ({size / 1e3:.0f} kB)")
+
+
+def _format(form: str | None, output: Path | None) -> str:
+    """The format that is asked for.
+
+    Raises:
+        InputError: It is neither, or not that of the file.
+    """
+    ending = "" if output is None else output.suffix.removeprefix(".").lower()
+    if form is not None and form not in FORMATS:
+        raise InputError(f"--format: expected svg or dxf, got '{form}'")
+    if form is None and ending and ending not in FORMATS:
+        raise InputError(f"-o: expected a file that ends with .svg or .dxf, or --format with it, got '{output}'")
+    if form is not None and ending in FORMATS and ending != form:
+        raise InputError(f"--format: expected {ending} for '{output}', got '{form}'")
+    return form or ending or FORMATS[0]

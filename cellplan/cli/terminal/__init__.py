@@ -1,0 +1,1 @@
+"""Streams of the program: results and errors, progress, what a terminal shows."""

@@ -1,0 +1,1 @@
+"""``--watch``: commands that begin again whenever a file is saved."""

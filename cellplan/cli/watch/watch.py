@@ -1,0 +1,111 @@
+"""``--watch``: do the work of a command again whenever the cell or one of its files is saved."""
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+from cellplan.cli.terminal.errors import (
+    InterruptedWorkError,
+    OutputError,
+    error_lines,
+    exit_status,
+    report_failure,
+    tell,
+)
+from cellplan.cli.terminal.output import Result, present, say_json
+from cellplan.cli.terminal.progress import Listener, progress_listener
+from cellplan.cli.watch.files import InputsChangedError, WatchedFiles
+from cellplan.cli.watch.page import WatchPage
+from cellplan.errors import ExitStatus
+from cellplan.model.cell import Cell
+
+Work = Callable[[Callable[[Cell], None], Listener], Result]  # called with what to tell of the cell, and of progress
+
+
+def watch(
+    work: Work, cell: Path, *, schema: str, as_json: bool, quiet: bool, page: WatchPage | None = None
+) -> NoReturn:
+    """Do the work, wait until a file is saved, and so on until Ctrl-C.
+
+    What is wrong with a cell is said, and its files are watched further. Work during which a file is saved is given up
+    and begun anew.
+
+    Args:
+        work: One round.
+        cell: The cell file.
+        schema: Schema of the JSON objects.
+        as_json: Whether each round gives one JSON object on a line of its own, instead of text.
+        quiet: Whether nothing but results is shown.
+        page: Shows the latest result.
+
+    Raises:
+        InterruptedWorkError: Always, at the end.
+    """
+    files, number = WatchedFiles(cell), 0
+    with contextlib.ExitStack() as opened:
+        if page is not None:
+            opened.callback(page.close)
+            page.open()
+            tell(f"open {page.path} in a browser: it shows each new result")
+        try:
+            while True:
+                number += 1
+                _round(work, files, page, schema=schema, as_json=as_json, quiet=quiet)
+                if not quiet:
+                    count = "1 file" if files.count == 1 else f"{files.count} files"
+                    tell(f"watching {count}: save one for another round, Ctrl-C ends")
+                saved = files.next_saved()
+                if not quiet:
+                    tell(f"round {number + 1}: {saved} was saved")
+        except KeyboardInterrupt:
+            raise InterruptedWorkError(f"watching ended in round {number}") from None
+
+
+def _round(work: Work, files: WatchedFiles, page: WatchPage | None, *, schema: str, as_json: bool, quiet: bool) -> None:
+    """One round; saved files begin it anew."""
+    while True:
+        files.begin()
+        if page is not None:
+            page.show("working")
+        try:
+            with progress_listener(quiet=quiet) as listener:
+                result = work(files.follow, _interruptible(files, listener))
+        except InputsChangedError:
+            files.settle()
+            continue
+        except OutputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - the next save may mend whatever it is
+            if files.rewritten() is not None:  # half a save was read
+                files.settle()
+                continue
+            _refuse(error, files, page, schema=schema, as_json=as_json)
+            return
+        present(result, as_json=as_json, on_one_line=True)
+        if page is not None:
+            failed = result.status != ExitStatus.PASSED
+            page.show("failed" if failed else "passed", run=result.folder)
+        return
+
+
+def _interruptible(files: WatchedFiles, listener: Listener) -> Listener:
+    """The listener, which also notices saved files."""
+
+    def listen(stage: str, share: float) -> None:
+        files.require_unchanged()
+        listener(stage, share)
+
+    return listen
+
+
+def _refuse(error: Exception, files: WatchedFiles, page: WatchPage | None, *, schema: str, as_json: bool) -> None:
+    """Say why a round has no result, and watch for files that the cell lacks."""
+    files.follow_neighbours()
+    lines = error_lines(error)
+    if as_json:
+        status = int(exit_status(error))
+        say_json({"schema": schema, "status": "error", "exit": status, "errors": lines}, on_one_line=True)
+    report_failure(error)
+    if page is not None:
+        page.show("error", lines)

@@ -1,0 +1,38 @@
+"""Options that several commands share: their help names every choice that the model knows."""
+
+from typing import Any, get_args, get_type_hints
+
+import pytest
+import typer
+
+from cellplan.cli.options import shared
+from cellplan.cli.solve.solve import SolveOptions
+from cellplan.io.schema.solver import SolverEntry
+from cellplan.model.cell import Mode
+from cellplan.model.solver import Integrator, MethodName
+
+
+def help_of(option: Any) -> str:
+    (found,) = (each for each in get_args(option) if isinstance(each, typer.models.OptionInfo))
+    assert found.help is not None
+    return found.help
+
+
+def listed(words: tuple[str, ...]) -> str:
+    return f": {', '.join(words[:-1])} or {words[-1]}."
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        (shared.Mode, tuple(Mode)),
+        (shared.Method, get_args(MethodName)),
+        (get_type_hints(SolveOptions, include_extras=True)["integrator"], ("auto", *Integrator)),
+    ],
+)
+def test_the_help_names_every_choice_in_its_order(option: Any, words: tuple[str, ...]) -> None:
+    assert help_of(option).endswith(listed(words))
+
+
+def test_the_schema_names_the_same_integrators() -> None:
+    assert get_args(SolverEntry.model_fields["integrator"].annotation) == ("auto", *Integrator)
