@@ -23,18 +23,9 @@ class DrawnPhase(NamedTuple):
     report: Report
 
 
-def phase_drawings(phase: DrawnPhase, *, floor_plan: str = "") -> dict[str, str]:
-    """The drawings of one phase, by file name.
-
-    Args:
-        floor_plan: Its floor plan, where that was drawn before.
-    """
-    return {STILL: run_still(*phase), FLOOR_PLAN: floor_plan or phase_floor_plan(phase)}
-
-
-def phase_floor_plan(phase: DrawnPhase) -> str:
-    """The floor plan of one phase, which does not show its clearance."""
-    return _floor_plan(phase.cell, [phase])
+def phase_drawings(phase: DrawnPhase) -> dict[str, str]:
+    """The drawings of one phase, by file name."""
+    return {STILL: run_still(*phase), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
 
 
 def program_drawings(cell: Cell, phases: Sequence[DrawnPhase]) -> dict[str, str]:

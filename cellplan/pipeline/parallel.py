@@ -15,8 +15,6 @@ def solve_in_parallel(
 ) -> Solution:
     """Solve as ``solve`` does; copies of this process check the clearance while it does all else.
 
-    Meanwhile it makes the files of a run folder that do not depend on the clearance.
-
     Args:
         cell: The cell, as ``load_cell`` gives it.
         task: Name of the only task to work on.
@@ -28,6 +26,4 @@ def solve_in_parallel(
             return solve(cell, task=task, near=near, progress=progress)
         early = EarlyClearance(work.begin, with_curves=True)
         scene, solution = solve_motion(cell, task=task, near=near, progress=progress, early=early)
-        from cellplan.pipeline.write_run import prepared  # reads what makes pages while the copies work
-
-        return certified(prepared(solution), scene, progress=progress, early=early)
+        return certified(solution, scene, progress=progress, early=early)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
@@ -13,9 +12,6 @@ from cellplan.model.presented import Presented
 from cellplan.model.report import Report
 from cellplan.model.verdict import verdict
 from cellplan.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from cellplan.pipeline.early_files import EarlyFiles
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,7 +27,6 @@ class Run:
         rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
         scene: The scene that it is judged in, with the cell as it is in this phase; None for that of the whole program.
         moved: How far its starts were moved.
-        early: Files that were made before the clearance was known; None without any. See ``early_files``.
     """
 
     phase: Phase
@@ -42,7 +37,6 @@ class Run:
     rungs: Mapping[str, str] = field(default_factory=dict)
     scene: Scene | None = None
     moved: tuple[MovedStart, ...] = ()
-    early: "EarlyFiles | None" = None
 
     def __repr__(self) -> str:
         """One line without arrays."""

@@ -15,7 +15,6 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
-from cellplan.pipeline.early_files import early_files, with_early_files
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.render import Beside, overview_page, report_page
@@ -108,27 +107,20 @@ def versions() -> dict[str, str]:
     return found
 
 
-def prepared(solution: Solution) -> Solution:
-    """The solution with what of its run folder does not depend on its clearance, which need not be known yet."""
-    versions()  # looked up here for the first time
-    return with_early_files(solution)
-
-
 def _write_report(
     target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], beside: Beside
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
-    place, early = "" if run.name is None else f"{run.name}/", early_files(run)
+    place = "" if run.name is None else f"{run.name}/"
     record = run_record(
         run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers, moved=run.moved
     )
     target.write_text(f"{place}report.json", as_json(record))
-    target.write_text(f"{place}series.json", series_json(run.report, run.motion, head=early.series))
-    plots = pictures(run_figures(run.report, cell=cell), formats, drawn=early.drawn)
+    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
+    plots = pictures(run_figures(run.report, cell=cell), formats)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    phase = DrawnPhase(cell, run.schedule, run.report)
-    beside |= _write_drawings(target, place, phase_drawings(phase, floor_plan=early.floor_plan))
+    beside |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
     page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
     target.write_text(f"{place}report.html", page)
     return record

@@ -8,24 +8,20 @@ from cellplan.report.plots.figure import Figure
 from cellplan.report.plots.svg import svg_text
 
 FORMATS: Final = ("png", "pdf")  # that may be requested beside SVG
-NOTHING: Final[Mapping[str, str]] = {}
 
 
-def pictures(
-    figures: Mapping[str, Figure], formats: Collection[str] = (), *, drawn: Mapping[str, str] = NOTHING
-) -> dict[str, bytes]:
+def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> dict[str, bytes]:
     """Every figure as SVG and in the requested formats, by file name.
 
     Args:
         figures: Figures by name.
         formats: Further formats, of ``FORMATS``.
-        drawn: What ``svg_text`` gave of some of them before, by name.
 
     Raises:
         InputError: A format is unknown, or needs the plotting library, which is not installed.
     """
     require_formats(formats)
-    files = {f"{name}.svg": (drawn.get(name) or svg_text(figure)).encode() for name, figure in figures.items()}
+    files = {f"{name}.svg": svg_text(figure).encode() for name, figure in figures.items()}
     if formats:
         from cellplan.report.plots.canvas import paint
 

@@ -18,7 +18,6 @@ from cellplan.report.plots.palette import CLASSES, INK, LIMIT, robot_colours
 from cellplan.report.plots.placing import SUPERSCRIPTS, number_sign
 from cellplan.report.record.common import shortened
 
-CLEARANCE: Final = "clearance"  # the one figure that shows more than the motion
 JOINT_COLUMNS: Final = 3
 LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
 MAX_TITLE_LETTERS: Final = 29  # [-] letters beside which the whole note has room in one of three columns
@@ -45,7 +44,7 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     over_all = {
         "margins": margins_figure(report, robots, colours),
         "speeds": speeds_figure(report, robots, colours),
-        CLEARANCE: _clearance_figure(report, cell.checks.clearance),
+        "clearance": _clearance_figure(report, cell.checks.clearance),
     }
     figures = {name: figure for name, figure in over_all.items() if figure is not None}
     for accuracy in report.accuracy:

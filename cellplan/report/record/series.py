@@ -17,7 +17,6 @@ SCHEMA: Final = "cellplan.series/1"
 MAX_STEPS: Final = 50_000  # a longer motion is thinned
 DIGITS: Final = 7  # [-] significant: 1e-5 deg of a joint, 1e-7 of an error; the joint tables have all digits
 INDENT: Final = "  "
-CLEARANCE: Final = "clearance"  # name of the last ones
 
 Curve = list[Number]
 
@@ -109,7 +108,7 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
         },
         "iterations": None if motion is None or motion.iterations is None else motion.iterations[steps],
         "slack": None if motion is None or motion.slack is None else motion.slack[steps],
-        CLEARANCE: _clearance_series(report.clearance),
+        "clearance": _clearance_series(report.clearance),
     }
 
 
@@ -142,21 +141,9 @@ def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:
     return tree
 
 
-def series_json(report: Report, motion: Motion | None = None, *, head: str = "") -> str:
-    """The text of ``series.json``; see ``series``.
-
-    Args:
-        report: The run.
-        motion: The planned motion.
-        head: What ``series_head`` gave of the same motion; empty for nothing.
-    """
-    end = series_text({CLEARANCE: _clearance_series(report.clearance)})
-    return (head or series_head(report, motion)).removesuffix("\n}") + "," + end.removeprefix("{") + "\n"
-
-
-def series_head(report: Report, motion: Motion | None = None) -> str:
-    """The text of all series but those of the clearance, which come last."""
-    return series_text({name: each for name, each in series(report, motion).items() if name != CLEARANCE})
+def series_json(report: Report, motion: Motion | None = None) -> str:
+    """The text of ``series.json``; see ``series``."""
+    return series_text(series(report, motion)) + "\n"
 
 
 def series_text(tree: Mapping[str, Any], depth: int = 0) -> str:
