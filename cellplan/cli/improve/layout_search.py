@@ -5,10 +5,8 @@ from concurrent.futures import Executor
 from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
-from cellplan.cli.improve.fastest import FastestOptions
-from cellplan.cli.improve.layout import LayoutOptions
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
@@ -28,9 +26,13 @@ from cellplan.pipeline.repair.result import advice_lines, write_repair
 from cellplan.search.programs.objective import Objective, Timing
 from cellplan.study.session import Stop
 
+if TYPE_CHECKING:
+    from cellplan.cli.improve.fastest import FastestOptions
+    from cellplan.cli.improve.layout import LayoutOptions
+
+SearchOptions: TypeAlias = "LayoutOptions | FastestOptions"
 Choice = TypeVar("Choice", bound=StrEnum)
 Value = TypeVar("Value")
-SearchOptions = LayoutOptions | FastestOptions
 SEARCHED: Final = {"certified": ExitStatus.PASSED, "no_start": ExitStatus.NO_SOLUTION}  # any other status: failed
 REPAIRED: Final = {
     "passes": ExitStatus.PASSED,
@@ -86,7 +88,7 @@ def searched(options: SearchOptions, request: LayoutRequest) -> Result:
     return result_of_folder(record["schema"], status, lines, folder / "study.html", study=record)
 
 
-def repaired(options: LayoutOptions, request: LayoutRequest) -> Result:
+def repaired(options: "LayoutOptions", request: LayoutRequest) -> Result:
     """Repair a cell, and write the folder."""
     folder = study_folder(options, "repair")
     refuse_unless_replaceable(folder)
