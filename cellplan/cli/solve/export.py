@@ -32,7 +32,7 @@ class ExportOptions(Options):
             "Format: csv, json or ros2 for any controller; krl, rapid, urscript or val3 for those of a maker; stream: "
             "rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: every one that "
             "can take the run.",
-            autocompletion=one_of("cellplan.pipeline.export.program:EXPORTERS", "all"),
+            autocompletion=one_of("cellplan.pipeline.export.dialects:DIALECTS", "wide", "all"),
         ),
     ]
     output: Annotated[
