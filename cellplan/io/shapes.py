@@ -7,7 +7,6 @@ import numpy as np
 
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.io.schema.common import PoseEntry
 from cellplan.io.schema.mounting import AttachmentEntry
 from cellplan.io.schema.robot_table import LinkBodyEntry, SegmentEntry
 from cellplan.io.schema.shapes import (
@@ -22,7 +21,8 @@ from cellplan.io.schema.shapes import (
     ToolRoundEntry,
     ToolShapeEntry,
 )
-from cellplan.io.schema.units import Mm, in_si
+from cellplan.model.settings.entry import PoseEntry
+from cellplan.model.settings.units import Mm, in_si
 
 ALONG: Final = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),

@@ -7,6 +7,13 @@ from types import MappingProxyType
 from typing import Final, Literal
 
 from cellplan.geometry.transforms import Array
+from cellplan.model.settings.solver import (
+    DampedLeastSquaresEntry,
+    FilteredInverseEntry,
+    QuadraticProgramEntry,
+    SearchEntry,
+    WeightingEntry,
+)
 
 MethodName = Literal[  # each is the name of a file and a function in planning/methods/
     "weighted_pseudo_inverse",
@@ -97,8 +104,8 @@ def beside_smallest(method: MethodName, *, has_goals: bool, near_limits: float, 
     Args:
         method: The resolution method.
         has_goals: Whether anything is pursued besides the tasks.
-        near_limits: See ``WeightingSettings``.
-        load: See ``WeightingSettings``.
+        near_limits: See ``WeightingEntry``.
+        load: See ``WeightingEntry``.
     """
     obstacles = {
         "method": not METHODS[method].is_accurate,
@@ -107,74 +114,6 @@ def beside_smallest(method: MethodName, *, has_goals: bool, near_limits: float, 
         "weighting.load": load != 0.0,
     }
     return tuple(key for key, stands in obstacles.items() if stands)
-
-
-class SingularityMeasure(StrEnum):
-    """Measure of the distance from a singularity."""
-
-    SINGULAR_VALUE = "singular_value"
-    MANIPULABILITY = "manipulability"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DampedLeastSquaresSettings:
-    """Where damping sets in; how large it becomes is stated by ``SolverSettings.damping``.
-
-    Attributes:
-        measure: Smallest singular value ([Nicolato2007]_ Eq. 2.12) or manipulability ([Vargas2012]_ Eqs. 9-10).
-        region: Value of the measure below which damping sets in (``epsilon``, ``w0``).
-        shapes_gain: Whether the feedback gain falls near a singularity ([Nicolato2007]_ Eq. 2.14).
-    """
-
-    measure: SingularityMeasure = SingularityMeasure.SINGULAR_VALUE
-    region: float = 0.02
-    shapes_gain: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FilteredInverseSettings:
-    """How fast the filtered inverse follows the Jacobian.
-
-    Attributes:
-        gain: Update gain ``Gamma`` in [1/s] ([Vargas2012]_ Eq. 34).
-        starts_at_zero: Whether it starts at zero, as in the paper, rather than at the pseudo-inverse.
-    """
-
-    gain: float = 1000.0
-    starts_at_zero: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SearchSettings:
-    """Settings of the heuristic and the recursive search for the next configuration ([Nicolato2007]_ ch. 3).
-
-    Attributes:
-        tolerance: Largest square root of the cost at which a sample counts as reached, in [m].
-        orientation_weight: Weight ``gamma`` of the orientation in the cost in [m^2].
-        rounds: Rounds over all joints after which a sample counts as out of reach.
-        brakes: Whether joints slow down near their limits (Eqs. 3.29, 3.30).
-        sequence: Joints as (robot, joint) in the order in which the recursive search moves them; None for the order
-            of the stacked joint vector.
-    """
-
-    tolerance: float = 1e-7
-    orientation_weight: float = 0.01
-    rounds: int = 2000
-    brakes: bool = False
-    sequence: tuple[tuple[str, str], ...] | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class QuadraticProgramSettings:
-    """Limits and slack of the quadratic program.
-
-    Attributes:
-        slack_weight: Cost of the task's slack relative to that of weighted joint velocities.
-        ramp: Time in [s] in which a joint without a known acceleration limit reaches its velocity limit; None: at once.
-    """
-
-    slack_weight: float = 1e8
-    ramp: float | None = None
 
 
 class GoalKind(StrEnum):
@@ -204,19 +143,6 @@ class SecondaryGoal:
     configurations: Mapping[str, Array] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WeightingSettings:
-    """Joint weights that change along the motion; with 0 they are constant.
-
-    Attributes:
-        near_limits: Gain of the weight that grows as a joint approaches a limit.
-        load: Gain of the weight that grows with the gravity load of a joint.
-    """
-
-    near_limits: float = 0.0
-    load: float = 0.0
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SolverSettings:
     """Settings of the solver.
@@ -242,11 +168,11 @@ class SolverSettings:
     gain: float
     damping: float | None
     seed: int
-    damped_least_squares: DampedLeastSquaresSettings = DampedLeastSquaresSettings()
-    filtered_inverse: FilteredInverseSettings = FilteredInverseSettings()
-    search: SearchSettings = SearchSettings()
-    quadratic_program: QuadraticProgramSettings = QuadraticProgramSettings()
-    weighting: WeightingSettings = WeightingSettings()
+    damped_least_squares: DampedLeastSquaresEntry = field(default_factory=DampedLeastSquaresEntry)
+    filtered_inverse: FilteredInverseEntry = field(default_factory=FilteredInverseEntry)
+    search: SearchEntry = field(default_factory=SearchEntry)
+    quadratic_program: QuadraticProgramEntry = field(default_factory=QuadraticProgramEntry)
+    weighting: WeightingEntry = field(default_factory=WeightingEntry)
     goals: tuple[SecondaryGoal, ...] = ()
     integrator: Integrator | None = Integrator.EULER
     accuracy: float = 1e-7

@@ -12,7 +12,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.robot import Joint
-from cellplan.model.solver import SearchSettings
+from cellplan.model.settings.solver import SearchEntry
 
 STEPS = 20
 STEP = 2e-3  # [s]
@@ -85,7 +85,7 @@ def straight(cell: Cell, start: Sequence[float], way: Sequence[float], *, step: 
                 end=float(times[-1]),
             )
         )
-    settings = replace(cell.solver, gain=0.5 / step, search=SearchSettings(rounds=ROUNDS))
+    settings = replace(cell.solver, gain=0.5 / step, search=SearchEntry(rounds=ROUNDS))
     cell = replace(
         cell,
         solver=replace(settings, **solver),

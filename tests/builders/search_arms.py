@@ -16,7 +16,8 @@ from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
-from cellplan.model.solver import SearchSettings, SolverSettings
+from cellplan.model.settings.solver import SearchEntry
+from cellplan.model.solver import SolverSettings
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -70,7 +71,7 @@ def arm_cell(model: RobotModel, *, method: str, axes=(0, 1, 2), **search) -> Cel
         start=None,
         weights=np.ones(len(model.joints)),
     )
-    solver = SolverSettings(method=method, gain=100.0, damping=None, seed=0, search=SearchSettings(**search))
+    solver = SolverSettings(method=method, gain=100.0, damping=None, seed=0, search=SearchEntry(**search))
     return Cell(
         name="arm",
         robots=(robot,),

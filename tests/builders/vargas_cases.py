@@ -8,13 +8,8 @@ import numpy as np
 
 from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from cellplan.geometry.transforms import Array
-from cellplan.model.solver import (
-    DampedLeastSquaresSettings,
-    FilteredInverseSettings,
-    MethodName,
-    SingularityMeasure,
-    SolverSettings,
-)
+from cellplan.model.settings.solver import DampedLeastSquaresEntry, FilteredInverseEntry
+from cellplan.model.solver import MethodName, SolverSettings
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -74,8 +69,8 @@ def vargas_run(name: str, method: MethodName, step: float) -> VargasRun:
         gain=5.0,
         damping=0.3,
         seed=0,
-        damped_least_squares=DampedLeastSquaresSettings(measure=SingularityMeasure.MANIPULABILITY, region=1.0),
-        filtered_inverse=FilteredInverseSettings(gain=case.gain, starts_at_zero=True),
+        damped_least_squares=DampedLeastSquaresEntry(measure="manipulability", region=1.0),
+        filtered_inverse=FilteredInverseEntry(gain_per_s=case.gain, start="zero"),
     )
     cell = planar_cell(LENGTHS, solver, settle=DURATION)
     schedule = tip_schedule(cell, case.point, velocity=case.velocity, duration=DURATION, step=step)

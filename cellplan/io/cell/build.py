@@ -29,12 +29,12 @@ from cellplan.io.schema.task import (
     TrapezoidEntry,
 )
 from cellplan.io.schema.tool import OF_ROD
-from cellplan.io.schema.units import Mm, in_si, si_or_none
 from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry
 from cellplan.model.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing
 from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import Mm, in_si, si_or_none
 from cellplan.model.task import (
     CirclePath,
     Frame,

@@ -8,10 +8,10 @@ from cellplan.io.schema.cell import CellDocument
 from cellplan.io.schema.controllers import ControllerEntry, RobotControlEntry, StopEntry
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
-from cellplan.io.schema.units import si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl, StopDemand
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import si_or_none
 
 ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
 EXTERNAL: Final = 6  # external axes that a row of these programs holds

@@ -16,11 +16,11 @@ from cellplan.io.cell.layout_ties import Ties
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.layout import KeepOutEntry, LayoutEntry
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.io.schema.units import in_si
 from cellplan.io.shapes import pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.layout import Choice, KeepOut, LayoutSettings, Misplacement, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import in_si
 from cellplan.model.units import MM
 
 NEAR_MM: Final = 1000.0  # x and y of a base may change by so much where no range is given

@@ -18,12 +18,12 @@ from cellplan.io.schema.mounting import (
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import MOUNTS, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
-from cellplan.io.schema.units import Mm, si_or_none
 from cellplan.io.shapes import MeshReader, centred_solid, direction, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.mounting import Bracket, Hanger, Mount, Pedestal, Wedge
 from cellplan.model.rail import on_rail
 from cellplan.model.robot import BASE, Body, Joint, JointKind, RobotModel
+from cellplan.model.settings.units import Mm, si_or_none
 
 PEDESTAL: Final = "pedestal"  # name of the body
 MOUNT: Final = "mount"  # name of the body of all other mounts

@@ -6,49 +6,23 @@ from typing import Final
 from cellplan.io.robots.rules import configuration_in_si
 from cellplan.io.schema.solver import ConfigurationGoalEntry, SecondaryEntry, SolverEntry
 from cellplan.model.robot import RobotModel
-from cellplan.model.solver import (
-    DampedLeastSquaresSettings,
-    FilteredInverseSettings,
-    GoalKind,
-    Integrator,
-    QuadraticProgramSettings,
-    SearchSettings,
-    SecondaryGoal,
-    SingularityMeasure,
-    SolverSettings,
-    WeightingSettings,
-)
+from cellplan.model.solver import GoalKind, Integrator, SecondaryGoal, SolverSettings
 
 HALF_FEEDBACK: Final = 0.5  # gain_per_s * step_s by default: a quarter of the stability limit of Euler's steps
 
 
 def build_solver(entry: SolverEntry, step: float, models: Mapping[str, RobotModel]) -> SolverSettings:
     """Method, gains and goals; the gain follows from the step in [s] when it is not given."""
-    damped, filtered, search, program = (
-        entry.damped_least_squares,
-        entry.filtered_inverse,
-        entry.search,
-        entry.quadratic_program,
-    )
-    joints = None if search.sequence is None else tuple((joint.robot, joint.joint) for joint in search.sequence)
     return SolverSettings(
         method=entry.method,
         gain=HALF_FEEDBACK / step if entry.gain_per_s is None else entry.gain_per_s,
         damping=None if isinstance(entry.damping, str) else entry.damping,
         seed=entry.seed,
-        damped_least_squares=DampedLeastSquaresSettings(
-            measure=SingularityMeasure(damped.measure), region=damped.region, shapes_gain=damped.shape_gain
-        ),
-        filtered_inverse=FilteredInverseSettings(gain=filtered.gain_per_s, starts_at_zero=filtered.start == "zero"),
-        search=SearchSettings(
-            tolerance=search.tolerance_mm.si,
-            orientation_weight=search.orientation_weight_m2,
-            rounds=search.rounds,
-            brakes=search.brakes,
-            sequence=joints,
-        ),
-        quadratic_program=QuadraticProgramSettings(slack_weight=program.slack_weight, ramp=program.ramp_s),
-        weighting=WeightingSettings(near_limits=entry.weighting.near_limits, load=entry.weighting.load),
+        damped_least_squares=entry.damped_least_squares,
+        filtered_inverse=entry.filtered_inverse,
+        search=entry.search,
+        quadratic_program=entry.quadratic_program,
+        weighting=entry.weighting,
         goals=_goals(entry.secondary, models),
         integrator=None if entry.integrator == "auto" else Integrator(entry.integrator),
         accuracy=entry.accuracy_mm.si,

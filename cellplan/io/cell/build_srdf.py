@@ -14,9 +14,9 @@ from cellplan.io.input.findings import unknown_name
 from cellplan.io.robots.rules import start_keys
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
-from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import Deg, Mm
 
 if TYPE_CHECKING:  # read only for a cell that names an SRDF
     from cellplan.io.robots.urdf.srdf import Srdf

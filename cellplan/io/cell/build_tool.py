@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 from cellplan.io.schema.tool import RodEntry, ToolEntry
-from cellplan.io.schema.units import in_si
 from cellplan.io.shapes import MeshReader, centred_solid, pose_from_entry, tool_solid
 from cellplan.model.cell import Tool
 from cellplan.model.robot import BASE, Body
 from cellplan.model.rod import Holder, Rod, tool_body_name
+from cellplan.model.settings.units import in_si
 
 
 def build_tool(entry: ToolEntry, read_mesh: MeshReader) -> Tool:

@@ -12,10 +12,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.io.input.findings import KeyPath, did_you_mean, listed, raise_findings, shown
 from cellplan.io.schema import CellDocument
-from cellplan.io.schema.common import PoseEntry
 from cellplan.io.schema.messages import annotation_at, fields_of
 from cellplan.io.yaml.reader import YamlDocument, parse_yaml
 from cellplan.io.yaml.writer import flow_text
+from cellplan.model.settings.entry import PoseEntry
 
 COMPONENTS: Final[Mapping[str, tuple[str, str]]] = {
     "x_mm": ("xyz_mm", "0"),

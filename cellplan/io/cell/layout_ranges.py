@@ -8,14 +8,14 @@ from typing import Any, Final
 from cellplan.io.cell.layout_addresses import Address
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown
 from cellplan.io.robots.rules import start_posture
-from cellplan.io.schema.common import PoseEntry
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import WEIGHT_RANGE, RobotEntry
 from cellplan.io.schema.tool import RodEntry
-from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.layout import VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.entry import PoseEntry
+from cellplan.model.settings.units import Deg, Mm
 
 KINDS: Final[Mapping[str, VariableKind]] = {
     "base": VariableKind.BASE,

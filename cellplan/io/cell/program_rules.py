@@ -10,10 +10,10 @@ from cellplan.io.robots.rules import configuration_findings, configuration_in_si
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.program import PartPlaceEntry
 from cellplan.io.schema.task import TaskEntry
-from cellplan.io.schema.units import Mm
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
 from cellplan.model.sequence import order_faults
+from cellplan.model.settings.units import Mm
 
 STAND_OFF: Final = Mm(30.0)  # of the tools of a program where the cell gives none
 STAND_OFFS: Final = ("approach_mm", "retract_mm")

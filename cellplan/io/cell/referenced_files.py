@@ -24,9 +24,9 @@ from cellplan.io.robots.urdf import XACRO_SUFFIX
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.path import CsvEntry
 from cellplan.io.schema.robot import RobotEntry
-from cellplan.io.schema.units import Deg, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import Deg, si_or_none
 from cellplan.model.task import SampledPath, TimedPath
 
 if TYPE_CHECKING:  # read only for a cell that names such a file

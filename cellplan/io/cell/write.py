@@ -11,12 +11,12 @@ from cellplan.io.robots.rules import configuration_in_si, start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import TaskEntry
-from cellplan.io.schema.units import Deg, Mm, file_number, in_si
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
 from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
 from cellplan.model.sequence import sequence_of
+from cellplan.model.settings.units import Deg, Mm, file_number, in_si
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.model.units import MM

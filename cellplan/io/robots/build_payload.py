@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from cellplan.io.input.findings import Finding, KeyPath, unknown_name
 from cellplan.io.schema.robot import PayloadEntry
-from cellplan.io.schema.units import si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.payload import AxisLimit, Payload
+from cellplan.model.settings.units import si_or_none
 
 
 def build_payload(entry: PayloadEntry | None) -> Payload | None:

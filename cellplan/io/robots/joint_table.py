@@ -23,10 +23,10 @@ from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS
 from cellplan.io.schema.robot_table import BodiesEntry, JointEntry, ReachEntry
-from cellplan.io.schema.units import in_si, si_or_none
 from cellplan.io.shapes import link_solid, pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, PublishedReach, RobotModel
+from cellplan.model.settings.units import in_si, si_or_none
 
 FOOT: Final = "base"  # word for the link that does not move
 TOOL_NAME: Final = re.compile(r"tool(_[0-9]+)?")  # these names belong to the bodies of the tool

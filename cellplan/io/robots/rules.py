@@ -11,9 +11,9 @@ from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, u
 from cellplan.io.robots.build_payload import build_payload, payload_findings
 from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
-from cellplan.io.schema.units import Deg, Mm, in_si, si_or_none
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
+from cellplan.model.settings.units import Deg, Mm, in_si, si_or_none
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
 Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found

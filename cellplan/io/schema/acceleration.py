@@ -4,8 +4,8 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.common import Entry, Reason, by_kind, one_of_keys, require_one
-from cellplan.io.schema.units import Ms, Within
+from cellplan.model.settings.entry import Entry, Reason, by_kind, one_of_keys, require_one
+from cellplan.model.settings.units import Ms, Within
 
 AXES: Final = 64  # joints of one robot
 SECONDS_WORDS: Final = "a number of seconds or a list of them"

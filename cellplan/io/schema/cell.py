@@ -5,17 +5,6 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import (
-    Coordinates,
-    Entry,
-    Name,
-    PoseEntry,
-    Reason,
-    Text,
-    by_kind,
-    require_each_once,
-    rule,
-)
 from cellplan.io.schema.controllers import ControllerEntry, StopEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.program import ProgramEntry
@@ -32,7 +21,18 @@ from cellplan.io.schema.task import (
     ToolDepth,
 )
 from cellplan.io.schema.tool import Mass
-from cellplan.io.schema.units import Deg, Mm, Ms, Within
+from cellplan.model.settings.entry import (
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Reason,
+    Text,
+    by_kind,
+    require_each_once,
+    rule,
+)
+from cellplan.model.settings.units import Deg, Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64

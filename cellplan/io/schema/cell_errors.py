@@ -4,8 +4,8 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.common import Entry, Name, by_kind, one_of_keys, require_one
 from cellplan.io.schema.solver import LARGEST_SEED
+from cellplan.model.settings.entry import Entry, Name, by_kind, one_of_keys, require_one
 
 LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a wrong unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn

@@ -4,8 +4,8 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.io.schema.common import Angle, Component, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
-from cellplan.io.schema.units import Deg, Mm
+from cellplan.model.settings.entry import Angle, Component, Entry, PlaneCoordinates, SignedAxis, Size, by_kind, rule
+from cellplan.model.settings.units import Deg, Mm
 
 PlaneWord = Literal["xy", "yz", "xz"]
 PlaneDirection = tuple[Component, Component]

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.io.schema.common import Angle, Coordinate, Entry, Text, rule
+from cellplan.model.settings.entry import Angle, Coordinate, Entry, Text, rule
 
 LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
 

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import CycleTime
-from cellplan.io.schema.common import Entry, Name, by_kind, rule
 from cellplan.io.schema.controller import ControllerZeroEntry
-from cellplan.io.schema.units import Mm, Ms, Within
+from cellplan.model.settings.entry import Entry, Name, by_kind, rule
+from cellplan.model.settings.units import Mm, Ms, Within
 
 IDENTIFIER: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 IDENTIFIER_WORDS: Final = "a name of 1 to 32 ASCII letters, digits or '_' that begins with a letter"

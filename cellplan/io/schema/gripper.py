@@ -4,8 +4,8 @@ from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.io.schema.common import Entry, Text, require_each_once, rule
-from cellplan.io.schema.units import Deg, Mm, Within
+from cellplan.model.settings.entry import Entry, Text, require_each_once, rule
+from cellplan.model.settings.units import Deg, Mm, Within
 
 FINGER_LIMIT: Final = 2  # joints that open a gripper together
 WIDEST_MM: Final = 10_000.0  # a wider opening is a wrong unit

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.io.schema.common import FARTHEST_MM, Angle, Entry, rule
+from cellplan.model.settings.entry import FARTHEST_MM, Angle, Entry, rule
 
 COEFFICIENT_LIMIT: Final = 400  # more are a table of the motion, not a spline
 

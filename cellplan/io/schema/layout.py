@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.io.schema.common import (
+from cellplan.model.settings.entry import (
     Coordinate,
     Entry,
     Name,
@@ -16,7 +16,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, Within
 
 KEEP_OUT_SHAPES: Final = ("box", "cylinder")
 ITEM_LIMIT: Final = 1000

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 from pydantic import BaseModel, Tag, ValidationError
 
 from cellplan.io.input.findings import Finding, KeyPath
-from cellplan.io.schema.common import Entry
 from cellplan.io.schema.mismatch import Kind, Mismatch, mismatch_text
-from cellplan.io.schema.units import Quantity
 from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.settings.entry import Entry
+from cellplan.model.settings.units import Quantity
 
 UNITS: Final[Mapping[str, str]] = {
     "_deg_s3": "degrees per second³",

@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Any
 
 from cellplan.io.input.findings import KeyPath, did_you_mean, listed, shown
-from cellplan.io.schema.common import NAME_WORDS
+from cellplan.model.settings.entry import NAME_WORDS
 
 
 class Kind(StrEnum):

@@ -4,7 +4,6 @@ from typing import ClassVar, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from cellplan.io.schema.common import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
 from cellplan.io.schema.shapes import (
     MESH_FILE,
     MESH_UNIT,
@@ -18,6 +17,7 @@ from cellplan.io.schema.shapes import (
     SphereEntry,
     ToolBodyEntry,
 )
+from cellplan.model.settings.entry import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
 
 PEDESTAL_SHAPES = ("cylinder", "box")
 

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Final, Self
 from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
-from cellplan.io.schema.common import (
+from cellplan.model.settings.entry import (
     Coordinate,
     Direction,
     Entry,
@@ -15,7 +15,7 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.units import Mm, Within
+from cellplan.model.settings.units import Mm, Within
 
 PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction

@@ -4,9 +4,9 @@ from typing import Annotated, Final
 
 from pydantic import Field, Tag
 
-from cellplan.io.schema.common import Entry, Name, PoseEntry, by_kind
 from cellplan.io.schema.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
-from cellplan.io.schema.units import Mm, Within
+from cellplan.model.settings.entry import Entry, Name, PoseEntry, by_kind
+from cellplan.model.settings.units import Mm, Within
 
 MARK_LIMIT: Final = 200
 MARK_WORDS: Final = "a name or {name: m1, dwell_s: 0.5}"

@@ -5,7 +5,12 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import ConfigDict, Field, Tag, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.common import (
+from cellplan.io.schema.controllers import RobotControlEntry
+from cellplan.io.schema.gripper import GripperEntry
+from cellplan.io.schema.joint_path import JointPathEntry
+from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
+from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
+from cellplan.model.settings.entry import (
     Angle,
     Coordinate,
     Direction,
@@ -19,12 +24,18 @@ from cellplan.io.schema.common import (
     require_one,
     rule,
 )
-from cellplan.io.schema.controllers import RobotControlEntry
-from cellplan.io.schema.gripper import GripperEntry
-from cellplan.io.schema.joint_path import JointPathEntry
-from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
-from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
-from cellplan.io.schema.units import Deg, DegPerS, DegPerS2, DegPerS3, Mm, MmPerS, MmPerS2, MmPerS3, Quantity, Within
+from cellplan.model.settings.units import (
+    Deg,
+    DegPerS,
+    DegPerS2,
+    DegPerS3,
+    Mm,
+    MmPerS,
+    MmPerS2,
+    MmPerS3,
+    Quantity,
+    Within,
+)
 
 LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit

@@ -4,23 +4,6 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.common import (
-    NOT_TURNED,
-    ORIGIN,
-    Angles,
-    Coordinate,
-    Coordinates,
-    Entry,
-    Name,
-    PoseEntry,
-    Size,
-    Text,
-    Vector,
-    by_kind,
-    one_of_keys,
-    require_one,
-    rule,
-)
 from cellplan.io.schema.controller import ControllerZeroEntry
 from cellplan.io.schema.robot import (
     AXIS_LIMIT,
@@ -37,6 +20,23 @@ from cellplan.io.schema.robot import (
     TurningSpeed,
 )
 from cellplan.io.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
+from cellplan.model.settings.entry import (
+    NOT_TURNED,
+    ORIGIN,
+    Angles,
+    Coordinate,
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    Text,
+    Vector,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
 
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits

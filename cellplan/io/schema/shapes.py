@@ -4,7 +4,7 @@ from typing import ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from cellplan.io.schema.common import (
+from cellplan.model.settings.entry import (
     AxisName,
     Coordinate,
     Entry,

@@ -4,7 +4,9 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from cellplan.io.schema.common import (
+from cellplan.io.schema.path import PathEntry
+from cellplan.io.schema.robot import Configuration, JointPosition, SlidingSpeed
+from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
     Angle,
     Direction,
@@ -16,9 +18,7 @@ from cellplan.io.schema.common import (
     require_each_once,
     rule,
 )
-from cellplan.io.schema.path import PathEntry
-from cellplan.io.schema.robot import Configuration, JointPosition, SlidingSpeed
-from cellplan.io.schema.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
 DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface

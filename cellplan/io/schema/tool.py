@@ -4,9 +4,9 @@ from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.io.schema.common import Coordinates, Entry, FrameAngle, PoseEntry, Size, rule
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
-from cellplan.io.schema.units import Deg, Mm, Within
+from cellplan.model.settings.entry import Coordinates, Entry, FrameAngle, PoseEntry, Size, rule
+from cellplan.model.settings.units import Deg, Mm, Within
 
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 WIDEST_TILT_DEG: Final = 180.0

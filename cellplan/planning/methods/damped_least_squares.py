@@ -5,7 +5,7 @@ from typing import Final
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.solver import DampedLeastSquaresSettings, SingularityMeasure
+from cellplan.model.settings.solver import DampedLeastSquaresEntry
 from cellplan.planning.tracking.problem import Advance, TrackingProblem
 from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING, ROUNDING, WeightedInverse
 
@@ -29,7 +29,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
         measure = nearness(inverse, settings)
         lambda_squared = squared_damping(measure, settings, largest=problem.damping)
         _refuse_undamped(inverse, lambda_squared)
-        share = gain_share(measure, settings.region) if settings.shapes_gain else 1.0
+        share = gain_share(measure, settings.region) if settings.shape_gain else 1.0
         speeds = inverse.speeds(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
         if tasks.secondary is not None:
             speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
@@ -38,14 +38,14 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
     return advance
 
 
-def nearness(inverse: WeightedInverse, settings: DampedLeastSquaresSettings) -> float:
+def nearness(inverse: WeightedInverse, settings: DampedLeastSquaresEntry) -> float:
     """What tells how near a singularity is: smallest singular value or manipulability, both of ``J W^-1/2``."""
-    if settings.measure is SingularityMeasure.SINGULAR_VALUE:
+    if settings.measure == "singular_value":
         return inverse.smallest
     return inverse.manipulability
 
 
-def squared_damping(measure: float, settings: DampedLeastSquaresSettings, *, largest: float | None) -> float:
+def squared_damping(measure: float, settings: DampedLeastSquaresEntry, *, largest: float | None) -> float:
     r"""What is added to ``J W^-1 J^T``, the squared damping factor ([Nicolato2007]_ Eq. 2.12, [Vargas2012]_ Eq. 9).
 
     .. math:: \lambda^2 = (1 - (\sigma / \varepsilon)^2) \lambda_{max}^2 \quad (\sigma < \varepsilon), \qquad
@@ -64,7 +64,7 @@ def squared_damping(measure: float, settings: DampedLeastSquaresSettings, *, lar
     ratio = measure / settings.region
     if ratio >= 1.0:
         return 0.0
-    if settings.measure is SingularityMeasure.SINGULAR_VALUE:
+    if settings.measure == "singular_value":
         return (1.0 - ratio**2) * (settings.region if largest is None else largest) ** 2
     return (1.0 - ratio) ** 2 * (LARGEST_DAMPING**2 if largest is None else largest)
 

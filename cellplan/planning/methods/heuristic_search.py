@@ -27,7 +27,7 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     redundant cells shake. Rounds that gain little are carried on (see `ConfigurationSearch`). A joint that moves no
     tool stays: rounding alone would turn it by any angle.
     """
-    tolerance = problem.cell.solver.search.tolerance
+    tolerance = problem.cell.solver.search.tolerance_mm.si
     search = ConfigurationSearch(problem)
     improve = _best_first(search.cost, tolerance**2)
     before: dict[int, Array] = {}  # configuration at the time before the last one, by that one's number

@@ -69,7 +69,7 @@ def _sequence(cell: Cell) -> Indices:
     if named is None:
         return np.arange(cell.joint_count)
     return np.array(
-        [cell.columns(robot).start + cell.robot(robot).model.joint_names.index(joint) for robot, joint in named],
+        [cell.columns(it.robot).start + cell.robot(it.robot).model.joint_names.index(it.joint) for it in named],
         dtype=np.intp,
     )
 
@@ -85,7 +85,7 @@ class _Rounds:
             _Brake.of(float(low), float(high)) if cell.solver.search.brakes and np.isfinite(high - low) else None
             for low, high in zip(lower, upper, strict=True)
         ]
-        self._target = AIM * cell.solver.search.tolerance**2
+        self._target = AIM * cell.solver.search.tolerance_mm.si**2
 
     def on(self, cost: SearchCost, shares: Array) -> Pass:
         """Rounds on one expansion after another.

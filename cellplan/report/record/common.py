@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Final, TypedDict
 
@@ -11,6 +11,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, Report
+from cellplan.model.settings.entry import Entry
 
 Number = float | None
 Record = Mapping[str, Any]  # a record as consumers read it, from memory or from a file
@@ -70,6 +71,12 @@ def number(value: float | None) -> Number:
     if value is None or not math.isfinite(value):
         return None
     return float(f"{value:.{SIGNIFICANT}g}") + 0.0
+
+
+def entry_record(entry: Entry, without: Collection[str] = ()) -> Any:
+    """The values of an entry under the keys of its file."""
+    values = entry.model_dump(mode="json", exclude=set(without))
+    return {key: number(value) if isinstance(value, float) else value for key, value in values.items()}
 
 
 def smallest(values: Array, times: Array) -> ExtremeRecord:

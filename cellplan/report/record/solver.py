@@ -10,7 +10,7 @@ from cellplan.model.branches import MovedStart
 from cellplan.model.motion import Motion, NearestSingular
 from cellplan.model.solver import Integrator, SolverSettings
 from cellplan.model.units import DEG, MM, joint_unit
-from cellplan.report.record.common import Number, number
+from cellplan.report.record.common import Number, entry_record, number
 
 SLACK_UNIT: Final = "norm of the twist residual, mixed units: m/s and rad/s"
 
@@ -158,10 +158,7 @@ def solver_record(
             else {"gain": number(goal.gain)}
             for goal in solver.goals
         },
-        "weighting": {
-            "near_limits": number(solver.weighting.near_limits),
-            "load": number(solver.weighting.load),
-        },
+        "weighting": entry_record(solver.weighting),
         "iterations": None if motion is None else _iterations_record(motion),
         "slack": None if motion is None else _slack_record(motion),
         "resolution": None if motion is None else _resolution_record(motion),
@@ -186,35 +183,21 @@ def moved_start_record(moved: MovedStart) -> MovedStartRecord:
 
 
 def _own_settings(solver: SolverSettings) -> SettingsRecord:
-    """Settings of the method itself."""
-    if solver.method == "damped_least_squares":
-        damped = solver.damped_least_squares
-        measure = str(damped.measure)
-        return {"measure": measure, "region": number(damped.region), "shape_gain": damped.shapes_gain}
-    if solver.method in {"filtered_inverse", "filtered_inverse_ii"}:
-        filtered = solver.filtered_inverse
-        return {"gain_per_s": number(filtered.gain), "start": "zero" if filtered.starts_at_zero else "inverse"}
-    if solver.method == "quadratic_program":
-        program = solver.quadratic_program
-        return {"slack_weight": number(program.slack_weight), "ramp_s": number(program.ramp)}
-    return _search_settings(solver) if solver.traits.is_search else {}
-
-
-def _search_settings(solver: SolverSettings) -> SettingsRecord:
-    """Settings of a search; only the recursive one has a sequence."""
-    search = solver.search
-    record: SettingsRecord = {
-        "tolerance_mm": number(MM * search.tolerance),
-        "orientation_weight_m2": number(search.orientation_weight),
-        "rounds": search.rounds,
-        "brakes": search.brakes,
-    }
-    if solver.method == "recursive_search":
-        sequence = search.sequence
-        record["sequence"] = (
-            None if sequence is None else [{"robot": robot, "joint": joint} for robot, joint in sequence]
-        )
-    return record
+    """Settings of the method itself; only the recursive search has a sequence."""
+    match solver.method:
+        case "damped_least_squares":
+            own = entry_record(solver.damped_least_squares)
+        case "filtered_inverse" | "filtered_inverse_ii":
+            own = entry_record(solver.filtered_inverse)
+        case "quadratic_program":
+            own = entry_record(solver.quadratic_program)
+        case "heuristic_search":
+            own = entry_record(solver.search, without={"sequence"})
+        case "recursive_search":
+            own = entry_record(solver.search)
+        case _:
+            own = {}
+    return own
 
 
 def _iterations_record(motion: Motion) -> IterationsRecord | None:

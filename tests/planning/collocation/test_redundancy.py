@@ -11,7 +11,8 @@ from builders.timed_cells import Case, between_samples, case_of, largest_error, 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.motion import Schedule
-from cellplan.model.solver import GoalKind, Integrator, SecondaryGoal, WeightingSettings
+from cellplan.model.settings.solver import WeightingEntry
+from cellplan.model.solver import GoalKind, Integrator, SecondaryGoal
 from cellplan.planning.collocation.batch_targets import sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.redundancy import Redundancy
@@ -26,19 +27,19 @@ GOALS = {
 }
 OBSTACLES = SecondaryGoal(kind=GoalKind.OBSTACLES, gain=0.1, within=0.25)
 PLANAR_START = np.radians([50.0, -85.0, 35.0, -26.91606059, 95.64533787, -68.72927727])
-HEAVY = WeightingSettings(load=1.0)
-HELD_BACK = WeightingSettings(near_limits=1.0)
+HEAVY = WeightingEntry(load=1.0)
+HELD_BACK = WeightingEntry(near_limits=1.0)
 ACCURACY = 1e-7  # [m]
 
 
-def varied(cell: Cell, *goals: SecondaryGoal, weighting: WeightingSettings | None = None) -> Cell:
+def varied(cell: Cell, *goals: SecondaryGoal, weighting: WeightingEntry | None = None) -> Cell:
     """A cell with goals and changing weights, whose tools and part have masses."""
     robots = [replace(robot, tool=replace(robot.tool, mass=2.0 + index)) for index, robot in enumerate(cell.robots)]
-    solver = replace(cell.solver, goals=goals, weighting=weighting or WeightingSettings())
+    solver = replace(cell.solver, goals=goals, weighting=weighting or WeightingEntry())
     return replace(cell, robots=tuple(robots), part=replace(cell.part, mass=7.0), solver=solver)
 
 
-def with_solver(case: Case, *goals: SecondaryGoal, weighting: WeightingSettings | None = None) -> Case:
+def with_solver(case: Case, *goals: SecondaryGoal, weighting: WeightingEntry | None = None) -> Case:
     return Case(varied(case.cell, *goals, weighting=weighting), case.schedule, case.moving, case.start)
 
 
@@ -77,7 +78,7 @@ def batched_velocities(case: Case, samples: slice, q: Array) -> Array:
 @pytest.mark.parametrize("name", ["plain", "sliding", "mixed", "closed", "spin and partial"])
 def test_velocities_are_those_of_euler_s_steps_at_every_configuration(name: str) -> None:
     """All goals, and weights that depend on loads and on the way to a limit."""
-    both = WeightingSettings(load=0.7, near_limits=1.3)
+    both = WeightingEntry(load=0.7, near_limits=1.3)
     case = with_solver(triangles(CELLS[name]), *GOALS.values(), weighting=both)
     middle = len(case.schedule.times) // 2
     samples = slice(middle, middle + 3)
@@ -114,7 +115,7 @@ def test_bounds_of_joint_speeds_are_those_of_euler_s_steps() -> None:
     ],
 )
 def test_euler_s_steps_come_to_the_accurate_motion_in_proportion_to_the_step(
-    goals: tuple[SecondaryGoal, ...], weighting: WeightingSettings | None, step: float
+    goals: tuple[SecondaryGoal, ...], weighting: WeightingEntry | None, step: float
 ) -> None:
     accurate = four_robots(*goals, step=step, weighting=weighting).resolved()
     assert accurate.resolution is not None

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.errors import NoSolutionError
-from cellplan.model.solver import DampedLeastSquaresSettings, SingularityMeasure, SolverSettings
+from cellplan.model.settings.solver import DampedLeastSquaresEntry
+from cellplan.model.solver import SolverSettings
 from cellplan.planning.methods.damped_least_squares import (
     LARGEST_DAMPING,
     damped_least_squares,
@@ -25,8 +26,8 @@ LENGTHS = (2.0, 1.0, 1.0)
 GAIN = 5.0
 STEP = 0.01
 VELOCITY = np.array([0.3, -0.2])
-BY_VALUE = DampedLeastSquaresSettings(region=0.5)
-BY_MANIPULABILITY = DampedLeastSquaresSettings(measure=SingularityMeasure.MANIPULABILITY, region=1.0)
+BY_VALUE = DampedLeastSquaresEntry(region=0.5)
+BY_MANIPULABILITY = DampedLeastSquaresEntry(measure="manipulability", region=1.0)
 
 
 def one_step(q, *, settings=BY_VALUE, damping=None, weights=(1.0, 1.0, 1.0), drift=None):
@@ -106,7 +107,7 @@ def test_speeds_are_those_of_the_printed_law(bend):
 
 
 def test_shaped_gain_leaves_only_the_desired_twist_in_the_region():
-    settings = replace(BY_VALUE, shapes_gain=True)
+    settings = BY_VALUE.changed(shape_gain=True)
     _, _, shaped = one_step((0.3, 0.02, -0.02), settings=settings, damping=0.1)
     J, _, whole = one_step((0.3, 0.02, -0.02), damping=0.1)
     s = np.linalg.svd(J, compute_uv=False)[-1]
@@ -124,12 +125,12 @@ def test_manipulability_is_the_root_of_the_determinant():
 @given(
     q=st.tuples(*[st.floats(-3.0, 3.0)] * 3),
     near=st.floats(0.0, 1e-3),
-    measure=st.sampled_from(list(SingularityMeasure)),
+    measure=st.sampled_from(["singular_value", "manipulability"]),
 )
 def test_speeds_are_bounded_by_the_damping_wherever_the_arm_stands(q, near, measure):
     """``|qdot| <= |v| max(1 / (2 lambda), 1 / s)``: with damping 0.1 the gain at a stretched arm is at most 5."""
     _, xdot, speeds = one_step(
-        (q[0], near, 0.0), settings=DampedLeastSquaresSettings(measure=measure, region=1.0), damping=0.1
+        (q[0], near, 0.0), settings=DampedLeastSquaresEntry(measure=measure, region=1.0), damping=0.1
     )
     assert np.isfinite(speeds).all()
     assert np.linalg.norm(speeds) <= 1.01 * np.linalg.norm(xdot) * 5.0  # 1.01: lambda is a little below its largest

@@ -5,7 +5,8 @@ from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.model.solver import FilteredInverseSettings, SolverSettings
+from cellplan.model.settings.solver import FilteredInverseEntry
+from cellplan.model.solver import SolverSettings
 from cellplan.planning.methods.filtered_inverse_ii import filtered_inverse_ii
 from cellplan.planning.methods.support.filtered_jacobian import FilteredMotion
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -22,7 +23,7 @@ def resting_problem(q):
         gain=1.0,
         damping=None,
         seed=0,
-        filtered_inverse=FilteredInverseSettings(gain=1e-12),
+        filtered_inverse=FilteredInverseEntry(gain_per_s=1e-12),
     )
     cell = planar_cell(LENGTHS, solver, settle=1.0)
     point = tips(LENGTHS, q[None])[0] + [0.01, -0.02]

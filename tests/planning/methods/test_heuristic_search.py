@@ -49,7 +49,7 @@ def circle_through_shoulder(count):
 
 @pytest.mark.slow
 def test_circle_through_the_shoulder_singularity_is_followed_smoothly():
-    cell = arm_cell(dh_arm(ANTHROPOMORPHIC), method="heuristic_search", tolerance=4.5e-8)
+    cell = arm_cell(dh_arm(ANTHROPOMORPHIC), method="heuristic_search", tolerance_mm=4.5e-5)
     schedule = points_schedule(cell, *circle_through_shoulder(601))
     np.testing.assert_allclose(schedule.tasks[0].X_PT[300, :3, 3], 0.0, atol=1e-15)
 
@@ -103,7 +103,7 @@ def test_goal_out_of_reach_is_approached_and_what_is_missing_is_reported(method)
 def test_pose_of_a_puma_is_tracked(method):
     """[Nicolato2007]_ 4.3: tolerance 1e-8, gamma 0.01; the poses are those of the printed joint values."""
     model = dh_arm(PUMA)
-    cell = arm_cell(model, method=method, axes=range(6), tolerance=1e-8, orientation_weight=0.01)
+    cell = arm_cell(model, method=method, axes=range(6), tolerance_mm=1e-5, orientation_weight_m2=0.01)
     start = np.array([np.pi / 4, np.pi / 4, np.pi / 3, np.pi / 3, np.pi / 3, np.pi / 5])
     ends = np.array([start, [np.pi / 3, np.pi / 3, np.pi / 4, 3 * np.pi / 4, np.pi / 4, 2 * np.pi / 3]])
     first, last = tool_poses(cell, ends)

@@ -15,6 +15,8 @@ from builders.search_arms import (
     with_weights,
 )
 
+from cellplan.model.settings.solver import SearchJointEntry
+
 TOLERANCE = 1e-5  # [m] of section 4.2
 STEP = 4e-3  # [s]
 START = np.array([np.pi / 4, np.pi / 6, np.pi / 2, np.pi / 4])
@@ -35,7 +37,12 @@ def four_links(*, limits=None, velocity=None, **search):
     model = dh_arm(FOUR_LINKS, limits=limits)
     if velocity is not None:
         model = with_velocity(model, 3, velocity)
-    return arm_cell(model, method="recursive_search", axes=(0, 1), **{"tolerance": TOLERANCE, **search})
+    return arm_cell(model, method="recursive_search", axes=(0, 1), **{"tolerance_mm": 1e3 * TOLERANCE, **search})
+
+
+def joints(*names: str) -> tuple[SearchJointEntry, ...]:
+    """Joints of the arm in a sequence."""
+    return tuple(SearchJointEntry(robot="arm", joint=name) for name in names)
 
 
 def test_position_limits_of_the_fourth_joint_hold_without_any_loss():
@@ -61,7 +68,7 @@ def test_speed_limits_of_all_joints_hold_even_if_the_tool_falls_behind():
     model = dh_arm(FOUR_LINKS)
     for i in range(4):
         model = with_velocity(model, i, 0.4)
-    cell = arm_cell(model, method="recursive_search", axes=(0, 1), tolerance=TOLERANCE)
+    cell = arm_cell(model, method="recursive_search", axes=(0, 1), tolerance_mm=1e3 * TOLERANCE)
     schedule = circle(cell, START, radius=0.05)
     motion = followed(cell, schedule, START)
     assert np.abs(np.diff(motion.q, axis=0)).max() / STEP <= 0.4
@@ -88,7 +95,7 @@ def test_brakes_slow_a_joint_on_its_way_to_a_limit_only():
 def test_joint_that_starts_on_its_limit_leaves_it_in_spite_of_brakes():
     """Eq. 3.29 as printed would hold it there for ever."""
     start = START.copy()
-    cell = four_links(limits={3: (start[3], 2.0)}, brakes=True, sequence=(("arm", "j3"), ("arm", "j4")))
+    cell = four_links(limits={3: (start[3], 2.0)}, brakes=True, sequence=joints("j3", "j4"))
     at = tool_poses(cell, (start + np.array([0, 0, 0.1, 0.2]))[None])[0, :3, 3]
     schedule = points_schedule(cell, np.array([0.0, 1.0]), np.stack([at, at]))
     motion = followed(cell, schedule, start)
@@ -117,9 +124,8 @@ def test_only_the_ratio_of_weights_matters():
 
 
 def test_joints_left_out_of_the_sequence_stand_still_and_the_first_one_does_most():
-    names = [("arm", f"j{i}") for i in (4, 3, 2)]
-    cell = four_links(sequence=tuple(names))
-    turned = four_links(sequence=tuple(reversed(names)))
+    cell = four_links(sequence=joints("j4", "j3", "j2"))
+    turned = four_links(sequence=joints("j2", "j3", "j4"))
     schedule = circle(cell, START, radius=0.03)
     one, other = followed(cell, schedule, START), followed(turned, schedule, START)
     assert np.ptp(one.q[:, 0]) == np.ptp(other.q[:, 0]) == 0.0
@@ -129,7 +135,7 @@ def test_joints_left_out_of_the_sequence_stand_still_and_the_first_one_does_most
 
 
 def test_joints_left_out_stand_still_even_when_the_posture_is_disturbed():
-    cell = four_links(sequence=(("arm", "j1"), ("arm", "j2"), ("arm", "j3")))
+    cell = four_links(sequence=joints("j1", "j2", "j3"))
     schedule = points_schedule(cell, np.array([0.0, 1.0]), np.tile([0.79, 0.0, 0.0], (2, 1)))
     motion = followed(cell, schedule, np.zeros(4))
     assert position_errors(cell, schedule, motion).max() <= TOLERANCE
@@ -138,7 +144,7 @@ def test_joints_left_out_stand_still_even_when_the_posture_is_disturbed():
 
 def test_first_round_is_the_small_angle_step_of_the_paper():
     """One joint, one round, a goal very near: ``theta = e . (s x r) / |s x r|^2`` (Eq. 3.27 with its factor 2)."""
-    cell = four_links(sequence=(("arm", "j2"),), rounds=1, tolerance=1e-9)
+    cell = four_links(sequence=joints("j2"), rounds=1, tolerance_mm=1e-6)
     at = tool_poses(cell, START[None])[0, :3, 3]
     elbow = 0.2 * np.array([np.cos(START[0]), np.sin(START[0]), 0.0])
     r = at - elbow
@@ -159,7 +165,7 @@ def test_cost_falls_far_from_the_goal_where_angles_are_not_small():
 
 
 def test_smooth_path_gives_smooth_joints():
-    cell = four_links(tolerance=1e-9)
+    cell = four_links(tolerance_mm=1e-6)
     at = tool_poses(cell, START[None])[0, :3, 3]
     times = np.linspace(0.0, 2.0, 401)
     points = at + quintic(times)[:, None] * [-0.1, 0.05, 0.0]

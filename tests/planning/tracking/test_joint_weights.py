@@ -9,7 +9,7 @@ from builders.random_cells import random_cell
 
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Grasp, Part
-from cellplan.model.solver import WeightingSettings
+from cellplan.model.settings.solver import WeightingEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.joint_weights import LARGEST_FACTOR, JointWeights, limit_slope
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -40,7 +40,7 @@ def test_slope_points_to_the_nearer_limit_and_stays_finite_at_and_beyond_it():
 
 
 def weighted(cell, **strengths):
-    return replace(cell, solver=replace(cell.solver, weighting=WeightingSettings(**strengths)))
+    return replace(cell, solver=replace(cell.solver, weighting=WeightingEntry(**strengths)))
 
 
 def weights_of(cell, q, *, xdot=None, J=None):

@@ -1,6 +1,6 @@
 """How a motion was found: settings in use under the names of the cell file; words only where they are worth it."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
@@ -9,7 +9,8 @@ import pytest
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.model.motion import Motion, Resolution
-from cellplan.model.solver import Integrator, MethodName, SolverSettings, WeightingSettings
+from cellplan.model.settings.solver import WeightingEntry
+from cellplan.model.solver import Integrator, MethodName, SolverSettings
 from cellplan.report.page.render import report_page
 from cellplan.report.record.run import run_record
 from cellplan.report.record.solver import solver_record
@@ -120,7 +121,7 @@ def test_the_record_says_what_the_accurate_mode_took() -> None:
 
 
 def test_a_method_that_rules_the_accurate_mode_out_is_never_said_to_be_accurate() -> None:
-    changed = replace(settings("damped_least_squares"), weighting=WeightingSettings(load=1.0))
+    changed = replace(settings("damped_least_squares"), weighting=WeightingEntry(load=1.0))
 
     assert changed.integrator is None
     assert solver_record(changed)["integrator"] == "euler"
@@ -152,7 +153,7 @@ def test_the_joints_of_a_sequence_are_named() -> None:
 
 
 def test_every_weight_that_can_change_is_recorded() -> None:
-    assert list(solver_record(settings())["weighting"]) == [field.name for field in fields(WeightingSettings)]
+    assert list(solver_record(settings())["weighting"]) == list(WeightingEntry.model_fields)
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from cellplan.errors import InputError
 from cellplan.io.robots.limits import LIMIT_TOL
 from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint
 from cellplan.io.robots.urdf.tree import UrdfTree, in_user_unit, joints_to, known_joint, unit_of
-from cellplan.io.schema.units import file_number
 from cellplan.io.yaml.writer import flow_text
+from cellplan.model.settings.units import file_number
 
 
 def unlocked_joints(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]:

@@ -58,7 +58,7 @@ class ConfigurationSearch:
         settings = problem.cell.solver.search
         self._problem = problem
         self.cost = SearchCost(problem)
-        self._target = settings.tolerance**2
+        self._target = settings.tolerance_mm.si**2
         self._rounds = settings.rounds
 
     def advance(self, k: int, start: Array, bounds: Bounds, improve: Pass, *, momentum: Array | None = None) -> Advance:

@@ -109,7 +109,7 @@ class FilteredMotion:
         lateral = _besides(tasks)
         share = longest
         while share >= SHORTEST:
-            settled = relaxation.after(self._settings.gain * share * step, theta) * moves[:, None]
+            settled = relaxation.after(self._settings.gain_per_s * share * step, theta) * moves[:, None]
             B = self._law(settled, J)
             at_work = B @ xdot / root
             speeds = at_work + tasks.bounded(lateral, velocities=at_work)
@@ -126,7 +126,7 @@ class FilteredMotion:
 
     def _start(self, relaxation: Relaxation, J: Array) -> Array:
         """Theta at the first time."""
-        return np.zeros_like(J.T) if self._settings.starts_at_zero else relaxation.inverse()
+        return np.zeros_like(J.T) if self._settings.start == "zero" else relaxation.inverse()
 
 
 def _besides(tasks: FirstOrder) -> Array:

@@ -96,7 +96,7 @@ class SearchCost:
         self._kinds = [_kind(task) for task in problem.tasks]
         self._is_examined = False
         self._here: _Geometry | None = None
-        gamma = problem.cell.solver.search.orientation_weight
+        gamma = problem.cell.solver.search.orientation_weight_m2
         owners: list[int] = []
         columns: list[int] = []  # column of the tool's pose: 3 is the tip, 0 to 2 its axes
         weights: list[list[float]] = []

@@ -31,7 +31,7 @@ class JointBounds:
     def __init__(self, cell: Cell) -> None:
         """Take the limits of all joints; an acceleration may follow from ``solver.quadratic_program.ramp_s``."""
         limits = cell.joint_limits
-        ramp = cell.solver.quadratic_program.ramp
+        ramp = cell.solver.quadratic_program.ramp_s
         self._names = [f"{robot.name}/{joint.name}" for robot in cell.robots for joint in robot.model.joints]
         self._is_revolute = limits.is_revolute
         self._lower, self._upper, self._velocity = limits.lower, limits.upper, limits.velocity

@@ -19,10 +19,10 @@ from cellplan.io.robots.limits import LIMIT_TOL, StatedLimits
 from cellplan.io.robots.urdf.document import UrdfJoint, UrdfLimit, read_document
 from cellplan.io.robots.urdf.load import UrdfOptions, load_urdf, read_urdf
 from cellplan.io.robots.urdf.locks import lock_positions, rest_position
-from cellplan.io.schema.units import Deg, Mm
 from cellplan.io.yaml.reader import parse_yaml
 from cellplan.model.cell import Cell
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.units import Deg, Mm
 
 Load = Callable[..., Cell]
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from cellplan.io.schema import CellDocument, RobotTableDocument
-from cellplan.io.schema.common import Coordinate, Entry
 from cellplan.io.schema.robot import SlidingSpeed, TurningJerk
-from cellplan.io.schema.units import (
+from cellplan.model.settings.entry import Coordinate, Entry
+from cellplan.model.settings.units import (
     Deg,
     DegPerS,
     DegPerS2,

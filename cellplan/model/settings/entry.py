@@ -1,12 +1,12 @@
 """Building blocks of all files: strict entries, numbers with bounds, poses, directions and choices."""
 
 from collections.abc import Iterable
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
 
-from cellplan.io.schema.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, Within
 
 NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
 NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
@@ -119,6 +119,10 @@ class Entry(BaseModel):
     """A mapping of a file: unknown keys, converted types and numbers that are not finite are refused."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+    def changed(self, **values: Any) -> Self:
+        """The entry with other values, which are validated like those of a file."""
+        return type(self).model_validate({**dict(self), **values})
 
 
 class PoseEntry(Entry):
