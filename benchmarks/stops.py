@@ -55,7 +55,7 @@ def cases(path: Path) -> Iterator[Case]:
     """The phases of a cell, solved without its controllers: what they cost at their worst is not asked for here."""
     cell = load_cell(path)
     bare = replace(cell, robots=tuple(replace(robot, control=None) for robot in cell.robots), controllers={})
-    solution = solve(replace(bare, checks=replace(cell.checks, stop=None)))
+    solution = solve(replace(bare, checks=cell.checks.changed(stop=None)))
     for run in solution.runs:
         whole = run.scene or Scene.from_cell(solution.cell)
         scene = scene_of_run(whole, [each.task.name for each in run.schedule.tasks])
@@ -141,7 +141,7 @@ class Brute:
         X_PT = inverse(state.X_WP[None]) @ state.X_WT[[cell.index(robot)]]
         X_ST = (inverse(cell.part.X_PS) @ X_PT)[0]
         tool = cell.robot(robot).tool.X_FT
-        length = max(float(tool[:3, 3] @ tool[:3, 2]), cell.checks.contact_zone)
+        length = max(float(tool[:3, 3] @ tool[:3, 2]), cell.checks.contact_zone_mm.si)
         shape, ball = coal_shape(cell.part.shape), coal_shape(Sphere(1e-9))
         along = np.linspace(0.0, length, POINTS)
         for back in along[::-1]:

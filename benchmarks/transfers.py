@@ -22,9 +22,9 @@ from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
 from cellplan.io.robots.bundled import load_bundled
 from cellplan.io.robots.urdf.load import load_urdf
 from cellplan.model.cell import Cell, Mode, MotionSettings, Obstacle, Part, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer
@@ -89,7 +89,7 @@ def scene_with(model: RobotModel, things: Sequence[Obstacle]) -> Scene:
         obstacles=(floor, *things),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=ROW_STEP),
         solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-        checks=CheckSettings(clearance=CLEARANCE, contact_zone=0.02),
+        checks=ChecksEntry(clearance_mm=1e3 * CLEARANCE),
         origin=Origin(),
         inputs={},
     )

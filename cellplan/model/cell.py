@@ -11,7 +11,6 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.controllers import Controller, RobotControl
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.joint_spline import JointSpline
@@ -22,6 +21,7 @@ from cellplan.model.presented import Presented
 from cellplan.model.program import ProgramSettings
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.rod import Rod
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
 
@@ -274,7 +274,7 @@ class Cell(Presented):
     obstacles: tuple[Obstacle, ...]
     motion: MotionSettings
     solver: SolverSettings
-    checks: CheckSettings
+    checks: ChecksEntry
     origin: Origin
     inputs: Mapping[str, str]
     remarks: tuple[tuple[str, str], ...] = ()

@@ -78,16 +78,3 @@ class RobotControl:
     tool_number: int | None = None
     base_number: int | None = None
     handshake: Handshake | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopDemand:
-    """What is demanded when one robot stops and the others go on.
-
-    Attributes:
-        depth: Largest depth in [m] of a tool in the part; None for no demand.
-        clearance: Smallest distance in [m] of all that must not touch; None for no demand.
-    """
-
-    depth: float | None = None
-    clearance: float | None = None

@@ -15,7 +15,6 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.task import Frame
-from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, scene_bodies
 from cellplan.scene.grips import grip_watch
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
@@ -98,7 +97,7 @@ class _ContactZones:
         outside, is_in_zone = self._outside_zone(self._bodies[tool])
         if not is_in_zone:
             return replace(pair, solids=(tool, part))
-        zone = MM * self._cell.checks.contact_zone
+        zone = self._cell.checks.contact_zone_mm
         reason = f"at work: may touch within {zone:g} mm of the tool tip; checked for contact outside it"
         return replace(pair, rule=Rule.PROCESS, reason=reason, solids=self._cut(tool, part, outside))
 
@@ -114,7 +113,7 @@ class _ContactZones:
         """The surface of a tool outside its contact zone, and whether any lies inside; equal tools are cut once."""
         if isinstance(body.shape, HalfSpace):
             return None, False
-        outside, is_in_zone = _cut_at_tip(body.shape, _tip(self._cell, body), self._cell.checks.contact_zone)
+        outside, is_in_zone = _cut_at_tip(body.shape, _tip(self._cell, body), self._cell.checks.contact_zone_mm.si)
         return (None if outside is None else replace(outside, name=body.name)), is_in_zone
 
 
@@ -123,7 +122,7 @@ def cut_tools(cell: Cell) -> Iterator[Mesh]:
     at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
     for body in scene_bodies(cell):
         if body.robot in at_work and works_like_a_tool(body, cell) and not isinstance(body.shape, HalfSpace):
-            surface, is_in_zone = outside_zone(body.shape, np.array(_tip(cell, body)), cell.checks.contact_zone)
+            surface, is_in_zone = outside_zone(body.shape, np.array(_tip(cell, body)), cell.checks.contact_zone_mm.si)
             if is_in_zone and surface is not None:
                 yield surface
 

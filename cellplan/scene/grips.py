@@ -46,7 +46,7 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
     """
     if isinstance(body.shape, HalfSpace):  # no tool is one
         return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=False, outside=None)
-    robot, zone = cell.robot(grasp.robot), cell.checks.contact_zone
+    robot, zone = cell.robot(grasp.robot), cell.checks.contact_zone_mm.si
     X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
     surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=grasp.depth + GRIP_TOL)
     watched = prepare(body.name, body.shape if surface is None or not is_in_zone else surface)
@@ -84,7 +84,7 @@ def _require_free(cell: Cell, body: SceneBody, grasp: Grasp, outside: CollisionB
     engine, poses = _gripped(cell, body, grasp, outside)
     if engine.touch(0, 1, poses, sample=0) or is_inside(engine, (0, 1), poses, sample=0):
         number = cell.positioners.index(grasp.robot)
-        zone = MM * cell.checks.contact_zone
+        zone = cell.checks.contact_zone_mm
         raise InputError(
             f"{cell.origin.at(f'part.held_by[{number}].at')}: expected '{grasp.robot}' to touch the part near its tool "
             f"tip (checks.contact_zone_mm = {zone:g}) or with the face at the tip, got {body.name} that touches it "

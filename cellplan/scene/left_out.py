@@ -63,7 +63,7 @@ class _Standing:
 
     def __init__(self, cell: Cell, bodies: Sequence[SceneBody], engine: Engine) -> None:
         """Place them; the others are placed as if all joints were at zero, and not used."""
-        self._bodies, self._engine, self._clearance = bodies, engine, cell.checks.clearance
+        self._bodies, self._engine, self._clearance = bodies, engine, cell.checks.clearance_mm.si
         X = [body.X_BS if body.robot is None else cell.robot(body.robot).X_WB @ body.X_BS for body in bodies]
         placed: Array = np.array(X).reshape(-1, 4, 4)
         self._poses = BodyPoses(placed[:, None, :3, :3], placed[:, None, :3, 3])

@@ -110,7 +110,7 @@ def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) 
     """The depth allowed for two bodies of which one holds the part or stands on the other; None for all others."""
     first, second = ends
     if stand_on_each_other(a, b):
-        return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth)
+        return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth_mm.si)
     grasp = grasp_of(a, b, cell)
     if grasp is None:
         return None

@@ -9,10 +9,10 @@ from itertools import combinations
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.left_out import LeftOutKind
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import BASE
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, is_ground
 from cellplan.scene.link_tree import NO_BODY, LinkTree
@@ -97,7 +97,7 @@ def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair]
     return watched, excluded
 
 
-def _watched(checks: CheckSettings, bodies: Sequence[SceneBody], i: int, j: int) -> ScenePair:
+def _watched(checks: ChecksEntry, bodies: Sequence[SceneBody], i: int, j: int) -> ScenePair:
     """A pair that is to keep the clearance of the cell, and the accuracy of both bodies where it is added."""
     first, second, on_ground = bodies[i], bodies[j], is_ground(bodies[j])
     added = (first.accuracy or 0.0, second.accuracy or 0.0) if checks.adds_accuracy else (0.0, 0.0)
@@ -108,7 +108,7 @@ def _watched(checks: CheckSettings, bodies: Sequence[SceneBody], i: int, j: int)
         is_ground=on_ground,
         clearance_class=clearance_class(first, second),
         rule=Rule.CLEARANCE,
-        demand=checks.clearance + added[0] + added[1],
+        demand=checks.clearance_mm.si + added[0] + added[1],
     )
 
 
@@ -157,7 +157,7 @@ def _user_exclusions(cell: Cell, bodies: Sequence[SceneBody]) -> dict[tuple[int,
     """Reasons of the pairs that the cell leaves out, by their indices in order."""
     index = _named_bodies(cell, bodies)
     reasons: dict[tuple[int, int], str] = {}
-    for number, exclusion in enumerate(cell.checks.exclusions):
+    for number, exclusion in enumerate(cell.checks.exclude):
         where = cell.origin.at(f"checks.exclude[{number}].bodies")
         for name in exclusion.bodies:
             if name not in index:

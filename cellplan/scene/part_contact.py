@@ -80,7 +80,7 @@ class PartContact:
     def _limit(self, scene: Scene, pair: ScenePair) -> MountedPair:
         """How deep the two may be in each other."""
         if not self.is_lying:
-            limit, accuracy, mount = scene.cell.checks.standing_depth, 0.0, Mount.STANDING
+            limit, accuracy, mount = scene.cell.checks.standing_depth_mm.si, 0.0, Mount.STANDING
         else:
             links = [body for body in _ends(scene, pair) if body.kind is Kind.LINK]
             accuracy, mount = max((body.accuracy or 0.0 for body in links), default=0.0), Mount.GRIP
@@ -105,7 +105,7 @@ class PartContact:
         if self.grasp.bodies is not None or isinstance(body.shape, HalfSpace):
             return None
         X_ST = inverse(body.X_BS) @ robot.model.X_BF @ robot.tool.X_FT
-        zone = scene.cell.checks.contact_zone
+        zone = scene.cell.checks.contact_zone_mm.si
         surface, is_in_zone = outside_grip(body.shape, X_ST, radius=zone, layer=depth + GRIP_TOL)
         if surface is None:
             return None

@@ -184,7 +184,7 @@ def _random_configurations(model: RobotModel, rng: np.random.Generator) -> Array
 
 def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
     """Let a robot whose foot has no body stand with its first link in the surroundings."""
-    limit = cell.checks.standing_depth
+    limit = cell.checks.standing_depth_mm.si
     reason = f"stands on it, as the foot has no body: may touch, at most {MM * limit:g} mm deep"
     design.excluded.append(Excluded(pair.first, pair.second, reason, LeftOutKind.STANDING))
     design.mounted.append(

@@ -9,8 +9,8 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Obstacle
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import BASE, Body
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 SHAPES: tuple[Solid, ...] = (
@@ -41,7 +41,7 @@ def cell_with_bodies(seed: int, *, joints: int = 4) -> Cell:
         tasks=(),
         part=replace(cell.part, shape=Capsule(0.1, 0.3), X_PS=random_pose(rng)),
         obstacles=(Obstacle(name="post", shape=Cylinder(0.1, 1.0), X_WS=random_pose(rng)),),
-        checks=CheckSettings(clearance=0.0, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0),
     )
 
 

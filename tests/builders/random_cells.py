@@ -7,9 +7,9 @@ import numpy as np
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
 from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 
@@ -130,7 +130,7 @@ def random_cell(
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-3),
         solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=ChecksEntry(),
         origin=Origin(),
         inputs={},
     )

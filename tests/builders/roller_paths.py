@@ -7,8 +7,8 @@ import numpy as np
 from cellplan.geometry.shapes import Cylinder, Solid
 from cellplan.geometry.transforms import Array, pose, rotation_vector
 from cellplan.model.cell import Cell, Mode, MotionSettings, Part
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import (
     CirclePath,
@@ -68,7 +68,7 @@ def clocked(*tasks: Task, duration: float | None = 4.0, step: float = 0.001, ori
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=duration, step=step),
         solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=ChecksEntry(),
         origin=origin,
         inputs={},
     )

@@ -7,10 +7,10 @@ import numpy as np
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
 from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 
@@ -134,9 +134,7 @@ def work(robot: str) -> Task:
     )
 
 
-def make_cell(
-    *robots: Robot, part: Part | None = None, things=(), tasks=(), checks: CheckSettings | None = None
-) -> Cell:
+def make_cell(*robots: Robot, part: Part | None = None, things=(), tasks=(), checks: ChecksEntry | None = None) -> Cell:
     """A cell; without a part of its own a small one lies far away."""
     return Cell(
         name="test",
@@ -146,7 +144,7 @@ def make_cell(
         obstacles=tuple(things),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=0.001),
         solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
-        checks=checks or CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=checks or ChecksEntry(),
         origin=Origin(),
         inputs={},
     )

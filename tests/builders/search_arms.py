@@ -12,10 +12,10 @@ from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_about, rotation_vector
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Mode, MotionSettings, Part, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SearchEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.planning.euler.integrate import integrate_schedule
@@ -80,7 +80,7 @@ def arm_cell(model: RobotModel, *, method: str, axes=(0, 1, 2), **search) -> Cel
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-2),
         solver=solver,
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=ChecksEntry(),
         origin=Origin(),
         inputs={},
     )

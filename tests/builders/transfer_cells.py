@@ -10,13 +10,13 @@ from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.bundled import load_bundled
 from cellplan.model.cell import Obstacle, Robot
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer
 from cellplan.scene.scene import Scene
 
-CHECKS = CheckSettings(clearance=0.005, contact_zone=0.02)
+CHECKS = ChecksEntry()
 STEP = 0.004  # [s]
 
 

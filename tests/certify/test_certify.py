@@ -10,9 +10,9 @@ from builders.scene_builders import body, floor, joint, make_cell, placed, slide
 from cellplan.certify.certify import certify
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 GAP = 0.05  # [m] that the ball keeps from the post where it passes it
@@ -24,7 +24,9 @@ def passing_ball(gap: float = GAP) -> tuple[Scene, Array]:
     """A ball that slides along x past another one that stands beside its path, and the rows of its motion."""
     post = thing("post", Sphere(0.1), pose((0.5, 0.2 + gap, 0.0)))
     cell = make_cell(
-        placed("ball", slide_model(Sphere(0.1))), things=(post,), checks=CheckSettings(clearance=0.01, contact_zone=0.0)
+        placed("ball", slide_model(Sphere(0.1))),
+        things=(post,),
+        checks=ChecksEntry(clearance_mm=10.0, contact_zone_mm=0.0),
     )
     return Scene.from_cell(cell), STEP * np.arange(150)[:, None]
 
@@ -119,7 +121,9 @@ def test_the_lowest_point_of_a_swing_above_the_floor_is_found_between_two_sample
         X_BF=np.eye(4),
         bodies=(body("ball", 0, shape=Sphere(0.05), at=(0.0, 0.0, 0.4)),),
     )
-    cell = make_cell(placed("arm", swing), things=(floor(),), checks=CheckSettings(clearance=0.3, contact_zone=0.0))
+    cell = make_cell(
+        placed("arm", swing), things=(floor(),), checks=ChecksEntry(clearance_mm=300.0, contact_zone_mm=0.0)
+    )
     q = np.array([[-0.9], [-0.5], [-0.1], [0.3], [0.7]])
 
     bound = certify(Scene.from_cell(cell), q, 0.3)

@@ -12,8 +12,8 @@ from cellplan.certify.free_motion import FreeMotion
 from cellplan.collision.distance import measure
 from cellplan.geometry.shapes import Capsule, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 RADIUS = 0.1  # [m] of both balls
@@ -28,7 +28,7 @@ def passing(demand: float = 0.01) -> tuple[Scene, Array]:
     cell = make_cell(
         placed("one", ball),
         placed("two", ball, base=pose((0.0, 2.0 * RADIUS + GAP, 0.0))),
-        checks=CheckSettings(clearance=demand, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=1e3 * demand, contact_zone_mm=0.0),
     )
     way = 0.04 * np.arange(41)
     return Scene.from_cell(cell), np.column_stack([way, way + 0.8])
@@ -111,7 +111,7 @@ def test_the_part_moves_with_its_first_holder() -> None:
         placed("one", holder),
         placed("two", other, base=pose((0.0, 1.0, 0.0))),
         part=held_part(Sphere(0.3), "one", pose((0.0, -0.5, 0.0))),
-        checks=CheckSettings(clearance=0.01, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=10.0, contact_zone_mm=0.0),
     )
     q = np.array([[0.0, 0.0], [0.2, 0.0]])
 
@@ -134,7 +134,7 @@ def swings() -> tuple[Scene, Array]:
     cell = make_cell(
         placed("one", arm, tool=no_tool()),
         placed("two", arm, base=pose((2.2, 0.0, 0.0), (0.0, 0.0, np.pi))),
-        checks=CheckSettings(clearance=0.1, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=100.0, contact_zone_mm=0.0),
     )
     angle = np.linspace(-1.2, 1.2, 26)
     return Scene.from_cell(cell), np.column_stack([angle, -angle])

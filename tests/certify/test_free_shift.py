@@ -11,7 +11,7 @@ from cellplan.certify.free_motion import FreeMotion
 from cellplan.certify.free_shift import SHIFT_SHARE, SHIFT_TOL, ShiftBound, free_shift
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.check_settings import CheckSettings
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 RADIUS = 0.1  # [m] of both balls
@@ -27,7 +27,7 @@ def passing(demand: float) -> tuple[Scene, Array]:
     cell = make_cell(
         placed("one", ball),
         placed("two", ball, base=pose((0.0, 2.0 * RADIUS + GAP, 0.0))),
-        checks=CheckSettings(clearance=demand, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=1e3 * demand, contact_zone_mm=0.0),
     )
     return Scene.from_cell(cell), np.column_stack([SPEED * TIMES, SPEED * TIMES + AHEAD])
 

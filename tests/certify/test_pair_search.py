@@ -15,8 +15,8 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
 from cellplan.geometry.transforms import Array, frame_from_axes, pose, pose_from
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 PLACEMENTS = 200
@@ -45,7 +45,9 @@ def needle_and_wire(rng: np.random.Generator) -> Cell:
     met = met + 0.8 * (NEEDLE + WIRE) * rng.uniform(-1.0, 1.0) * beside / np.linalg.norm(beside)
     needle = turned(slide_model(Capsule(NEEDLE, 0.08), axis=tuple(flight)), axis_frame(np.zeros(3), along_needle))
     wire = thing("wire", Capsule(WIRE, 0.1), axis_frame(met + along_wire * rng.uniform(-0.03, 0.03), along_wire))
-    return make_cell(placed("needle", needle), things=(wire,), checks=CheckSettings(clearance=0.0, contact_zone=0.0))
+    return make_cell(
+        placed("needle", needle), things=(wire,), checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0)
+    )
 
 
 def turned(model: RobotModel, X: Array) -> RobotModel:

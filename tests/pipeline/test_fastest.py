@@ -347,7 +347,7 @@ def test_the_tools_keep_their_speed_in_the_world(cell: Cell) -> None:
 
 def test_a_tool_that_is_too_fast_in_the_world_fails_by_what_it_exceeds(cell: Cell) -> None:
     """As written, its quintic law has 1.875 times the mean speed."""
-    strict = replace(cell, checks=replace(cell.checks, tool_speed=0.5))
+    strict = replace(cell, checks=cell.checks.changed(tool_speed_mm_s=500.0))
     report = solve(strict).runs[0].report
 
     (check,) = (check for check in report.checks if not check.passed)

@@ -11,7 +11,6 @@ import pytest
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.origin import Origin
 from cellplan.model.report import (
     Check,
@@ -27,6 +26,7 @@ from cellplan.model.report import (
     TaskAccuracy,
 )
 from cellplan.model.robot import Joint, JointKind, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
 from cellplan.report.record.common import Provenance
@@ -114,7 +114,7 @@ def _cell(name: str, kinds: str = "rrrrrr") -> Cell:
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=4.0, step=0.001),
         solver=SolverSettings(method="weighted_pseudo_inverse", gain=650.0, damping=None, seed=7),
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=ChecksEntry(),
         origin=Origin(file="cell.yaml"),
         inputs={"cell.yaml": "7c" * 32, "robots/kuka_kr6.yaml": "1f" * 32},
     )

@@ -137,7 +137,7 @@ def test_fingers_that_do_not_reach_the_part_say_how_far_it_is(apart: float, endi
 
 def test_what_a_further_holder_does_not_grip_with_keeps_the_clearance_too() -> None:
     cell = gripping()
-    cell = replace(cell, checks=replace(cell.checks, contact_zone=0.04))
+    cell = replace(cell, checks=cell.checks.changed(contact_zone_mm=40.0))
     at_tips = replace(stick(), X_FT=pose((0.0, 0.0, 0.04)), bodies=())
     other = placed("b", gripper_model(), base=pose((3.0, 0.0, 0.0)), tool=at_tips)
     second = Grasp(robot="b", X_PT=pose((0.0, 0.0, -0.04)), bodies=("b/left", "b/right"))
@@ -203,7 +203,7 @@ def working(*, gripper: tuple[str, ...], deep: float = 0.0) -> Cell:
     plate = fixed_part(Box((0.02, 0.3, 0.3)), pose((0.7 + GRIP_HEIGHT + 0.01 - deep, 0.0, 1.0)))
     arm = replace(arm, tool=tool, gripper=gripper)
     cell = make_cell(arm, part=plate, tasks=(work("a"),))
-    return replace(cell, checks=replace(cell.checks, contact_zone=0.045))
+    return replace(cell, checks=cell.checks.changed(contact_zone_mm=45.0))
 
 
 def test_a_gripper_may_touch_what_it_works_on_near_the_tip_as_a_tool_may() -> None:

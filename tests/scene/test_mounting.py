@@ -21,8 +21,8 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Cell, Grasp, Part
-from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.left_out import LeftOutKind
+from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
 from cellplan.scene.mounting import Mount
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -42,9 +42,9 @@ def refusal(cell: Cell) -> str:
     return str(caught.value)
 
 
-def leave(*pairs: tuple[str, str]) -> CheckSettings:
-    exclusions = tuple(Exclusion(bodies=pair, reason="a pocket") for pair in pairs)
-    return CheckSettings(clearance=0.005, contact_zone=0.02, exclusions=exclusions)
+def leave(*pairs: tuple[str, str]) -> ChecksEntry:
+    exclusions = tuple(ExclusionEntry(bodies=pair, reason="a pocket") for pair in pairs)
+    return ChecksEntry(exclude=exclusions)
 
 
 def test_a_part_on_the_right_side_of_the_flange_is_no_error() -> None:

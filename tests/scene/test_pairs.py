@@ -24,9 +24,9 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell, Grasp, Part
-from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.report import ClearanceClass
 from cellplan.model.robot import FollowerJoint, JointKind, Link, RobotModel
+from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
 from cellplan.model.task import Frame
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
@@ -182,9 +182,7 @@ def test_a_robot_without_a_foot_may_stand_in_the_floor_with_its_first_link() -> 
 
 
 def test_pairs_the_user_leaves_out_carry_the_users_reason() -> None:
-    settings = CheckSettings(
-        clearance=0.005, contact_zone=0.02, exclusions=(Exclusion(bodies=("b/tool", "a/tool"), reason="they meet"),)
-    )
+    settings = ChecksEntry(exclude=(ExclusionEntry(bodies=("b/tool", "a/tool"), reason="they meet"),))
 
     scene = Scene.from_cell(two_arms(checks=settings))
 
@@ -212,8 +210,8 @@ def in_pieces() -> Cell:
 
 def left_out(cell: Cell, *bodies: str) -> set[frozenset[str]]:
     """The pairs that an exclusion leaves out of a cell."""
-    exclusion = Exclusion(bodies=(bodies[0], bodies[1]), reason="as it is")
-    settings = CheckSettings(clearance=0.005, contact_zone=0.02, exclusions=(exclusion,))
+    exclusion = ExclusionEntry(bodies=(bodies[0], bodies[1]), reason="as it is")
+    settings = ChecksEntry(exclude=(exclusion,))
     return {pair for pair, why in reasons(Scene.from_cell(replace(cell, checks=settings))).items() if why == "as it is"}
 
 
@@ -245,10 +243,10 @@ def test_a_whole_robot_is_left_out_by_its_own_name() -> None:
     ],
 )
 def test_exclusions_that_name_no_pair_are_refused(bodies: tuple[str, str], message: str) -> None:
-    exclusion = Exclusion(bodies=bodies, reason="why not")
+    exclusion = ExclusionEntry(bodies=bodies, reason="why not")
 
     with pytest.raises(InputError) as caught:
-        Scene.from_cell(two_arms(checks=CheckSettings(clearance=0.0, contact_zone=0.0, exclusions=(exclusion,))))
+        Scene.from_cell(two_arms(checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0, exclude=(exclusion,))))
 
     assert str(caught.value) == f"<cell>: checks.exclude[0].bodies: {message}"
 

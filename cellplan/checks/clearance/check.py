@@ -33,8 +33,8 @@ def check_clearance(
     is kept is proved first; where it cannot be the pair is "not certified", which fails the check. The smallest
     distance is searched for afterwards; where that takes too much work a lower bound of it is reported.
 
-    The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone`` of its tip, during the
-    whole motion: before its start and after its end it dwells on the part. Such contacts are listed as allowed, and
+    The tool of a robot whose task is scheduled may touch the part within ``checks.contact_zone_mm`` of its tip, during
+    the whole motion: before its start and after its end it dwells on the part. Such contacts are listed as allowed, and
     that pair is excluded from the clearance requirement. The part of the tool outside the zone must not touch. Robots
     whose tasks are not scheduled are idle and keep away from everything, the part too.
 

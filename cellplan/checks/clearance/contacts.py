@@ -67,14 +67,14 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
     """
     checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]
     names, at_s, distance = found.pair or ("", ""), found.at_s or 0.0, float(found.minimum or 0.0)
-    demand, reason, is_exact = checks.clearance, "", found.exact
+    demand, reason, is_exact = checks.clearance_mm.si, "", found.exact
     if checks.adds_accuracy and distance > 0.0 and kept:
         worst = min(kept, key=lambda pair: pair.proved - pair.pair.demand)
         names, demand = bound.names(worst), worst.pair.demand
         at_s, distance = time_of(times, worst.at), worst.proved
         is_exact = worst.distance - distance <= EXACT_TOL
-        added = demand - checks.clearance
-        reason = f" ({MM * checks.clearance:.1f} mm, and {MM * added:.1f} mm for the accuracy of both bodies)"
+        added = demand - checks.clearance_mm.si
+        reason = f" ({checks.clearance_mm:.1f} mm, and {MM * added:.1f} mm for the accuracy of both bodies)"
     passed = bool(distance >= demand)
     shown = rounded_down(MM * distance) if passed else np.floor(10.0 * MM * distance) / 10.0  # never as enough
     least = "" if is_exact else "at least "
@@ -117,7 +117,7 @@ def _spans(touches: Array, times: Array) -> list[tuple[float, float]]:
 
 def _at_work(bound: Bound, times: Array) -> list[Contact]:
     """Contacts of tools at work with the part: from the first touch to the last, whatever short breaks there are."""
-    zone = MM * bound.scene.cell.checks.contact_zone
+    zone = bound.scene.cell.checks.contact_zone_mm
     return [
         Contact(
             pair=bound.names(pair),

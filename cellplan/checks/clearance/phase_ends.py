@@ -208,7 +208,7 @@ def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], 
             )
     cell = phase.scene.cell
     for grasp in cell.closures:
-        yield grasp, (cell.checks.closure_position, cell.checks.closure_orientation), None
+        yield grasp, (cell.checks.closure_mm.si, cell.checks.closure_deg.si), None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

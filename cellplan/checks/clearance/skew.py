@@ -177,6 +177,6 @@ def _tools(scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tup
     for grasp in cell.closures:
         if {grasp.robot, carrier} in apart:
             desired = np.broadcast_to(grasp.X_PT, (len(times), 4, 4))
-            limits = cell.checks.closure_position, cell.checks.closure_orientation
+            limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
             tool = shifted(relation=grasp, mover=movers[grasp.robot], desired=desired, limits=limits)
             yield _Tool(name=grasp.name, robot=grasp.robot, carrier=carrier, ways=tool.ways(times), depth=None)

@@ -86,21 +86,21 @@ def check_stops(cell: Cell, found: StopReport | None) -> list[Check]:
     demand = cell.checks.stop
     if demand is None:
         return []
-    limits = {"stop_depth": demand.depth, "stop_clearance": demand.clearance}
+    limits = {"stop_depth": demand.depth_mm, "stop_clearance": demand.clearance_mm}
     if found is None:
-        return [_unknown(name, MM * limit) for name, limit in limits.items() if limit is not None]
+        return [_unknown(name, limit) for name, limit in limits.items() if limit is not None]
     checks = []
-    if demand.depth is not None:
+    if demand.depth_mm is not None:
         deepest = found.deepest
         depth = 0.0 if deepest is None else deepest.depth
         of = "no tool" if deepest is None else f"tool of task '{deepest.task}'"
-        passed, values = depth <= demand.depth + DEPTH_TOL, (MM * depth, MM * demand.depth)
+        passed, values = depth <= demand.depth_mm.si + DEPTH_TOL, (MM * depth, demand.depth_mm)
         checks.append(_check("stop_depth", passed, values, of, None if deepest is None else deepest.worst))
-    if demand.clearance is not None:
+    if demand.clearance_mm is not None:
         nearest = found.nearest
         distance = np.inf if nearest is None else min(nearest.proved, nearest.distance)
         of = "no two robots" if nearest is None or nearest.bodies is None else " - ".join(nearest.bodies)
-        passed, values = distance >= demand.clearance, (MM * float(min(distance, 1e6)), MM * demand.clearance)
+        passed, values = distance >= demand.clearance_mm.si, (MM * float(min(distance, 1e6)), demand.clearance_mm)
         checks.append(_check("stop_clearance", passed, values, of, None if nearest is None else nearest.worst))
     return checks
 

@@ -66,7 +66,7 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
     if task.relative_to is not Frame.PART or not set(AXIS_COMPONENTS) <= set(task.axes):
         return None
     robot = cell.robot(task.robot)
-    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone_mm.si
     along = line_depths(robot.tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not robot.bodies_at_work)
     return ToolDepth(
         task=task.name, robot=task.robot, depth=float(along.max()), at_s=None, limit=task.tool_depth, body=AXIS
@@ -76,14 +76,14 @@ def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
 def tool_axis_depths(cell: Cell, robot: str, X_PT: Array) -> Array:
     """The same of the axis of the tool alone."""
     placed = cell.robot(robot)
-    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone_mm.si
     return line_depths(placed.tool.X_FT, cell.part.shape, X_ST, zone=zone, is_all=not placed.bodies_at_work)
 
 
 def tool_depth_at(cell: Cell, robot: str, X_PT: Array) -> Array:
     """Depth in [m] of a robot's tool, axis and bodies, at any poses of it on the part, shape (N, 4, 4), shape (N,)."""
     placed, found = cell.robot(robot), tool_axis_depths(cell, robot, X_PT)
-    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone
+    X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone_mm.si
     for body in placed.bodies_at_work:
         columns = body_columns(body.shape, inverse(placed.tool.X_FT) @ body.X_BS, zone)
         if len(columns.line):
@@ -93,7 +93,7 @@ def tool_depth_at(cell: Cell, robot: str, X_PT: Array) -> Array:
 
 def tool_reach(cell: Cell, robot: str) -> float:
     """Largest distance in [m] from the tip of what counts of a robot's tool: its axis, and its bodies at work."""
-    tool, bodies, zone = cell.robot(robot).tool, cell.robot(robot).bodies_at_work, cell.checks.contact_zone
+    tool, bodies, zone = cell.robot(robot).tool, cell.robot(robot).bodies_at_work, cell.checks.contact_zone_mm.si
     along = abs(float(tool.X_FT[:3, 3] @ tool.X_FT[:3, 2]))
     columns = (body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone) for body in bodies)
     return max([along, zone, *(each.reach for each in columns)])
@@ -107,7 +107,7 @@ def _task_depth(
     robot = cell.robot(task.robot)
     fine_times, X_PT = _tool_on_part(cell, task, times, chains=chains, q=q)
     X_ST = inverse(cell.part.X_PS) @ X_PT
-    X_FT, bodies, zone = robot.tool.X_FT, robot.bodies_at_work, cell.checks.contact_zone
+    X_FT, bodies, zone = robot.tool.X_FT, robot.bodies_at_work, cell.checks.contact_zone_mm.si
     along = line_depths(X_FT, cell.part.shape, X_ST, zone=zone, is_all=not bodies)
     deepest = [(AXIS, int(np.argmax(along)), float(along.max()))]
     for body in bodies:

@@ -96,7 +96,7 @@ def check_accelerations(cell: Cell, found: MotionAccelerations) -> list[Check]:
     for use in found.joints:
         checks += [] if use.limit is None else [_check_acceleration(cell, use, use.limit)]
         checks += [] if use.jerk_limit is None else [_check_jerk(use, use.jerk_limit)]
-    limit = cell.checks.part_acceleration
+    limit = cell.checks.part_acceleration_m_s2
     if limit is not None and found.part is not None:
         checks.append(_check_part(found.part.corner, limit))
     return checks

@@ -65,7 +65,7 @@ def check_closures_between(cell: Cell, closures: Sequence[ClosureAccuracy]) -> l
         if closure.between is None:
             continue
         of, robot, between = f"of '{closure.robot}' on the part", closure.robot, closure.between
-        position, orientation = cell.checks.closure_position, cell.checks.closure_orientation
+        position, orientation = cell.checks.closure_mm.si, cell.checks.closure_deg.si
         checks += [
             _check("closure_position_error_between_rows", between.position, robot, allowed=position, of=of),
             _check("closure_orientation_error_between_rows", between.orientation, robot, allowed=orientation, of=of),

@@ -139,7 +139,7 @@ class ErrorsBetweenRows:
 
     def _closure_tools(self, closures: Sequence[ClosureAccuracy]) -> list[_Tool]:
         checks = self._scene.cell.checks
-        allowed = checks.closure_position, checks.closure_orientation
+        allowed = checks.closure_mm.si, checks.closure_deg.si
         return [
             _Tool(relation=grasp, at_rows=_lengths(errors), allowed=allowed, place=None, first=0)
             for grasp, errors in zip(self._scene.cell.closures, closures, strict=True)

@@ -52,7 +52,7 @@ def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy])
                 times,
                 MM * np.linalg.norm(closure.position_error, axis=1),
                 subject=closure.robot,
-                limit=MM * cell.checks.closure_position,
+                limit=cell.checks.closure_mm,
                 words=("mm", of),
             ),
             worst_error(
@@ -60,7 +60,7 @@ def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy])
                 times,
                 DEG * np.linalg.norm(closure.orientation_error, axis=1),
                 subject=closure.robot,
-                limit=DEG * cell.checks.closure_orientation,
+                limit=cell.checks.closure_deg,
                 words=("deg", of),
             ),
         ]

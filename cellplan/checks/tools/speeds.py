@@ -11,6 +11,7 @@ from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import REDUCED_SPEED, Check, RobotSpeed
+from cellplan.model.settings.units import si_or_none
 from cellplan.model.units import MM
 
 
@@ -38,7 +39,7 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
 
 def check_tool_speeds(cell: Cell, speeds: Mapping[str, RobotSpeed]) -> list[Check]:
     """The largest speed of each tool tip in the world, where the cell allows no more."""
-    limit = cell.checks.tool_speed
+    limit = si_or_none(cell.checks.tool_speed_mm_s)
     if limit is None:
         return []
     return [

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
-from cellplan.io.cell.build_controllers import build_control, build_stop
+from cellplan.io.cell.build_controllers import build_control
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.build_program import build_order, written_program
@@ -17,7 +17,7 @@ from cellplan.io.cell.path_rules import build_path
 from cellplan.io.cell.rules import needs_surface
 from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
 from cellplan.io.schema import CellDocument
-from cellplan.io.schema.cell import ChecksEntry, CycleEntry, MotionEntry
+from cellplan.io.schema.cell import CycleEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.io.schema.path import PathEntry, PolylineEntry
 from cellplan.io.schema.shapes import ObstacleEntry
@@ -31,7 +31,6 @@ from cellplan.io.schema.task import (
 from cellplan.io.schema.tool import OF_ROD
 from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry
 from cellplan.model.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing
-from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
 from cellplan.model.settings.units import Mm, in_si, si_or_none
@@ -330,20 +329,4 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
         timing=Timing(entry.timing) if isinstance(entry.timing, str) else Timing.CYCLE,
         cycle=cycle,
         build_up=None if isinstance(entry.jerk_build_up_s, str) else entry.jerk_build_up_s,
-    )
-
-
-def build_checks(entry: ChecksEntry) -> CheckSettings:
-    """Requirements of the checks."""
-    return CheckSettings(
-        clearance=entry.clearance_mm.si,
-        adds_accuracy=entry.body_accuracy == "add",
-        contact_zone=entry.contact_zone_mm.si,
-        exclusions=tuple(Exclusion(bodies=pair.bodies, reason=pair.reason) for pair in entry.exclude),
-        closure_position=entry.closure_mm.si,
-        closure_orientation=entry.closure_deg.si,
-        standing_depth=entry.standing_depth_mm.si,
-        part_acceleration=entry.part_acceleration_m_s2,
-        tool_speed=si_or_none(entry.tool_speed_mm_s),
-        stop=build_stop(entry.stop),
     )

@@ -5,11 +5,11 @@ from typing import Final
 
 from cellplan.io.input.findings import Finding, KeyPath, key_text, listed, unknown_name
 from cellplan.io.schema.cell import CellDocument
-from cellplan.io.schema.controllers import ControllerEntry, RobotControlEntry, StopEntry
+from cellplan.io.schema.controllers import ControllerEntry, RobotControlEntry
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl, StopDemand
+from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
 from cellplan.model.robot import RobotModel
 from cellplan.model.settings.units import si_or_none
 
@@ -57,13 +57,6 @@ def build_control(entry: RobotControlEntry | None) -> RobotControl | None:
             output=str(signals.output), inputs={robot: str(signal) for robot, signal in signals.inputs.items()}
         ),
     )
-
-
-def build_stop(entry: StopEntry | None) -> StopDemand | None:
-    """Demands on the time after a stop in [m]; None without any."""
-    if entry is None:
-        return None
-    return StopDemand(depth=si_or_none(entry.depth_mm), clearance=si_or_none(entry.clearance_mm))
 
 
 def control_findings(

@@ -9,7 +9,6 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.load import require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
 from cellplan.io.cell.build import (
-    build_checks,
     build_motion,
     build_obstacle,
     build_part,
@@ -268,7 +267,7 @@ def _cell(
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
         solver=build_solver(whole.solver, whole.motion.step_s, models),
-        checks=build_checks(whole.checks),
+        checks=whole.checks,
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),

@@ -13,7 +13,6 @@ from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.robot import RobotModel
 from cellplan.model.sequence import sequence_of
 from cellplan.model.settings.units import Deg, Mm, file_number, in_si
@@ -57,7 +56,7 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
         document.pop("layout", None)  # it may name other tasks, or choose between other modes
     document["motion"] = _motion(document["motion"], cell)
     document["solver"] = _solver(document["solver"], cell.solver)
-    document["checks"] = _checks(document["checks"], cell.checks)
+    document["checks"] = {**document["checks"], "clearance_mm": cell.checks.clearance_mm}
     return document
 
 
@@ -145,12 +144,6 @@ def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
         "seed": solver.seed,
     }
     return used | {key: value for key, value in entry.items() if key not in used}
-
-
-def _checks(entry: Mapping[str, Any], checks: CheckSettings) -> dict[str, Any]:
-    """Required clearance and tolerances."""
-    is_same = Mm(entry["clearance_mm"]).si == checks.clearance
-    return {**entry, "clearance_mm": entry["clearance_mm"] if is_same else MM * checks.clearance}
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:

@@ -5,10 +5,10 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.controllers import ControllerEntry, StopEntry
+from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.program import ProgramEntry
-from cellplan.io.schema.robot import RobotEntry, SlidingSpeed
+from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import (
@@ -18,28 +18,26 @@ from cellplan.io.schema.task import (
     TaskAxis,
     TaskEntry,
     TimeLawChoice,
-    ToolDepth,
 )
 from cellplan.io.schema.tool import Mass
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.entry import (
     Coordinates,
     Entry,
     Name,
     PoseEntry,
-    Reason,
     Text,
     by_kind,
     require_each_once,
     rule,
 )
-from cellplan.model.settings.units import Deg, Mm, Ms, Within
+from cellplan.model.settings.units import Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1
 ROBOT_LIMIT: Final = 64
 TASK_LIMIT: Final = 200
 OBSTACLE_LIMIT: Final = 500
 GRIP_LIMIT: Final = 200  # bodies of one gripper
-WIDEST_CONTACT_MM: Final = 50.0  # farther from its tip a tool that touches the part collides with it
 SAMPLE_LIMIT: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ALL_AXES: Final[tuple[TaskAxis, ...]] = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -210,69 +208,6 @@ class MotionEntry(Entry):
 def _is_multiple(time: float, step: float) -> bool:
     """Whether a time is a whole number of steps, at least one, but for rounding."""
     return round(time / step) >= 1 and abs(time / step - round(time / step)) <= WHOLE_STEPS
-
-
-class ExclusionEntry(Entry):
-    """A pair of bodies that the collision check leaves out."""
-
-    bodies: tuple[Text, Text] = Field(
-        description="Two bodies: ROBOT/LINK (all pieces of it), ROBOT/tool, ROBOT/tool_2, ROBOT/pedestal, "
-        "ROBOT/ATTACHMENT, ROBOT (all of it), part or a name of the environment."
-    )
-    reason: Reason = Field(description="Why they may touch; it is repeated in the report.")
-
-    @model_validator(mode="after")
-    def _names_a_pair(self) -> Self:
-        """Two different bodies."""
-        if self.bodies[0] == self.bodies[1]:
-            raise rule("expected two different bodies, got the same twice", "bodies[1]")
-        return self
-
-
-class ChecksEntry(Entry):
-    """Requirements of the checks."""
-
-    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] = Field(
-        default=Mm(5.0), description="Smallest allowed distance between things that must not touch."
-    )
-    body_accuracy: Literal["report", "add"] = Field(
-        default="report",
-        description="What to do with the stated accuracy of link bodies: report it beside the distances, or add that "
-        "of both bodies to the demanded clearance of each pair.",
-    )
-    contact_zone_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONTACT_MM)] = Field(
-        default=Mm(20.0), description="Radius round the tool tip within which tool and part may touch."
-    )
-    tool_depth_mm: ToolDepth = Field(
-        default=Mm(1.0),
-        description="Largest length of tool inside the part or beyond it, along the tool's axis from where it enters.",
-    )
-    closure_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
-        default=Mm(0.003), description="Largest distance of a further holder's tool from its grasp on the part."
-    )
-    closure_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
-        default=Deg(0.001), description="Largest angle between a further holder's tool and its grasp on the part."
-    )
-    standing_depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] = Field(
-        default=Mm(5.0),
-        description="How deep bodies that never move may reach into each other where one stands on the other: a base "
-        "in a floor or plinth, a fixed part on a table.",
-    )
-    part_acceleration_m_s2: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = Field(
-        default=None,
-        description="Largest allowed acceleration in the world of any corner of the bounding box of a part that is "
-        "held; it is only reported when absent.",
-    )
-    tool_speed_mm_s: SlidingSpeed | None = Field(
-        default=None,
-        description="Largest allowed speed of any tool tip in the world; it is only reported when absent.",
-    )
-    stop: StopEntry | None = Field(
-        default=None,
-        description="Demands on the time after one robot stopped, while robots of other controllers go on; only "
-        "reported when absent.",
-    )
-    exclude: tuple[ExclusionEntry, ...] = Field(default=(), description="Pairs left out of the collision check.")
 
 
 def _is_known_version(version: int) -> int:

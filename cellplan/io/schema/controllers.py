@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 from cellplan.io.schema.acceleration import CycleTime
 from cellplan.io.schema.controller import ControllerZeroEntry
 from cellplan.model.settings.entry import Entry, Name, by_kind, rule
-from cellplan.model.settings.units import Mm, Ms, Within
+from cellplan.model.settings.units import Ms, Within
 
 IDENTIFIER: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 IDENTIFIER_WORDS: Final = "a name of 1 to 32 ASCII letters, digits or '_' that begins with a letter"
@@ -132,22 +132,3 @@ class RobotControlEntry(Entry):
             )
             raise rule(text, found[0])
         return given
-
-
-class StopEntry(Entry):
-    """What is demanded when one robot stops and the robots of other controllers go on until they have braked."""
-
-    depth_mm: Annotated[Mm, Within(ge=0.0, le=1000.0)] | None = Field(
-        default=None, description="Largest depth of a tool in the part; it is only reported when absent."
-    )
-    clearance_mm: Annotated[Mm, Within(ge=0.0, le=10_000.0)] | None = Field(
-        default=None,
-        description="Smallest distance of all that must not touch; it is only reported when absent.",
-    )
-
-    @model_validator(mode="after")
-    def _demands_something(self) -> Self:
-        """At least one of the two."""
-        if self.depth_mm is None and self.clearance_mm is None:
-            raise rule("expected depth_mm, clearance_mm or both, got neither")
-        return self

@@ -11,7 +11,6 @@ from cellplan.io.schema.cell import (
     ROBOT_LIMIT,
     TASK_LIMIT,
     CellDocument,
-    ChecksEntry,
     MotionEntry,
     PartEntry,
 )
@@ -24,6 +23,7 @@ from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.settings.checks import ChecksEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

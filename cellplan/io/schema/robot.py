@@ -18,6 +18,7 @@ from cellplan.model.settings.entry import (
     Name,
     PoseEntry,
     Size,
+    SlidingSpeed,
     Text,
     by_kind,
     one_of_keys,
@@ -30,7 +31,6 @@ from cellplan.model.settings.units import (
     DegPerS2,
     DegPerS3,
     Mm,
-    MmPerS,
     MmPerS2,
     MmPerS3,
     Quantity,
@@ -39,7 +39,6 @@ from cellplan.model.settings.units import (
 
 LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
-FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
@@ -50,7 +49,6 @@ MOUNTS: Final = ("pedestal", "tilted", "hanging", "wall", "rail")
 
 JointAngle = Annotated[Deg, Within(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[DegPerS, Within(gt=0.0, le=FASTEST_DEG_S)]
-SlidingSpeed = Annotated[MmPerS, Within(gt=0.0, le=FASTEST_MM_S)]
 TurningAcceleration = Annotated[DegPerS2, Within(gt=0.0, le=STEEPEST)]
 SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
 TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]

@@ -5,7 +5,8 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.path import PathEntry
-from cellplan.io.schema.robot import Configuration, JointPosition, SlidingSpeed
+from cellplan.io.schema.robot import Configuration, JointPosition
+from cellplan.model.settings.checks import ToolDepth
 from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
     Angle,
@@ -13,6 +14,7 @@ from cellplan.model.settings.entry import (
     Entry,
     Name,
     Size,
+    SlidingSpeed,
     Vector,
     by_kind,
     require_each_once,
@@ -21,7 +23,6 @@ from cellplan.model.settings.entry import (
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
-DEEPEST_CUT_MM: Final = 100.0  # a tool that is to stand deeper in the part is no tool that works on its surface
 EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
 LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
 MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
@@ -124,7 +125,6 @@ class ProcessEntry(Entry):
     )
 
 
-ToolDepth = Annotated[Mm, Within(ge=0.0, le=DEEPEST_CUT_MM)]
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
 
-from cellplan.model.settings.units import Deg, Mm, Within
+from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
 
 NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
 NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
@@ -15,6 +15,7 @@ DIRECTION_WORDS: Final = "+x, -x, +y, -y, +z, -z or a direction [x, y, z]"
 
 FARTHEST_MM: Final = 100_000.0  # nothing in a cell is farther away than 100 m
 THINNEST_MM: Final = 0.001  # nothing solid is thinner than a micrometre
+FASTEST_MM_S: Final = 10_000.0  # 10 m/s: faster is a wrong unit
 LARGEST_FRAME_DEG: Final = 720.0  # two turns: more in the pose of a frame is a wrong unit
 LARGEST_TURN_DEG: Final = 3_600.0  # ten turns: more is a wrong unit
 
@@ -22,6 +23,7 @@ Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN)]
 Coordinate = Annotated[Mm, Within(ge=-FARTHEST_MM, le=FARTHEST_MM)]
 Size = Annotated[Mm, Within(ge=THINNEST_MM, le=FARTHEST_MM)]
 Angle = Annotated[Deg, Within(ge=-LARGEST_TURN_DEG, le=LARGEST_TURN_DEG)]
+SlidingSpeed = Annotated[MmPerS, Within(gt=0.0, le=FASTEST_MM_S)]
 
 Coordinates = tuple[Coordinate, Coordinate, Coordinate]
 PlaneCoordinates = tuple[Coordinate, Coordinate]

@@ -77,7 +77,7 @@ def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[
     speeds = {robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in own.robots}
     checks = [*check_feeds(scene, schedule, q, X_WP), *check_tool_speeds(own, speeds)]
     checks += check_payload(load_uses(own, scene.chains, times, q))
-    if own.checks.part_acceleration is not None and own.positioners:
+    if own.checks.part_acceleration_m_s2 is not None and own.positioners:
         window = own.robot(own.positioners[0]).controller_cycle
         part = part_acceleration(own, times, X_WP, window=window)
         checks += check_accelerations(own, MotionAccelerations(part=part))

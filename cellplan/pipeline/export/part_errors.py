@@ -39,7 +39,7 @@ class ToolsOnPart:
             robots: Names of the robots.
         """
         holder = {grasp.robot for grasp in cell.part.held_by[:1]}
-        limits = cell.checks.closure_position, cell.checks.closure_orientation
+        limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
         found: list[tuple[Relation, str, frozenset[str], tuple[float, float]]] = []
         for task in cell.tasks:
             own = {task.robot} if task.relative_to is Frame.WORLD else {task.robot, *holder}

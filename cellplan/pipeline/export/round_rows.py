@@ -271,7 +271,7 @@ def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, floa
         (each.task, each.X_PT, each.task.tolerance.between, each.task.first_judged(rows.times))
         for each in schedule.tasks
     ]
-    limits = checks.closure_position, checks.closure_orientation
+    limits = checks.closure_mm.si, checks.closure_deg.si
     pairs += [(grasp, grasp.X_PT[None], limits, 0) for grasp in cell.closures]
     for relation, desired, allowed, first in pairs:
         X_WT = scene.chains[relation.robot].tool_poses(rows.q[relation.robot])

@@ -187,9 +187,10 @@ def _binding(scene: Scene, run: Run, *, is_retimed: bool) -> Binding:
     for errors in run.report.accuracy if is_retimed else ():
         share = _share_between(errors, scene.cell)
         found.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
-    if scene.cell.checks.tool_speed is not None:
+    limit = scene.cell.checks.tool_speed_mm_s
+    if limit is not None:
         for name, speed in run.report.speeds.items():
-            share = speed.tool_peak / scene.cell.checks.tool_speed
+            share = speed.tool_peak / limit.si
             found.append((share, name, "", "tool speed", share))
     most, robot, joint, name, share = max(found, key=lambda each: each[0])
     return Binding(phase=run.phase.name, robot=robot, joint=joint, kind=name, share=share, time_share=most)

@@ -43,7 +43,7 @@ def margins_missed_at(program: TimedProgram, margin: float, span: float) -> tupl
 
 def distances_missed_at(program: TimedProgram, span: float, *, is_own: bool) -> tuple[float, ...]:
     """Times at which bodies are nearest and nearer than the cell demands, of a robot's own bodies or of all others."""
-    required, found = program.solution.cell.checks.clearance, list[float]()
+    required, found = program.solution.cell.checks.clearance_mm.si, list[float]()
     for run in program.solution.runs:
         missed = [
             least.at_s

@@ -304,7 +304,7 @@ def _enlarged(room: _Room, timed: _Timed, program: TimedProgram) -> bool:
     if margin is not None and missed_margin:
         room.angle += demanded - np.radians(margin) + MORE_ANGLE
         times += margins_missed_at(program, demanded, span)
-    required = MM * program.solution.cell.checks.clearance
+    required = program.solution.cell.checks.clearance_mm
     others, own = (clearance_of(program, is_own=each) for each in (False, True))
     keys = list[float]()
     if others is not None and others < required:

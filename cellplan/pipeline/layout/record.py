@@ -161,7 +161,7 @@ def layout_record(
         "objective": str(request.objective),
         "timing": str(request.timing),
         "duration_s": None if is_free else number(ready.duration),
-        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "required_clearance_mm": number(cell.checks.clearance_mm),
         "required_margin_deg": number(DEG * float(ready.variables.settings.margin)),
         "has_accelerations": has_accelerations,
         "seed": request.seed,

@@ -163,7 +163,7 @@ class _Search:
             often = f", most often: {self._failed.most_common(1)[0][0]}"
         return (
             f"{home_place(cell, self._robot)}: no home found near the start for '{name}', which is idle "
-            f"while {while_worked}, that keeps {1e3 * cell.checks.clearance:g} mm from everything{often} "
+            f"while {while_worked}, that keeps {cell.checks.clearance_mm:g} mm from everything{often} "
             f"(several hundred configurations tried): give {home_key(self._robot)} or move the base"
         )
 

@@ -18,6 +18,7 @@ from cellplan.model.joint_path import JointPath
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.process_times import kept_rests
 from cellplan.model.progress import Progress, silent
+from cellplan.model.settings.units import si_or_none
 from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.plan.step_errors import StepErrors
@@ -221,7 +222,7 @@ class RowLimits:
 
     def _tool_moves(self, before: Array, after: Array) -> Array:
         """Longest moves of a tool tip in the world, divided by the speed that is allowed, in [s], shape (N,)."""
-        cell, limit = self.scene.cell, self.scene.cell.checks.tool_speed
+        cell, limit = self.scene.cell, si_or_none(self.scene.cell.checks.tool_speed_mm_s)
         longest = np.zeros(len(before))
         for robot in cell.robots if limit is not None else ():
             columns, chain = cell.columns(robot.name), self.scene.chains[robot.name]
@@ -231,7 +232,7 @@ class RowLimits:
 
     def _part_share(self, times: Array, q: Array) -> float:
         """Acceleration of the part as a share of what is allowed."""
-        cell, limit = self.scene.cell, self.scene.cell.checks.part_acceleration
+        cell, limit = self.scene.cell, self.scene.cell.checks.part_acceleration_m_s2
         if limit is None or not cell.positioners:
             return 0.0
         by_robot = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}

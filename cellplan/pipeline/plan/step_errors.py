@@ -88,7 +88,7 @@ class StepErrors:
         for grasp in cell.closures:
             X_PT = inverse(X_WP) @ chains[grasp.robot].tool_poses(by_robot[grasp.robot])
             desired = np.broadcast_to(grasp.X_PT, X_PT.shape)
-            allowed = cell.checks.closure_position, cell.checks.closure_orientation
+            allowed = cell.checks.closure_mm.si, cell.checks.closure_deg.si
             worst = np.maximum(worst, _share(errors_on_part(X_PT, desired, grasp), allowed))
         return worst
 

@@ -11,7 +11,6 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.model.report import Report
-from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.present.kinds import KINDS, RUN, TASK_COLUMNS, record_of
 from cellplan.pipeline.present.pictures import record_pictures, run_pictures
@@ -98,7 +97,7 @@ def _(result: Cell) -> Card:
         figures=[
             figure("Mode", str(result.motion.mode), "", note=""),
             figure("Part", _part_text(result), "", note=""),
-            figure("Required clearance", small(MM * result.checks.clearance), "mm"),
+            figure("Required clearance", small(result.checks.clearance_mm), "mm"),
         ],
         grids=[
             _grid("Robots", robots, ("robot", "model", "role", "joints", "x_mm", "y_mm", "z_mm", "yaw_deg"), "robots"),

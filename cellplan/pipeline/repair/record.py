@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.check_kinds import JOINT_LIMITS, PASSED_BY_TIME
-from cellplan.model.units import DEG, MM
+from cellplan.model.units import DEG
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind
 from cellplan.pipeline.repair.wording import EffectRecord, change_text, effects
@@ -115,7 +115,7 @@ def advice_record(case: Case) -> AdviceRecord:
         "file": request.cell.name,
         "status": case.status,
         "duration_s": number(case.ready.duration),
-        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "required_clearance_mm": number(cell.checks.clearance_mm),
         "required_margin_deg": 0.0 if cell.layout is None else number(DEG * cell.layout.margin),
         "failed": case.failed,  # type: ignore[typeddict-item]
         "no_motion": case.no_motion,

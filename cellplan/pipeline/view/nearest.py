@@ -61,7 +61,7 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
     chosen = times[rows]
     record = NearestRecord(
         step=round(float(np.diff(chosen).max(initial=0.0)), 6),
-        required=MM * stretches[0].scene.cell.checks.clearance,
+        required=stretches[0].scene.cell.checks.clearance_mm,
         times=[round(float(each), 9) for each in chosen],
         pairs=[],
         distances=[],

@@ -121,7 +121,7 @@ def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_be
 def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
     """Largest distance in [m] and angle in [rad] of a given start from its task or grasp."""
     if isinstance(relation, Grasp):
-        return cell.checks.closure_position, cell.checks.closure_orientation
+        return cell.checks.closure_mm.si, cell.checks.closure_deg.si
     return relation.tolerance.position, relation.tolerance.orientation
 
 

@@ -44,7 +44,7 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     over_all = {
         "margins": margins_figure(report, robots, colours),
         "speeds": speeds_figure(report, robots, colours),
-        "clearance": _clearance_figure(report, cell.checks.clearance),
+        "clearance": _clearance_figure(report, cell.checks.clearance_mm.si),
     }
     figures = {name: figure for name, figure in over_all.items() if figure is not None}
     for accuracy in report.accuracy:
@@ -78,8 +78,8 @@ def _task_figure(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Figure:
 def _closure_figure(closure: ClosureAccuracy, times: Array, cell: Cell) -> Figure:
     """Total and per-axis error of the tool of a further holder on its grasp."""
     checks = cell.checks
-    panels = error_panels(times, closure.position_error, allowed=checks.closure_position, kind=POSITION)
-    panels += error_panels(times, closure.orientation_error, allowed=checks.closure_orientation, kind=ORIENTATION)
+    panels = error_panels(times, closure.position_error, allowed=checks.closure_mm.si, kind=POSITION)
+    panels += error_panels(times, closure.orientation_error, allowed=checks.closure_deg.si, kind=ORIENTATION)
     title = f"{closure.robot}: closure error at its grasp"
     return Figure(title=title, x=time_axis(times), panels=panels, columns=2)
 

@@ -35,7 +35,7 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standof
     """Assumptions, and one line on each value that was not stated."""
     return {
         "bodies": bodies_record(cell),
-        "body_accuracy": "add" if cell.checks.adds_accuracy else "report",
+        "body_accuracy": cell.checks.body_accuracy,
         "payload": loads_record(loads),
         "zero": {robot.name: zero_record(robot.model) for robot in cell.robots},
         "lines": [

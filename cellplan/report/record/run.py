@@ -7,7 +7,6 @@ from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
 from cellplan.model.report import CAUTION, Report
-from cellplan.model.units import MM
 from cellplan.report.record.accelerations import AccelerationsRecord, accelerations_record
 from cellplan.report.record.clearance import (
     ClosestPair,
@@ -149,7 +148,7 @@ def run_record(
         "repeatability": repeatability_record(report),
         "locked_joints": locked_joints_record(report, cell),
         "clearance": clearance_record(clearance.minima),
-        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "required_clearance_mm": number(cell.checks.clearance_mm),
         "pair_count": clearance.pair_count,
         "contacts": contacts_record(clearance),
         "exclusions": exclusions_record(clearance),

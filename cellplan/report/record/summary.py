@@ -6,7 +6,6 @@ from typing import Annotated, Any, TypedDict
 from cellplan.model.branches import MovedStart
 from cellplan.model.cell import Cell
 from cellplan.model.report import CAUTION, Report
-from cellplan.model.units import MM
 from cellplan.report.record.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
 from cellplan.report.record.clearance import clearance_record, left_out_record
 from cellplan.report.record.clock import clock_from
@@ -97,7 +96,7 @@ def summary_record(
         "joints": merged["joints"],
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": merged["clearance"],
-        "required_clearance_mm": number(MM * cell.checks.clearance),
+        "required_clearance_mm": number(cell.checks.clearance_mm),
         "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
         "checks": [
             {"phase": name, **check_record(check)} for name, report in reports.items() for check in report.checks

@@ -102,7 +102,7 @@ class MovingBodies:
             yield index, placed
             if index in self._cuts:
                 tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
-                yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone, self._cuts[index])
+                yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone_mm.si, self._cuts[index])
 
     def that_differ(self, cell: Cell, robot: str | None) -> Iterator[tuple[int, Placed]]:
         """Those of the tool of a robot, or the part where there is none; see ``Beside``."""

@@ -41,7 +41,7 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     tilted = {
         variable.name for variable in settings.ranges if variable.kind is VariableKind.BASE and variable.index in {3, 4}
     }
-    named = {body for pair in cell.checks.exclusions for body in pair.bodies}
+    named = {body for pair in cell.checks.exclude for body in pair.bodies}
     values, remarks = dict[str, object](), list[str]()
     for obstacle in cell.obstacles:
         robots = [robot for robot in cell.robots if _stands_on(robot, obstacle)]

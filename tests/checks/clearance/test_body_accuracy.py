@@ -10,9 +10,9 @@ from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.robot import BodyAccuracy
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.report.record.rests_on import unstated_bodies
 from cellplan.report.text.notes import accuracy_note
 from cellplan.scene.scene import Scene
@@ -31,7 +31,9 @@ def cell_of(gap: float, *, near: BodyAccuracy | None, adds: bool, far_gap: float
     )
     robots = (placed("a", model), placed("b", exact, base=pose((0.0, 3.0, 0.0))))
     return make_cell(
-        *robots, things=posts, checks=CheckSettings(clearance=0.005, contact_zone=0.02, adds_accuracy=adds)
+        *robots,
+        things=posts,
+        checks=ChecksEntry(body_accuracy="add" if adds else "report"),
     )
 
 

@@ -10,9 +10,9 @@ from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Capsule
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.robot import Body, RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 SIDES = 24
@@ -29,9 +29,7 @@ def spindle() -> RobotModel:
 
 def turning_rod(clearance: float = 0.005) -> Cell:
     things = (thing("tube", tube(BORE, 0.1, 0.4, sides=SIDES)),)
-    return make_cell(
-        placed("arm", spindle()), things=things, checks=CheckSettings(clearance=clearance, contact_zone=0.02)
-    )
+    return make_cell(placed("arm", spindle()), things=things, checks=ChecksEntry(clearance_mm=1e3 * clearance))
 
 
 def checked(cell: Cell, q: Array) -> tuple[ClearanceReport, tuple[Check, ...]]:

@@ -11,8 +11,8 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Shape
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings, Exclusion
 from cellplan.model.report import Check
+from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
 from cellplan.scene.scene import Scene
 
 AT_REST = np.zeros((1, 6))
@@ -81,14 +81,14 @@ def test_the_message_says_how_deep_and_asks_for_the_pit() -> None:
 
 
 def test_the_limit_of_what_stands_is_the_cells() -> None:
-    settings = CheckSettings(clearance=0.005, contact_zone=0.02, standing_depth=0.2)
+    settings = ChecksEntry(standing_depth_mm=200.0)
 
     assert standing(HalfSpace(), pose((0.0, 0.0, 0.11)), checks=settings)[0].passed
 
 
 def test_what_the_user_leaves_out_is_not_judged() -> None:
-    pit = Exclusion(bodies=("a/foot", "it"), reason="a pit")
-    settings = CheckSettings(clearance=0.005, contact_zone=0.02, exclusions=(pit,))
+    pit = ExclusionEntry(bodies=("a/foot", "it"), reason="a pit")
+    settings = ChecksEntry(exclude=(pit,))
 
     (check,) = standing(HalfSpace(), pose((0.0, 0.0, 0.11)), checks=settings)
 

@@ -13,10 +13,10 @@ from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Part
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Report, ToolDepth
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.skew import MOST_SKEW, SkewLimit, SkewReport
 from cellplan.model.task import Frame, Tolerance
 from cellplan.report.text.skew import skew_notes
@@ -49,7 +49,7 @@ def cell_of(
             ),
             part=part or held_part(Sphere(0.01), "holder", pose((0.0, 0.0, -3.0))),
             tasks=(task,),
-            checks=CheckSettings(clearance=clearance, contact_zone=0.0),
+            checks=ChecksEntry(clearance_mm=1e3 * clearance, contact_zone_mm=0.0),
         ),
         controllers={
             name: Controller(name=name, kind=ControllerKind.OTHER, skew=(skews or {}).get(name))

@@ -14,9 +14,9 @@ from cellplan.checks.clearance.stops import BAND_PARTS, check_stops, one_stop, s
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.check_settings import CheckSettings
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl, StopDemand
+from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.settings.checks import ChecksEntry, StopEntry
 from cellplan.scene.scene import Scene
 
 SPEED = 0.8  # [m/s] of both robots
@@ -38,13 +38,13 @@ def controllers(**seconds: tuple[float, float]) -> dict[str, Controller]:
     }
 
 
-def convoy(stop: StopDemand | None = None) -> tuple[Cell, Schedule, dict[str, Array]]:
+def convoy(stop: StopEntry | None = None) -> tuple[Cell, Schedule, dict[str, Array]]:
     """Two balls of 0.1 m that slide along one line at the same speed, the second one 0.5 m ahead."""
     ball = slide_model(Sphere(0.1))
     cell = make_cell(
         controlled(placed("rear", ball), "r"),
         controlled(placed("front", ball, base=pose((0.5, 0.0, 0.0))), "f"),
-        checks=CheckSettings(clearance=0.01, contact_zone=0.0, stop=stop),
+        checks=ChecksEntry(clearance_mm=10.0, contact_zone_mm=0.0, stop=stop),
     )
     cell = replace(cell, controllers=controllers(r=(0.1, 0.3), f=(0.05, 0.1)))
     times = np.linspace(0.0, 2.0, 41)
@@ -92,7 +92,7 @@ def test_stops_count_to_the_end_of_the_program_only() -> None:
 
 @pytest.mark.parametrize(("demand", "passed"), [(0.08, True), (0.12, False)])
 def test_a_demanded_clearance_is_a_check(demand: float, passed: bool) -> None:
-    cell, schedule, q = convoy(StopDemand(clearance=demand))
+    cell, schedule, q = convoy(StopEntry(clearance_mm=1e3 * demand))
 
     (check,) = check_stops(cell, stop_report(Scene.from_cell(cell), schedule, q))
 
@@ -101,7 +101,7 @@ def test_a_demanded_clearance_is_a_check(demand: float, passed: bool) -> None:
     assert "'front' stops at" in check.message
 
 
-def pressed(stop: StopDemand | None = None) -> tuple[Cell, Schedule, dict[str, Array]]:
+def pressed(stop: StopEntry | None = None) -> tuple[Cell, Schedule, dict[str, Array]]:
     """A block that slides up at 0.1 m/s and a pen above it that goes up with it; its tip is on the block."""
     up = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, 1.0)), bodies=())
     down = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
@@ -111,7 +111,7 @@ def pressed(stop: StopDemand | None = None) -> tuple[Cell, Schedule, dict[str, A
         controlled(placed("pen", down, base=pose((0.0, 0.0, 0.2), (np.pi, 0.0, 0.0)), tool=PEN), "p"),
         part=held_part(Box((0.2, 0.2, 0.2)), "table", np.eye(4)),
         tasks=(task,),
-        checks=CheckSettings(clearance=0.0, contact_zone=0.02, stop=stop),
+        checks=ChecksEntry(clearance_mm=0.0, stop=stop),
     )
     cell = replace(cell, controllers=controllers(t=(0.2, 0.4), p=(0.1, 0.0)))
     times = np.linspace(0.0, 2.0, 21)
@@ -128,7 +128,7 @@ def pressed(stop: StopDemand | None = None) -> tuple[Cell, Schedule, dict[str, A
 
 
 def test_a_part_that_goes_on_runs_onto_the_stopped_tool() -> None:
-    cell, schedule, q = pressed(StopDemand(depth=0.03))
+    cell, schedule, q = pressed(StopEntry(depth_mm=30.0))
 
     found = stop_report(Scene.from_cell(cell), schedule, q)
 
@@ -164,7 +164,7 @@ def test_a_part_that_nobody_carries_is_run_onto_by_no_stop() -> None:
 
 
 def test_nothing_is_said_where_no_controller_states_how_its_robots_go_on() -> None:
-    cell, schedule, q = convoy(StopDemand(clearance=0.01))
+    cell, schedule, q = convoy(StopEntry(clearance_mm=10.0))
     silent = replace(
         cell, controllers={name: replace(each, reaction=None, brake=None) for name, each in cell.controllers.items()}
     )

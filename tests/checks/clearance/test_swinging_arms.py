@@ -23,8 +23,8 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Mesh
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Cell
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
@@ -46,7 +46,9 @@ def two_arms() -> Cell:
         "post", Mesh(vertices=wedge.vertices, faces=wedge.faces, source="wedge", is_closed=True), pose((0.7, -0.6, 0.8))
     )
     part = held_part(Capsule(0.05, 0.2), "b", pose((0.0, 0.0, -0.16)))
-    return make_cell(*arms, part=part, things=(floor(), post), checks=CheckSettings(clearance=0.0, contact_zone=0.0))
+    return make_cell(
+        *arms, part=part, things=(floor(), post), checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0)
+    )
 
 
 def swinging(seed: int, samples: int) -> Array:

@@ -13,9 +13,9 @@ from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Tool
-from cellplan.model.check_settings import CheckSettings
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, ToolDepth
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.task import Frame, SampledPath, Task
 
 SHEET = Box((0.4, 0.4, 0.002))
@@ -33,7 +33,7 @@ def cell_with(tool: Tool, part: Solid, task: Task | None = None) -> Cell:
         robot,
         part=fixed_part(part, np.eye(4)),
         tasks=(task or work("drill"),),
-        checks=CheckSettings(clearance=0.005, contact_zone=0.02),
+        checks=ChecksEntry(),
     )
 
 

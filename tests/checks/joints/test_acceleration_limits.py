@@ -133,7 +133,7 @@ def test_tool_and_part_are_reported_in_the_world_and_the_part_may_be_limited() -
     assert accelerations.part.centre.peak == pytest.approx(4 * LINK * per_metre, rel=1e-4)
     assert accelerations.part.corner.peak == pytest.approx(float(np.hypot(4 * LINK + 0.2, 0.01)) * per_metre, rel=1e-4)
     for limit, passed in ((5.9, True), (5.8, False)):
-        strict = replace(cell, part=part, checks=replace(cell.checks, part_acceleration=limit))
+        strict = replace(cell, part=part, checks=cell.checks.changed(part_acceleration_m_s2=limit))
         (check,) = found(strict, q)[1]["part_acceleration"]
         assert check.passed == passed
 

@@ -153,7 +153,7 @@ def test_no_instant_is_worse_than_the_bound(seed: int) -> None:
     cell = load_cell(CELLS / "turntable.yaml")
     rng = np.random.default_rng(seed)
     step = float(rng.choice([0.02, 0.05, 0.1]))
-    cell = replace(cell, motion=replace(cell.motion, step=step), checks=replace(cell.checks, clearance=0.0))
+    cell = replace(cell, motion=replace(cell.motion, step=step), checks=cell.checks.changed(clearance_mm=0.0))
     cell = replace(
         cell, tasks=tuple(replace(task, tolerance=Tolerance(position=1.0, orientation=3.0)) for task in cell.tasks)
     )

@@ -87,7 +87,7 @@ def test_an_error_beyond_what_is_allowed_is_named_with_instant_and_cure():
         True,
         pytest.approx(1e-3),
     )
-    wider = replace(cell, checks=replace(cell.checks, closure_position=6e-6))
+    wider = replace(cell, checks=cell.checks.changed(closure_mm=0.006))
     assert all(check.passed for check in check_closure(wider, TIMES, closures))
 
 

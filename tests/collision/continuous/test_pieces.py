@@ -15,7 +15,7 @@ from cellplan.collision.engine import Engine
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Mesh, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.check_settings import CheckSettings
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 EXACT = 1e-4  # [m] promised accuracy of a smallest distance
@@ -101,7 +101,7 @@ def stirring() -> tuple[Scene, Array, tuple[int, int]]:
     cell = make_cell(
         placed("arm", arm_model()),
         things=(thing("bowl", bowl(), pose((0.68, 0.0, 1.1))),),
-        checks=CheckSettings(clearance=0.0, contact_zone=0.0),
+        checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0),
     )
     scene = Scene.from_cell(cell)
     index = {body.name: place for place, body in enumerate(scene.bodies)}

@@ -11,7 +11,8 @@ from cellplan.io.cell.load import load_cell
 from cellplan.io.cell.write import render_cell
 from cellplan.io.schema.controllers import KindName
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl, StopDemand
+from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
+from cellplan.model.settings.checks import StopEntry
 
 KUKA = "    model: kuka_kr6\n"
 ABB = "    weights: [1, 1, 1, 1, 1, 1]\n"
@@ -64,7 +65,7 @@ def test_controllers_are_read_in_seconds_and_signals_as_texts(connected: Load) -
         base_number=2,
         handshake=Handshake(output="do_there", inputs={"holder": "di_go"}),
     )
-    assert cell.checks.stop == StopDemand(depth=0.002, clearance=0.0015)
+    assert cell.checks.stop == StopEntry(depth_mm=2.0, clearance_mm=1.5)
 
 
 def test_every_kind_of_controller_can_be_stated() -> None:
@@ -121,7 +122,7 @@ def test_values_of_controllers_are_changed_by_address(connected: Load) -> None:
     assert (worker.decimals, worker.task) == (5, None)
     assert holder is not None
     assert holder.handshake == Handshake(output="5", inputs={"worker": "9"})
-    assert changed.checks.stop == StopDemand(clearance=0.0015)
+    assert changed.checks.stop == StopEntry(clearance_mm=1.5)
 
 
 def test_several_robots_share_a_controller_with_tasks_and_signals_of_their_own(connected: Load) -> None:

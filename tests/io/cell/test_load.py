@@ -57,7 +57,7 @@ def test_the_base_cell_is_read_in_metres_and_radians(load: Load) -> None:
     assert cell.motion.mode is Mode.SIMULTANEOUS
     assert (cell.motion.duration, cell.motion.step) == (4.0, 0.001)
     assert (cell.solver.gain, cell.solver.damping, cell.solver.seed) == (500.0, None, 0)
-    assert (cell.checks.clearance, cell.checks.contact_zone) == (0.005, 0.02)
+    assert (cell.checks.clearance_mm.si, cell.checks.contact_zone_mm.si) == (0.005, 0.02)
 
 
 def test_the_cell_remembers_its_lines_and_the_digests_of_its_files(load: Load) -> None:
@@ -381,8 +381,8 @@ def test_further_holders_may_leave_components_open(load: Callable[..., Cell]) ->
     assert cell.closures[0].axes == (0, 1, 5)
     assert cell.part.held_by[0].axes == (0, 1, 2, 3, 4, 5)
     assert [relation.name for relation in cell.relations] == ["ring", "helper@part"]
-    assert cell.checks.closure_position == pytest.approx(2e-5)
-    assert cell.checks.closure_orientation == pytest.approx(np.radians(0.5))
+    assert cell.checks.closure_mm.si == pytest.approx(2e-5)
+    assert cell.checks.closure_deg.si == pytest.approx(np.radians(0.5))
 
 
 def test_the_first_holder_may_carry_the_part_along_a_path_in_the_world(load: Callable[..., Cell]) -> None:
@@ -392,4 +392,4 @@ def test_the_first_holder_may_carry_the_part_along_a_path_in_the_world(load: Cal
         ("    tool_axis: normal", "    tool_axis: -z"),
     )
     assert cell.task("ring").relative_to is Frame.WORLD
-    assert cell.checks.closure_position == 3e-6
+    assert cell.checks.closure_mm.si == 3e-6

@@ -14,7 +14,7 @@ def test_depths_are_read_in_millimetres_and_written_out_with_their_defaults(cell
     cell = load_cell(path)
 
     assert cell.part.held_by[0].depth == 0.002
-    assert cell.checks.standing_depth == 0.003
+    assert cell.checks.standing_depth_mm.si == 0.003
     written = written_document(cell)
     assert written["part"]["held_by"][0]["depth_mm"] == 2.0
     assert written["checks"]["standing_depth_mm"] == 3.0

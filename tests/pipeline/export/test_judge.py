@@ -159,7 +159,7 @@ def test_robots_that_meet_are_found(turns: VerifiedRun) -> None:
 
 def test_pairs_that_come_nearer_than_demanded_are_named_with_the_amount_and_a_cure(run: VerifiedRun) -> None:
     """Rows as they are, of a cell that demands half a metre: findings say which pair, how near, and what helps."""
-    strict = replace(run.cell, checks=replace(run.cell.checks, clearance=0.5))
+    strict = replace(run.cell, checks=run.cell.checks.changed(clearance_mm=500.0))
     job = job_of(run, full_rows(run), promise=Promise.SEQUENCE_ONLY)
 
     found = judge(replace(run, cell=strict, token=ACCESS_TOKEN), dialect(decimals=9), job, read_back(job, decimals=9))

@@ -209,7 +209,7 @@ def test_holders_of_different_cycles_are_named_where_they_strain_the_part(run: V
         for each in apart.cell.robots
         if each.control is not None
     )
-    strict = replace(apart.cell.checks, closure_position=1e-6)
+    strict = apart.cell.checks.changed(closure_mm=0.001)
     strained = replace(apart, cell=replace(apart.cell, robots=robots, checks=strict), token=ACCESS_TOKEN)
 
     with pytest.raises(NotVerifiedError) as refusal:

@@ -67,7 +67,7 @@ def test_the_options_make_the_same_cell(too_near: tuple[Repair, Path], sound: Pa
         assert np.array_equal(robot.X_WB, other.X_WB)
         assert robot.start is not None or other.start is None
         assert other.start is None or np.array_equal(robot.start, other.start)
-    assert pasted.checks.clearance == found.best.checks.clearance
+    assert pasted.checks.clearance_mm.si == found.best.checks.clearance_mm.si
 
 
 def test_every_attempt_is_a_remedy_or_has_a_reason(too_near: tuple[Repair, Path]) -> None:

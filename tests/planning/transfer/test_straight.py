@@ -104,7 +104,7 @@ def test_without_a_difference_nobody_moves(pair: tuple[Scene, PlannedTransfer]) 
 
 def test_the_limit_of_tool_speed_slows_a_straight_move(pair: tuple[Scene, PlannedTransfer]) -> None:
     scene, fast = pair
-    checks = replace(scene.cell.checks, tool_speed=1.0)
+    checks = scene.cell.checks.changed(tool_speed_mm_s=1000.0)
     motion = replace(scene.cell.motion, step=0.01)
     slow = replace(scene, cell=replace(scene.cell, checks=checks, motion=motion))
 
