@@ -33,13 +33,6 @@ ALONG: Final = {
 MeshReader = Callable[[str, str | None], Mesh]  # (file as written, unit) -> mesh in [m]
 
 
-def pose_from_entry(entry: PoseEntry | None) -> Array:
-    """Pose in [m] and [rad]; the identity for an absent entry."""
-    if entry is None:
-        return np.eye(4)
-    return pose(in_si(entry.xyz_mm), in_si(entry.rpy_deg))
-
-
 def direction(written: str | tuple[float, float, float]) -> Array:
     """Unit vector of a word such as ``+x`` or of a vector of any length."""
     if isinstance(written, str):
@@ -68,7 +61,7 @@ def obstacle_shape(entry: ObstacleEntry, read_mesh: MeshReader) -> tuple[Shape, 
     if entry.plane is not None:
         return HalfSpace(), pose((0.0, 0.0, entry.plane.z_mm.si))
     solid, X_AS = centred_solid(entry, read_mesh)
-    return solid, pose_from_entry(entry.at) @ X_AS
+    return solid, X_AS if entry.at is None else entry.at.matrix @ X_AS
 
 
 def tool_solid(entry: ToolShapeEntry, X_FT: Array, read_mesh: MeshReader) -> tuple[Solid, Array]:
@@ -82,10 +75,10 @@ def tool_solid(entry: ToolShapeEntry, X_FT: Array, read_mesh: MeshReader) -> tup
 def link_solid(entry: LinkBodyEntry, read_mesh: MeshReader) -> tuple[Solid, Array]:
     """Solid of a link and its pose in the robot's base frame."""
     if entry.mesh is not None:
-        return read_mesh(entry.mesh.file, entry.mesh.unit), pose_from_entry(entry.mesh.at)
+        return read_mesh(entry.mesh.file, entry.mesh.unit), entry.mesh.at.matrix
     if entry.box is not None:
         placed = PoseEntry(xyz_mm=entry.box.center_mm, rpy_deg=entry.box.rpy_deg)
-        return _box(entry.box.size_mm), pose_from_entry(placed)
+        return _box(entry.box.size_mm), placed.matrix
     if entry.sphere is not None:
         return Sphere(entry.sphere.radius_mm.si), pose(in_si(entry.sphere.center_mm))
     segment = entry.capsule or entry.cylinder

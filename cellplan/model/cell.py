@@ -18,10 +18,10 @@ from cellplan.model.layout import LayoutSettings
 from cellplan.model.mounting import Mount
 from cellplan.model.origin import Origin
 from cellplan.model.presented import Presented
-from cellplan.model.program import ProgramSettings
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.rod import Rod
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
 
@@ -278,7 +278,7 @@ class Cell(Presented):
     origin: Origin
     inputs: Mapping[str, str]
     remarks: tuple[tuple[str, str], ...] = ()
-    program: ProgramSettings | None = None
+    program: ProgramEntry | None = None
     layout: LayoutSettings | None = None
     controllers: Mapping[str, Controller] = field(default_factory=dict)
 

@@ -35,7 +35,7 @@ def demanded_spans(task: Task, corners: Array) -> Spans:
     """Stretches of time in [s] in which the feed of a process is demanded: between its ramps."""
     if task.process is None:
         return ()
-    ramp = task.process.ramp
+    ramp = task.process.ramp_s
     spans = ((begin + ramp, end - ramp) for begin, end in pairwise(corners.tolist()))
     return tuple((begin, end) for begin, end in spans if end - begin > TIME_TOLERANCE)
 
@@ -43,4 +43,4 @@ def demanded_spans(task: Task, corners: Array) -> Spans:
 def ramp_shares(task: Task, corners: Array) -> Array:
     """Share of the time of each stretch that a ramp of its time law takes, shape (corners - 1,)."""
     duration = np.diff(corners)
-    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp / duration
+    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp_s / duration

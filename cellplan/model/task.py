@@ -8,6 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
+from cellplan.model.settings.task import ProcessEntry, ToleranceEntry
 
 TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -171,59 +172,11 @@ class TimeLaw:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerance:
-    """Largest allowed tool error on the part in [m] and [rad].
-
-    Attributes:
-        position: At the rows of the tables.
-        orientation: Likewise.
-        position_between: Between the rows; None for the same as at the rows.
-        orientation_between: Likewise.
-    """
-
-    position: float
-    orientation: float
-    position_between: float | None = None
-    orientation_between: float | None = None
-
-    @property
-    def between(self) -> tuple[float, float]:
-        """Largest position error in [m] and orientation error in [rad] between the rows."""
-        return (
-            self.position if self.position_between is None else self.position_between,
-            self.orientation if self.orientation_between is None else self.orientation_between,
-        )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class StraightMove:
     """Move along the tool's axis, to a path or away from it: ``distance`` in [m], ``duration`` in [s]."""
 
     distance: float
     duration: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Process:
-    """What a tool does along its path at a demanded feed: welding, sealing, dispensing.
-
-    The process is on from the start of the task to the end of the path and of its delay. The tool rests during both
-    delays, speeds up during the ramp behind the first one, and slows down during the ramp before the last one; so it
-    does before and after each stop at a corner. Between the ramps its feed is demanded.
-
-    Attributes:
-        feed: Demanded speed of the tool along its path in [m/s].
-        tolerance: Share of the feed by which the speed may differ from it.
-        on_delay: Time in [s] for which the tool rests at the start of the path with the process on.
-        off_delay: Likewise at its end.
-        ramp: Time in [s] in which the tool comes from rest to the feed, and from the feed to rest.
-    """
-
-    feed: float
-    tolerance: float = 0.05
-    on_delay: float = 0.0
-    off_delay: float = 0.0
-    ramp: float = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -283,7 +236,7 @@ class Task:
     turn: float
     axes: tuple[int, ...]
     is_spin_free: bool
-    tolerance: Tolerance
+    tolerance: ToleranceEntry
     start: float
     duration: float | None
     feed: float | None
@@ -293,7 +246,7 @@ class Task:
     repeat: int = 1
     approach: StraightMove | None = None
     retract: StraightMove | None = None
-    process: Process | None = None
+    process: ProcessEntry | None = None
     dwell: float = 0.0
     relative_to: Frame = Frame.PART
     tool_depth: float = 1e-3
@@ -323,12 +276,12 @@ class Task:
     @property
     def moves_from(self) -> float:
         """Time in [s] at which the tool starts along its path: after the delay of its process."""
-        return self.start + (self.process.on_delay if self.process else 0.0)
+        return self.start + (self.process.on_delay_s if self.process else 0.0)
 
     @property
     def off_delay(self) -> float:
         """Time in [s] for which the process stays on at the end of the path."""
-        return self.process.off_delay if self.process else 0.0
+        return self.process.off_delay_s if self.process else 0.0
 
     @property
     def leaving(self) -> float:

@@ -17,7 +17,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Grasp
 from cellplan.model.left_out import LeftOutKind
-from cellplan.model.program import PartPlace
+from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.grips import GRIP_TOL
@@ -33,7 +33,7 @@ class PartContact:
     """A part that is picked up or put down."""
 
     key: str  # key of the place in the cell file
-    place: PartPlace  # the place
+    place: PartPlaceEntry  # the place
     grasp: Grasp  # how the part is held
     is_lying: bool  # whether the part lies there while the tool comes or leaves; else it comes or leaves with the tool
 
@@ -47,7 +47,7 @@ class PartContact:
                 continue  # a straight way off a half-space does not lead through anything of it
             limit = self._limit(scene, pair)
             mounted.append(limit)
-            stated = limit.limit if self.place.contact is None else self.place.contact
+            stated = limit.limit if self.place.contact_mm is None else self.place.contact_mm.si
             near = (stated if self.is_lying else max(stated, limit.limit)) + WAY_TOL
             spans += self._away(pair, near)
             if self.is_lying and (cut := self._cut(scene, pair, limit.limit, len(scene.engine.bodies) + len(cuts))):

@@ -10,8 +10,8 @@ from builders.random_cells import make_task, random_cell
 from cellplan.geometry.transforms import Array, pose_from
 from cellplan.model.cell import Cell, Part, Robot, Tool
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import Tolerance
 
 
 def planar_cell(lengths: Sequence[float], solver: SolverSettings, *, settle: float = 0.0) -> Cell:
@@ -27,7 +27,9 @@ def planar_cell(lengths: Sequence[float], solver: SolverSettings, *, settle: flo
         start=None,
         weights=np.ones(len(lengths)),
     )
-    task = make_task("arm", axes=(0, 1), settle=settle, tolerance=Tolerance(position=1.0, orientation=1.0))
+    task = make_task(
+        "arm", axes=(0, 1), settle=settle, tolerance=ToleranceEntry(position_mm=1000.0, orientation_deg=np.degrees(1.0))
+    )
     template = random_cell(0, operators=1)
     part = Part(shape=template.part.shape, X_PS=np.eye(4), held_by=(), X_WP=np.eye(4))
     return replace(template, name="planar", robots=(arm,), part=part, tasks=(task,), solver=solver)

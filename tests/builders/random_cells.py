@@ -10,8 +10,9 @@ from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, 
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind
 
 
 def random_pose(rng: np.random.Generator) -> Array:
@@ -87,7 +88,7 @@ def make_task(robot: str, **changes: object) -> Task:
         turn=0.0,
         axes=(0, 1, 2, 3, 4, 5),
         is_spin_free=False,
-        tolerance=Tolerance(position=1e-4, orientation=np.radians(0.01)),
+        tolerance=ToleranceEntry(position_mm=0.1, orientation_deg=0.01),
         start=0.0,
         duration=1.0,
         feed=None,

@@ -19,7 +19,7 @@ from cellplan.model.task import (
     Task,
     TimeLaw,
     TimeLawKind,
-    Tolerance,
+    ToleranceEntry,
 )
 from cellplan.model.toolpath import Toolpath
 
@@ -48,7 +48,7 @@ def task_on(path: PathSpec, **words: Any) -> Task:
         "turn": 0.0,
         "axes": (0, 1, 2, 3, 4, 5),
         "is_spin_free": False,
-        "tolerance": Tolerance(position=1e-4, orientation=1e-4),
+        "tolerance": ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-4)),
         "start": 0.0,
         "duration": None,
         "feed": None,

@@ -11,8 +11,9 @@ from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 
 QUARTER = 0.5 * np.pi
 
@@ -125,7 +126,7 @@ def work(robot: str) -> Task:
         turn=0.0,
         axes=tuple(range(6)),
         is_spin_free=False,
-        tolerance=Tolerance(position=1e-4, orientation=1e-4),
+        tolerance=ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-4)),
         start=0.0,
         duration=1.0,
         feed=None,

@@ -10,8 +10,8 @@ from builders.timed_cells import case_of
 from builders.two_phases import PAIR
 
 from cellplan import load_cell, solve, verify, write_run
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
-from cellplan.model.task import Tolerance
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -266,7 +266,7 @@ def test_one_failed_run_withholds_the_tables_of_all(tmp_path):
     (tmp_path / "cell.yaml").write_text(PAIR, encoding="utf-8")
     cell = with_overrides(load_cell(tmp_path / "cell.yaml"), integrator="euler")
     first, second = (
-        replace(task, tolerance=Tolerance(position=position, orientation=1e-3))
+        replace(task, tolerance=ToleranceEntry(position_mm=1e3 * position, orientation_deg=np.degrees(1e-3)))
         for task, position in zip(cell.tasks, (1e-9, 1e-3), strict=True)
     )
     cell = replace(cell, tasks=(first, second))

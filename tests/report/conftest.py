@@ -27,8 +27,9 @@ from cellplan.model.report import (
 )
 from cellplan.model.robot import Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import SolverSettings
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 from cellplan.report.record.common import Provenance
 
 N = 4001
@@ -96,7 +97,7 @@ def _task(name: str, robot: str) -> Task:
         turn=0.0,
         axes=(0, 1, 2, 3, 4, 5),
         is_spin_free=False,
-        tolerance=Tolerance(position=1e-4, orientation=math.radians(0.01)),
+        tolerance=ToleranceEntry(position_mm=0.1, orientation_deg=0.01),
         start=0.0,
         duration=None,
         feed=None,

@@ -203,7 +203,7 @@ def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], 
             own = depths.get(task.name)
             yield (
                 task,
-                (task.tolerance.position, task.tolerance.orientation),
+                (task.tolerance.position_mm.si, task.tolerance.orientation_deg.si),
                 None if own is None else own.limit - own.depth,
             )
     cell = phase.scene.cell

@@ -167,7 +167,7 @@ def _tools(scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tup
         task = scheduled.task
         if task.relative_to is not Frame.PART or {task.robot, carrier} not in apart:
             continue
-        limits = task.tolerance.position, task.tolerance.orientation
+        limits = task.tolerance.position_mm.si, task.tolerance.orientation_deg.si
         first = task.first_judged(times)
         tool = shifted(relation=task, mover=movers[task.robot], desired=scheduled.X_PT, limits=limits, first=first)
         depth = by_task.get(task.name)

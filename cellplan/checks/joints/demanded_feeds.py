@@ -13,7 +13,8 @@ from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.process_times import kept_rests, process_span
 from cellplan.model.report import Check
-from cellplan.model.task import TIME_TOLERANCE, Process, Task
+from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
 
@@ -49,9 +50,9 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
                 yield _check_delay(path.task, process, key, (begin, end - begin), step=schedule.step)
 
 
-def _check_delay(task: Task, process: Process, key: str, took: tuple[float, float], *, step: float) -> Check:
+def _check_delay(task: Task, process: ProcessEntry, key: str, took: tuple[float, float], *, step: float) -> Check:
     """The begin of a delay and the time that it takes in a retimed program, in [s]: at most what its rate allows."""
-    asked = process.on_delay if key == "on_delay" else process.off_delay
+    asked = process.on_delay_s if key == "on_delay" else process.off_delay_s
     limit = asked / (1.0 - process.tolerance) + step
     return Check(
         name=f"process_{key}",
@@ -62,7 +63,7 @@ def _check_delay(task: Task, process: Process, key: str, took: tuple[float, floa
         unit="s",
         at_s=took[0],
         message=f"{key}_s of task '{task.name}': {took[1]:.4g} s at {took[0]:.3f} s, demanded {asked:g} s within "
-        f"{PERCENT * process.tolerance:g} % and a step",
+        f"{process.tolerance_percent:g} % and a step",
     )
 
 
@@ -97,17 +98,17 @@ def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int
 
 
 def _check(
-    cell: Cell, scheduled: TaskSchedule, process: Process, *, times: Array, speeds: Array, q: Mapping[str, Array]
+    cell: Cell, scheduled: TaskSchedule, process: ProcessEntry, *, times: Array, speeds: Array, q: Mapping[str, Array]
 ) -> Check:
     """The largest difference of the speed from the feed, as a share of the feed."""
-    task, off = scheduled.task, speeds / process.feed - 1.0
+    task, off = scheduled.task, speeds / process.feed_mm_s.si - 1.0
     demanded = np.zeros(len(speeds), dtype=bool)
     for begin, end in scheduled.demanded:
         demanded |= (times[:-1] >= begin - TIME_TOLERANCE) & (times[1:] <= end + TIME_TOLERANCE)
     moves = (times[1:] > scheduled.begin + TIME_TOLERANCE) & (times[:-1] < scheduled.end - TIME_TOLERANCE)
     off = np.where(demanded, np.abs(off), np.where(moves, off, 0.0))
     worst, of = int(np.argmax(off)), f"feed of task '{task.name}'"
-    limit = f"demanded {MM * process.feed:g} mm/s within {PERCENT * process.tolerance:g} %"
+    limit = f"demanded {process.feed_mm_s:g} mm/s within {process.tolerance_percent:g} %"
     passed, value = bool(off[worst] <= process.tolerance), float(off[worst])
     message = (
         f"{of}: {MM * speeds[worst]:.4g} mm/s at {MM * scheduled.travelled[worst]:.4g} mm of its path, "
@@ -124,7 +125,7 @@ def _check(
         subject=task.name,
         passed=passed,
         value=PERCENT * value,
-        limit=PERCENT * process.tolerance,
+        limit=process.tolerance_percent,
         unit="%",
         at_s=float(times[worst]),
         message=message,

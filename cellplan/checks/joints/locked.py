@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.report import Check, TaskAccuracy
-from cellplan.model.task import Tolerance
+from cellplan.model.settings.task import ToleranceEntry
 
 STANDSTILL_TOL: Final = (
     1e-9  # [deg] or [mm] by which a joint that stands still may differ: a thousand units in the tables
@@ -27,7 +27,12 @@ def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check
 
 
 def with_locked_joints(
-    checks: Iterable[Check], errors: TaskAccuracy, tolerance: Tolerance, *, times: Array, locked: Iterable[LockedJoint]
+    checks: Iterable[Check],
+    errors: TaskAccuracy,
+    tolerance: ToleranceEntry,
+    *,
+    times: Array,
+    locked: Iterable[LockedJoint],
 ) -> list[Check]:
     """Failed checks on the accuracy of one task, with the joints that had failed when its tool left the path.
 
@@ -37,8 +42,8 @@ def with_locked_joints(
         times: Times in [s], shape (N,).
         locked: Joints that fail.
     """
-    outside = np.linalg.norm(errors.position_error, axis=1) > tolerance.position
-    outside |= np.linalg.norm(errors.orientation_error, axis=1) > tolerance.orientation
+    outside = np.linalg.norm(errors.position_error, axis=1) > tolerance.position_mm.si
+    outside |= np.linalg.norm(errors.orientation_error, axis=1) > tolerance.orientation_deg.si
     if not outside.any():
         return list(checks)
     left = float(times[np.argmax(outside)])

@@ -25,8 +25,8 @@ def worst_share(cell: Cell, accuracy: Sequence[TaskAccuracy], judged_from: Mappi
     for errors in accuracy:
         tolerance, first = cell.task(errors.task).tolerance, judged_from[errors.task]
         for error, allowed in (
-            (largest(errors.position_error, first), tolerance.position),
-            (largest(errors.orientation_error, first), tolerance.orientation),
+            (largest(errors.position_error, first), tolerance.position_mm.si),
+            (largest(errors.orientation_error, first), tolerance.orientation_deg.si),
         ):
             shares.append(error / allowed if allowed > 0.0 else np.inf if error > 0.0 else 0.0)
     return max(shares)
@@ -50,7 +50,7 @@ def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
     )
     trial, sample = np.unravel_index(int(np.argmax(series)), series.shape)
     value, at_s = scale * float(series[trial, sample]), float(run.times[first + sample])
-    limit = scale * (task.tolerance.position, task.tolerance.orientation)[kind]
+    limit = scale * (task.tolerance.position_mm.si, task.tolerance.orientation_deg.si)[kind]
     after = " after correction" if run.trials[0].correction is not None else ""
     which = f" in trial {trial + 1} of {len(errors)}" if len(errors) > 1 else ""
     return Check(

@@ -10,7 +10,7 @@ from cellplan.model.between_rows import BetweenError
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy
-from cellplan.model.task import Tolerance
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.scene.scene import Scene
 
@@ -47,7 +47,7 @@ def check_between_rows(
     )
 
 
-def check_task_between(errors: TaskAccuracy, tolerance: Tolerance) -> tuple[Check, ...]:
+def check_task_between(errors: TaskAccuracy, tolerance: ToleranceEntry) -> tuple[Check, ...]:
     """Position and orientation error of one task between the rows against its tolerance."""
     if errors.between is None:
         return ()

@@ -23,13 +23,11 @@ from cellplan.io.schema.path import PathEntry, PolylineEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.task import (
     BlendEntry,
-    ProcessEntry,
     TaskEntry,
-    ToleranceEntry,
     TrapezoidEntry,
 )
 from cellplan.io.schema.tool import OF_ROD
-from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape, pose_from_entry
+from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape
 from cellplan.model.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing
 from cellplan.model.origin import Origin
 from cellplan.model.robot import RobotModel
@@ -41,7 +39,6 @@ from cellplan.model.task import (
     PathSpec,
     PlaneName,
     PolygonPath,
-    Process,
     RunDirection,
     SampledPath,
     SpacePolylinePath,
@@ -50,7 +47,6 @@ from cellplan.model.task import (
     TimedPath,
     TimeLaw,
     TimeLawKind,
-    Tolerance,
 )
 
 COMPONENTS: Final = ("x", "y", "z", "rx", "ry", "rz")
@@ -74,7 +70,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
     return Robot(
         name=name,
         model=replace(model, bodies=(*rail_bodies(entry, read_mesh), *model.bodies)),
-        X_WB=pose_from_entry(entry.base),
+        X_WB=entry.base.matrix,
         tool=build_tool(entry.tool, read_mesh),
         start=start,
         path=path,
@@ -100,14 +96,14 @@ def build_part(document: CellDocument, models: Mapping[str, RobotModel], read_me
         held_by=tuple(
             Grasp(
                 robot=grasp.robot,
-                X_PT=pose_from_entry(grasp.at),
+                X_PT=grasp.at.matrix,
                 axes=_axis_numbers(grasp.axes),
                 depth=grasp.depth_mm.si,
                 bodies=grip_bodies(grasp.grip_bodies, grasp.robot, document.robots[grasp.robot], models[grasp.robot]),
             )
             for grasp in entry.held_by
         ),
-        X_WP=None if entry.at is None else pose_from_entry(entry.at),
+        X_WP=None if entry.at is None else entry.at.matrix,
         mass=entry.mass_kg,
         centre=None if entry.centre_mm is None else in_si(entry.centre_mm),
     )
@@ -126,7 +122,7 @@ def build_task(
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
-    process = _process(entry.process)
+    process = entry.process
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     corners = entry.corners or motion.corners
     return Task(
@@ -141,10 +137,10 @@ def build_task(
         turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
-        tolerance=_tolerance(entry.tolerance),
+        tolerance=entry.tolerance,
         start=entry.begins_s,
         duration=entry.duration_s,
-        feed=si_or_none(entry.feed_mm_s) if process is None else process.feed,
+        feed=si_or_none(entry.feed_mm_s) if process is None else process.feed_mm_s.si,
         time_law=law,
         blend=corners.blend_mm.si if isinstance(corners, BlendEntry) else None,
         settle=entry.settle_s,
@@ -167,19 +163,6 @@ def build_task(
 def _posture(given: Given, models: Mapping[str, RobotModel], *robots: str) -> Array | None:
     """A configuration of the first of some robots in [rad] or [m]; None when it is not given."""
     return None if given is None else configuration_in_si(models[robots[0]], given)
-
-
-def _process(entry: ProcessEntry | None) -> Process | None:
-    """A process with its feed in [m/s]."""
-    if entry is None:
-        return None
-    return Process(
-        feed=entry.feed_mm_s.si,
-        tolerance=entry.tolerance_percent / 100.0,
-        on_delay=entry.on_delay_s,
-        off_delay=entry.off_delay_s,
-        ramp=entry.ramp_s,
-    )
 
 
 def _straight_move(distance: Mm, duration: float) -> StraightMove | None:
@@ -210,16 +193,6 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
     normal = PLANE_NORMAL[(shape.plane if shape else None) or "xy"]
     is_default = "tool_x" not in entry.model_fields_set
     return f"-{normal}", "+y" if is_default and normal == "x" else entry.tool_x
-
-
-def _tolerance(entry: ToleranceEntry) -> Tolerance:
-    """Allowed tool errors in [m] and [rad]."""
-    return Tolerance(
-        position=entry.position_mm.si,
-        orientation=entry.orientation_deg.si,
-        position_between=(entry.between_rows_mm or entry.position_mm).si,
-        orientation_between=(entry.between_rows_deg or entry.orientation_deg).si,
-    )
 
 
 def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from cellplan.io.cell.layout_ties import Ties
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.layout import KeepOutEntry, LayoutEntry
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.io.shapes import pose_from_entry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.layout import Choice, KeepOut, LayoutSettings, Misplacement, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
@@ -180,6 +179,6 @@ def _floor(entry: LayoutEntry) -> Array | None:
 def _keep_out(name: str, entry: KeepOutEntry) -> KeepOut:
     """An area without bases, one metre high."""
     if entry.cylinder is not None:
-        return KeepOut(name=name, shape=Cylinder(entry.cylinder.radius_mm.si, 1.0), X_WS=pose_from_entry(entry.at))
+        return KeepOut(name=name, shape=Cylinder(entry.cylinder.radius_mm.si, 1.0), X_WS=entry.at.matrix)
     x, y = (size.si for size in entry.box.size_mm[:2]) if entry.box is not None else (0.0, 0.0)
-    return KeepOut(name=name, shape=Box((x, y, 1.0)), X_WS=pose_from_entry(entry.at))
+    return KeepOut(name=name, shape=Box((x, y, 1.0)), X_WS=entry.at.matrix)

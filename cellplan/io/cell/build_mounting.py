@@ -18,7 +18,7 @@ from cellplan.io.schema.mounting import (
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import MOUNTS, RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
-from cellplan.io.shapes import MeshReader, centred_solid, direction, pose_from_entry
+from cellplan.io.shapes import MeshReader, centred_solid, direction
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.mounting import Bracket, Hanger, Mount, Pedestal, Wedge
 from cellplan.model.rail import on_rail
@@ -103,7 +103,7 @@ def rail_bodies(entry: RobotEntry, read_mesh: MeshReader) -> Iterator[Body]:
     """Solids of the rail of a robot, taken as exact like all that a cell draws."""
     for key, index, solid in rail_entries(entry):
         shape, X_AS = centred_solid(solid, read_mesh)
-        name, X_BS = _rail_body_name(key, index), pose_from_entry(solid.at) @ X_AS
+        name, X_BS = _rail_body_name(key, index), solid.at.matrix @ X_AS
         yield Body(name=name, link=RAIL_LINKS[key], shape=shape, X_BS=X_BS, accuracy=0.0)
 
 
@@ -129,7 +129,7 @@ def build_attachments(entries: Iterable[AttachmentEntry], model: RobotModel, rea
     for name, entry in zip(attachment_names(entries), entries, strict=True):
         link = links[entry.link]
         solid, X_AS = centred_solid(entry, read_mesh)
-        X_BS = link.X_BL @ pose_from_entry(entry.at) @ X_AS
+        X_BS = link.X_BL @ entry.at.matrix @ X_AS
         bodies.append(Body(name=name, link=link.index, shape=solid, X_BS=X_BS))
     return tuple(bodies)
 
@@ -233,14 +233,14 @@ def _floor_findings(
         yield document.finding(path if pedestal.floor_z_mm is None else (*path, "floor_z_mm"), text)
     elif path[-2:] == TILTED:
         wedge = build_mount(entry, valid.environment)
-        if wedge is not None and wedge.solid(pose_from_entry(entry.base)) is None:
+        if wedge is not None and wedge.solid(entry.base.matrix) is None:
             text = "expected a column that ends above the floor on all sides, got one that is too wide for its height"
             yield document.finding(path, text)
 
 
 def _lean_findings(path: KeyPath, entry: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
     """A base stands upright on a pedestal, hangs upside down, and leans on a tilted mount."""
-    lean = math.degrees(math.acos(min(1.0, max(-1.0, float(pose_from_entry(entry.base)[2, 2])))))
+    lean = math.degrees(math.acos(min(1.0, max(-1.0, float(entry.base.matrix[2, 2])))))
     if path[-1] == "hanging" and 180.0 - lean > MOST_LEAN_DEG:
         text = f"expected a base upside down, such as rpy_deg: [180, 0, 0], got one that leans by {lean:.4g} deg"
         yield document.finding(path, text)

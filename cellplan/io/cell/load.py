@@ -21,7 +21,6 @@ from cellplan.io.cell.build_controllers import build_controllers, control_findin
 from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_layout import read_layout
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
-from cellplan.io.cell.build_program import build_program
 from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
@@ -271,7 +270,7 @@ def _cell(
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),
-        program=build_program(whole.program),
+        program=whole.program,
         controllers=build_controllers(whole),
     )
 

@@ -23,7 +23,7 @@ from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS
 from cellplan.io.schema.robot_table import BodiesEntry, JointEntry, ReachEntry
-from cellplan.io.shapes import link_solid, pose_from_entry
+from cellplan.io.shapes import link_solid
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, PublishedReach, RobotModel
 from cellplan.model.settings.units import in_si, si_or_none
@@ -165,7 +165,7 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
         source=table.source,
         joints=joints,
         flange_link=len(table.joints) - 1,
-        X_BF=pose_from_entry(table.flange),
+        X_BF=table.flange.matrix,
         bodies=bodies,
         body_accuracy=_body_accuracy(table),
         payload=build_payload(table.payload),

@@ -7,12 +7,10 @@ from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
 from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
-from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import (
-    LONGEST_S,
     CornerChoice,
     Seconds,
     TaskAxis,
@@ -31,6 +29,8 @@ from cellplan.model.settings.entry import (
     require_each_once,
     rule,
 )
+from cellplan.model.settings.program import ProgramEntry
+from cellplan.model.settings.task import LONGEST_S
 from cellplan.model.settings.units import Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1

@@ -17,13 +17,13 @@ from cellplan.io.schema.cell import (
 from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
-from cellplan.io.schema.program import ProgramEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.program import ProgramEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,8 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
 from pydantic_core import PydanticCustomError
 
-from cellplan.model.settings.units import Deg, Mm, MmPerS, Within
+from cellplan.geometry.transforms import Array, pose
+from cellplan.model.settings.units import Deg, Mm, MmPerS, Within, in_si
 
 NAME_PATTERN: Final = "^[A-Za-z0-9_][A-Za-z0-9_-]{0,39}$"
 NAME_WORDS: Final = "a name of 1 to 40 letters, digits, '_' or '-' that does not start with '-'"
@@ -135,3 +136,8 @@ class PoseEntry(Entry):
         default=NOT_TURNED,
         description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll), as in URDF.",
     )
+
+    @property
+    def matrix(self) -> Array:
+        """The pose in [m] and [rad], shape (4, 4)."""
+        return pose(in_si(self.xyz_mm), in_si(self.rpy_deg))

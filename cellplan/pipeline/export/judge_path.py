@@ -192,7 +192,7 @@ def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple
     """Errors at the rows of the run, where the cell demands more of them than of what lies between."""
     task: Task = given.task
     tolerance = task.tolerance
-    if tolerance.between == (tolerance.position, tolerance.orientation) or not np.any(rows.is_row):
+    if tolerance.between == (tolerance.position_mm.si, tolerance.orientation_deg.si) or not np.any(rows.is_row):
         return ()
     at_rows = replace(
         errors,

@@ -15,7 +15,7 @@ from cellplan.collision.separation import heights
 from cellplan.errors import HomeNotFoundError, InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.program import PartPlace
+from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.units import MM
 from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
@@ -58,16 +58,16 @@ def refuse_hanging_parts(scenes: StageScenes) -> None:
         InputError: With the body and the distance.
     """
     for key, place, scene in _places(scenes):
-        gaps = {} if place.is_clamped else _gaps(scene)
+        gaps = {} if place.clamped else _gaps(scene)
         where = scenes.cell.origin.at(f"program.{key}.rests_on")
         cure = "move the place or the body, or state clamped: true for a nest, magnet or hook that holds it"
         for name in place.supports if gaps else ():
-            if gaps[name] > place.rest_gap + GAP_TOL:
+            if gaps[name] > place.rest_gap_mm.si + GAP_TOL:
                 raise InputError(
                     f"{where}: expected a part that touches '{name}' where it lies, within rest_gap_mm = "
-                    f"{MM * place.rest_gap:g}, got one {MM * gaps[name]:.4g} mm away, which would fall: {cure}"
+                    f"{place.rest_gap_mm:g}, got one {MM * gaps[name]:.4g} mm away, which would fall: {cure}"
                 )
-        if not place.is_clamped and not place.supports and min(gaps.values(), default=np.inf) > place.rest_gap:
+        if not place.clamped and not place.supports and min(gaps.values(), default=np.inf) > place.rest_gap_mm.si:
             nearest = min(gaps, key=lambda name: gaps[name], default="")
             got = f"'{nearest}', the nearest, {MM * gaps[nearest]:.4g} mm away" if nearest else "no surroundings"
             raise InputError(
@@ -76,7 +76,7 @@ def refuse_hanging_parts(scenes: StageScenes) -> None:
             )
 
 
-def _places(scenes: StageScenes) -> Iterator[tuple[str, PartPlace, Scene]]:
+def _places(scenes: StageScenes) -> Iterator[tuple[str, PartPlaceEntry, Scene]]:
     """Places at which the part lies, with their keys and the scene there."""
     program = scenes.cell.program
     for key, place in {} if program is None else {"attach": program.attach, "detach": program.detach}.items():

@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from cellplan.geometry.transforms import rpy_from_rotation
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.robot import Joint
@@ -71,6 +69,6 @@ def _task_row(task: Task) -> Row:
         "duration_s": number(task.duration),
         "feed_mm_s": None if task.feed is None else number(MM * task.feed),
         "repeat": task.repeat,
-        "position_tolerance_mm": number(MM * task.tolerance.position),
-        "orientation_tolerance_deg": number(float(np.rad2deg(task.tolerance.orientation))),
+        "position_tolerance_mm": number(task.tolerance.position_mm),
+        "orientation_tolerance_deg": number(task.tolerance.orientation_deg),
     }

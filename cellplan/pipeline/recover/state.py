@@ -15,8 +15,8 @@ from cellplan.io.input.findings import listed
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Motion
 from cellplan.model.phase import Phase
-from cellplan.model.program import PartPlace
 from cellplan.model.robot import BASE, Body
+from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.task import Frame
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.planning.sequence.scenes import StageScenes
@@ -71,11 +71,11 @@ class RunPlaces:
         begins = [float(self.motion.times[self.rows(place).start]) for place in range(len(self.phases))]
         return max(0, int(np.searchsorted(begins, time + END, side="right")) - 1)
 
-    def lying_at(self, place: int) -> PartPlace | None:
+    def lying_at(self, place: int) -> PartPlaceEntry | None:
         """Where the part lies in a phase; None while it is held, or fixed anyway."""
         return self.stages[place % len(self.stages)].place if self.stages else None
 
-    def scene_while_stopped(self, lying: PartPlace | None) -> Scene:
+    def scene_while_stopped(self, lying: PartPlaceEntry | None) -> Scene:
         """The scene of a recovery: the full distance is demanded of all pairs."""
         scene = self.tipped.held if lying is None else self.tipped.with_part_at(lying)
         cell = replace(scene.cell, motion=self.cell.motion)
@@ -108,7 +108,7 @@ class StoppedState:
     kept: tuple[str, ...]
     q: Array
     place: int
-    lying: PartPlace | None
+    lying: PartPlaceEntry | None
 
     @property
     def is_on_program(self) -> bool:

@@ -66,8 +66,8 @@ def _tasks_record(cell: Cell, run: RunRehearsal) -> Record:
             "robot": task.robot,
             "run": run.name,
             "tolerance": {
-                "position_mm": number(1e3 * task.tolerance.position),
-                "orientation_deg": number(math.degrees(task.tolerance.orientation)),
+                "position_mm": number(task.tolerance.position_mm),
+                "orientation_deg": number(task.tolerance.orientation_deg),
             },
             "axes": [AXES[index] for index in task.axes],
             "judged_from_s": number(float(run.times[run.judged_from[task.name]])),

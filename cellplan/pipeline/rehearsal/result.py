@@ -124,8 +124,9 @@ def _execution_figures(cell: Cell, run: RunRehearsal, place: int, *, name: str, 
     worst = selected[int(np.argmax(largest))][1]
     several = f" (worst of {len(selected)} trials)" if len(selected) > 1 else ""
     title = f"{task.name} ({task.robot}): true tool error on the part, {TITLES[name]}{several}"
-    panels = error_panels(run.times, worst.position_error, allowed=task.tolerance.position, kind=POSITION)
-    panels += error_panels(run.times, worst.orientation_error, allowed=task.tolerance.orientation, kind=ORIENTATION)
+    allowed = task.tolerance
+    panels = error_panels(run.times, worst.position_error, allowed=allowed.position_mm.si, kind=POSITION)
+    panels += error_panels(run.times, worst.orientation_error, allowed=allowed.orientation_deg.si, kind=ORIENTATION)
     figures = {f"{name}_{task.name}": Figure(title=title, x=time_axis(run.times), panels=panels, columns=2)}
     if len(selected) > 1:
         figures |= _envelope_figures(run, [errors for _, errors in selected], name=name)
@@ -170,8 +171,8 @@ def _round_figures(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Figure
         title=f"{task}: largest true error by correction round",
         x=Axis(low=0.0, high=longest - 1.0, label="round"),
         panels=[
-            _rounds(position, title="position error", unit="mm", allowed=1e3 * tolerance.position),
-            _rounds(orientation, title="orientation error", unit="deg", allowed=math.degrees(tolerance.orientation)),
+            _rounds(position, title="position error", unit="mm", allowed=tolerance.position_mm),
+            _rounds(orientation, title="orientation error", unit="deg", allowed=tolerance.orientation_deg),
         ],
         columns=2,
     )

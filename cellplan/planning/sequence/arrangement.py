@@ -109,7 +109,7 @@ def _require_names(cell: Cell) -> None:
         InputError: The first of them.
     """
     operators = {task.name: task.robot for task in cell.tasks}
-    marks = [mark.name for mark in cell.program.marks] if cell.program is not None else []
+    marks = [mark.name for mark in cell.program.all_marks] if cell.program is not None else []
     for robot in cell.robots:
         for index, text in order_faults(robot.name, robot.order, operators, marks) if robot.order else ():
             place = f"robots.{robot.name}.order" if index is None else f"robots.{robot.name}.order[{index}]"

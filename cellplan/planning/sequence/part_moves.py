@@ -3,7 +3,6 @@
 Each of them is a task of the holder in the world, its tool upright to itself: the part lies where the cell says.
 """
 
-import math
 from dataclasses import replace
 from enum import StrEnum
 from typing import Final
@@ -12,13 +11,13 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
-from cellplan.model.program import PartPlace
-from cellplan.model.task import Frame, SampledPath, Task, TimeLaw, TimeLawKind, Tolerance
+from cellplan.model.settings.program import PartPlaceEntry
+from cellplan.model.settings.task import ToleranceEntry
+from cellplan.model.task import Frame, SampledPath, Task, TimeLaw, TimeLawKind
 from cellplan.model.time_law import peak_rate
 
 PEAK_SPEED: Final = 0.1  # [m/s] of the tool near a part that is gripped or put down: slow
 QUINTIC: Final = TimeLaw(kind=TimeLawKind.QUINTIC)
-TOLERANCE: Final = Tolerance(position=1e-4, orientation=math.radians(0.01))
 ALL_AXES: Final = (0, 1, 2, 3, 4, 5)
 
 
@@ -36,12 +35,12 @@ class PartMove(StrEnum):
         return f"part@{self.value}"
 
 
-def part_lying(cell: Cell, place: PartPlace) -> Cell:
+def part_lying(cell: Cell, place: PartPlaceEntry) -> Cell:
     """The cell while its part lies in it, held by no robot."""
     return replace(cell, tasks=(), part=replace(cell.part, held_by=(), X_WP=place.X_WP))
 
 
-def with_move(cell: Cell, move: PartMove, place: PartPlace, holder: str) -> Cell:
+def with_move(cell: Cell, move: PartMove, place: PartPlaceEntry, holder: str) -> Cell:
     """The cell with a straight move of the holder as its only task.
 
     Gripping and letting go are straight along the axis of the holder's tool; lifting and lowering are vertical.
@@ -56,7 +55,7 @@ def with_move(cell: Cell, move: PartMove, place: PartPlace, holder: str) -> Cell
     at = place.X_WP @ grasp.X_PT
     up = np.array([0.0, 0.0, 1.0])
     away = {PartMove.GRIP: -at[:3, 2], PartMove.RELEASE: -at[:3, 2]}.get(move, up)
-    length = place.approach if move in (PartMove.GRIP, PartMove.RELEASE) else place.lift
+    length = (place.approach_mm if move in (PartMove.GRIP, PartMove.RELEASE) else place.lift_mm).si
     ends = np.stack([at[:3, 3] + length * away, at[:3, 3]])
     if move in (PartMove.LIFT, PartMove.RELEASE):
         ends = ends[::-1]
@@ -82,7 +81,7 @@ def _task(move: PartMove, robot: str, ends: Array, R: Array) -> Task:
         turn=0.0,
         axes=ALL_AXES,
         is_spin_free=False,
-        tolerance=TOLERANCE,
+        tolerance=ToleranceEntry(),
         start=0.0,
         duration=float(np.ceil(100.0 * peak_rate(QUINTIC) * length / PEAK_SPEED) / 100.0),
         feed=None,

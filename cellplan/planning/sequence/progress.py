@@ -20,7 +20,7 @@ class SequenceProgress:
         self.cell = cell
         self._sequences = {robot.name: sequence_of(cell, robot.name) for robot in cell.robots}
         self._places = dict.fromkeys(self._sequences, 0)
-        self._dwells = {mark.name: mark.dwell for mark in cell.program.marks} if cell.program is not None else {}
+        self._dwells = {mark.name: mark.dwell_s for mark in cell.program.all_marks} if cell.program is not None else {}
         self._robots_of = {
             mark: [robot for robot, sequence in self._sequences.items() if mark in sequence] for mark in self._dwells
         }

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from cellplan.model.cell import Cell
-from cellplan.model.program import PartPlace
+from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.planning.sequence.part_moves import PartMove, part_lying
 from cellplan.planning.sequence.stages import Stage
 from cellplan.scene.part_contact import PartContact
@@ -39,7 +39,7 @@ class StageScenes:
         contact = PartContact(key=f"program.{key}", place=place, grasp=grasp, is_lying=is_lying)
         return contact.with_contacts(scene)
 
-    def with_part_at(self, place: PartPlace) -> Scene:
+    def with_part_at(self, place: PartPlaceEntry) -> Scene:
         """The scene with the part lying at a place."""
         key = place.X_WP.tobytes()
         if key not in self.lying:

@@ -10,7 +10,7 @@ from typing import Final
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Mode, Robot
 from cellplan.model.phase import Hold, Phase, Role, Transfer
-from cellplan.model.program import PartPlace, ProgramSettings
+from cellplan.model.settings.program import PartPlaceEntry, ProgramEntry
 from cellplan.model.task import Task
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.sequence.arrangement import Block, arrange
@@ -26,7 +26,7 @@ class Stage:
 
     phase: Phase  # the phase, not yet on a clock
     cell: Cell  # the cell with the tasks of the phase only, the starts of their robots, and the part where it is
-    place: PartPlace | None = None  # where the part lies; None while it is held, or fixed anyway
+    place: PartPlaceEntry | None = None  # where the part lies; None while it is held, or fixed anyway
     move: PartMove | None = None  # the straight move that grips or puts down the part; None in all other stages
     dwell: float | None = None  # time in [s] for which all robots stand; None for a motion
 
@@ -91,19 +91,19 @@ def _without_tasks(cell: Cell) -> Cell:
     return replace(cell, tasks=(), motion=replace(cell.motion, cyclic=False))
 
 
-def _picked_up(cell: Cell, program: ProgramSettings) -> Iterator[Stage]:
+def _picked_up(cell: Cell, program: ProgramEntry) -> Iterator[Stage]:
     if program.attach is not None:
         yield _straight(cell, PartMove.GRIP, program.attach)
         yield _straight(cell, PartMove.LIFT, program.attach)
 
 
-def _put_down(cell: Cell, program: ProgramSettings) -> Iterator[Stage]:
+def _put_down(cell: Cell, program: ProgramEntry) -> Iterator[Stage]:
     if program.detach is not None:
         yield _straight(cell, PartMove.LOWER, program.detach)
         yield _straight(cell, PartMove.RELEASE, program.detach)
 
 
-def _straight(cell: Cell, move: PartMove, place: PartPlace) -> Stage:
+def _straight(cell: Cell, move: PartMove, place: PartPlaceEntry) -> Stage:
     """A straight move of the holder; all others stand at their homes."""
     robots = tuple(replace(robot, start=robot.home if robot.home is not None else robot.start) for robot in cell.robots)
     holder = cell.positioners[0]
@@ -147,7 +147,7 @@ def _with_start(robots: Sequence[Robot], name: str, start: Array | None) -> tupl
     return tuple(replace(robot, start=start) if robot.name == name else robot for robot in robots)
 
 
-def _with_transfers(cell: Cell, program: ProgramSettings, between: Sequence[Stage]) -> Iterator[Stage]:
+def _with_transfers(cell: Cell, program: ProgramEntry, between: Sequence[Stage]) -> Iterator[Stage]:
     """The stages with transfer moves from home to the first, from each to the next and from the last to home."""
     yield _transfer(cell, None, between[0], name="transfer-1", place=program.attach)
     number = 1
@@ -160,7 +160,9 @@ def _with_transfers(cell: Cell, program: ProgramSettings, between: Sequence[Stag
         yield _transfer(cell, before, after, name=f"transfer-{number}", place=place)
 
 
-def _transfer(cell: Cell, before: Stage | None, after: Stage | None, *, name: str, place: PartPlace | None) -> Stage:
+def _transfer(
+    cell: Cell, before: Stage | None, after: Stage | None, *, name: str, place: PartPlaceEntry | None
+) -> Stage:
     """Transfer moves between two stages, of all robots that are at work in one of them; the others are at home."""
     at_work = {robot for stage in (before, after) if stage is not None for robot in _at_work(stage)}
     to = HOME if after is None else after.phase.name

@@ -122,7 +122,7 @@ def _allowed(cell: Cell, relation: Relation) -> tuple[float, float]:
     """Largest distance in [m] and angle in [rad] of a given start from its task or grasp."""
     if isinstance(relation, Grasp):
         return cell.checks.closure_mm.si, cell.checks.closure_deg.si
-    return relation.tolerance.position, relation.tolerance.orientation
+    return relation.tolerance.position_mm.si, relation.tolerance.orientation_deg.si
 
 
 def _outside(cell: Cell, robot: Robot) -> list[InputError]:

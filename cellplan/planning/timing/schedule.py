@@ -15,7 +15,8 @@ from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.process_times import demanded_spans, leaves_at, ramp_shares
-from cellplan.model.task import TIME_TOLERANCE, Process, Task
+from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.task import TIME_TOLERANCE, Task
 from cellplan.model.time_law import peak_rate, reached_at
 from cellplan.model.toolpath import Toolpath
 from cellplan.model.units import MM
@@ -259,16 +260,16 @@ def _corner_times(cell: Cell, task: Task, toolpath: Toolpath) -> Array:
     return task.start + duration * (behind / behind[-1])
 
 
-def _at_feed(task: Task, process: Process, behind: Array) -> Array:
+def _at_feed(task: Task, process: ProcessEntry, behind: Array) -> Array:
     """Times in [s] of the stops of a path with a demanded feed: a ramp takes half of its time for its length."""
-    lengths, least = np.diff(behind), process.feed * process.ramp
+    lengths, least = np.diff(behind), process.feed_mm_s.si * process.ramp_s
     if lengths.min() < least:
         raise InputError(
-            f"{task.where('process.ramp_s')}: expected ramps that leave the feed of {MM * process.feed:g} mm/s some of "
-            f"each side, got {process.ramp:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
-            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed:.3g} s"
+            f"{task.where('process.ramp_s')}: expected ramps that leave the feed of {process.feed_mm_s:g} mm/s some of "
+            f"each side, got {process.ramp_s:g} s for one of {MM * lengths.min():.4g} mm; round the corners "
+            f"(corners: {{blend_mm: 5}}) or make it shorter than {lengths.min() / process.feed_mm_s.si:.3g} s"
         )
-    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed + process.ramp))
+    return task.moves_from + np.append(0.0, np.cumsum(lengths / process.feed_mm_s.si + process.ramp_s))
 
 
 def _stops(task: Task, toolpath: Toolpath) -> Array:

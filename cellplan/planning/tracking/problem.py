@@ -243,7 +243,7 @@ def _place(task: Relation) -> str:
 
 def _tolerance(cell: Cell, task: Relation) -> float:
     """Allowed distance of a tool from its path or its grasp in [m]."""
-    return cell.checks.closure_mm.si if isinstance(task, Grasp) else task.tolerance.position
+    return cell.checks.closure_mm.si if isinstance(task, Grasp) else task.tolerance.position_mm.si
 
 
 def _settled_from(task: Relation) -> float:

@@ -91,7 +91,7 @@ def _spans(phase: Record, robot: str, records: Record, tasks: Mapping[str, Task]
 def _work(task: Task, record: Record, begin: float, end: float) -> Iterator[Span]:
     """A task from the begin of its phase to the end, in [s]."""
     first, last = begin + record["start_s"], begin + record["end_s"]
-    moves = first + (task.process.on_delay if task.process else 0.0)
+    moves = first + (task.process.on_delay_s if task.process else 0.0)
     off, leaves = last + task.off_delay, last + task.off_delay + task.dwell
     yield Span("move" if task.approach else "rest", "approach" if task.approach else "waits", begin, first)
     yield Span("delay", "process on, tool at rest", first, moves)

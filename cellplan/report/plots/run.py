@@ -69,8 +69,8 @@ def _task_figure(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Figure:
     """Total and per-axis error of position and orientation."""
     tolerance = cell.task(accuracy.task).tolerance
     place = "on the part" if cell.task(accuracy.task).relative_to is Frame.PART else "in the world"
-    panels = error_panels(times, accuracy.position_error, allowed=tolerance.position, kind=POSITION)
-    panels += error_panels(times, accuracy.orientation_error, allowed=tolerance.orientation, kind=ORIENTATION)
+    panels = error_panels(times, accuracy.position_error, allowed=tolerance.position_mm.si, kind=POSITION)
+    panels += error_panels(times, accuracy.orientation_error, allowed=tolerance.orientation_deg.si, kind=ORIENTATION)
     title = f"{accuracy.task} ({accuracy.robot}): tool error {place}"
     return Figure(title=title, x=time_axis(times), panels=panels, columns=2)
 

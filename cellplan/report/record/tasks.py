@@ -179,8 +179,8 @@ def _phase_of(report: Report) -> PhaseOfTask:
 
 def _tolerance_record(task: Task, *, has_between: bool) -> ToleranceRecord:
     tolerance: ToleranceRecord = {
-        "position_mm": number(MM * task.tolerance.position),
-        "orientation_deg": number(DEG * task.tolerance.orientation),
+        "position_mm": number(task.tolerance.position_mm),
+        "orientation_deg": number(task.tolerance.orientation_deg),
     }
     if has_between:
         position, orientation = task.tolerance.between

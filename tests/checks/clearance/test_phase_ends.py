@@ -49,7 +49,7 @@ def worst_across(run: VerifiedRun, skew: float) -> float:
                             continue
                         X_PT = np.linalg.inv(X["holder"] @ motion.cell.part.X_CP) @ X["pen"]
                         off = np.linalg.norm(X_PT[:3, 3] - scheduled.X_PT[row, :3, 3])
-                        worst = max(worst, float(off) / scheduled.task.tolerance.position)
+                        worst = max(worst, float(off) / scheduled.task.tolerance.position_mm.si)
         assert after.begin == pytest.approx(before.end)
     return worst
 

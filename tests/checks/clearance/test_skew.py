@@ -17,8 +17,9 @@ from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Report, ToolDepth
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.skew import MOST_SKEW, SkewLimit, SkewReport
-from cellplan.model.task import Frame, Tolerance
+from cellplan.model.task import Frame
 from cellplan.report.text.skew import skew_notes
 from cellplan.scene.scene import Scene
 
@@ -38,7 +39,11 @@ def cell_of(
         placed("operator", block, base=pose((0.0, 0.5, 0.0))),
         placed("other", block, base=pose((0.0, 5.0, 0.0))),
     )
-    task = replace(work("operator"), tolerance=Tolerance(position=LIMIT, orientation=1e-3), tool_depth=1e-2)
+    task = replace(
+        work("operator"),
+        tolerance=ToleranceEntry(position_mm=1e3 * LIMIT, orientation_deg=np.degrees(1e-3)),
+        tool_depth=1e-2,
+    )
     return replace(
         make_cell(
             *(

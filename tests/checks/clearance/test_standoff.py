@@ -15,12 +15,13 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Tool
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, Standoff
-from cellplan.model.task import Frame, OffPart, Process, Task, Tolerance
+from cellplan.model.settings.task import ProcessEntry, ToleranceEntry
+from cellplan.model.task import Frame, OffPart, Task
 from cellplan.report.record.rests_on import unstated_standoffs
 
 PLATE = Box((0.2, 0.2, 0.02))
 DOWN = (np.pi, 0.0, 0.0)  # z of the tool points against z of the part
-WELD = Process(feed=0.01, tolerance=0.05, on_delay=0.0, off_delay=0.0, ramp=0.1)
+WELD = ProcessEntry(feed_mm_s=10.0)
 TOOL = Tool(
     X_FT=pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0)), bodies=(body("tool", 0, shape=Cylinder(0.003, 0.1), at=(0, 0, 0.05)),)
 )
@@ -30,7 +31,7 @@ def cell_with(part: Solid, **task: object) -> Cell:
     """A tool that looks down and slides up and down over a part whose frame is the world's."""
     model = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
     robot = placed("gun", model, base=pose((0.0, 0.0, 0.1), DOWN), tool=TOOL)
-    tolerance = Tolerance(position=1e-4, orientation=1e-3)
+    tolerance = ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-3))
     own: Task = replace(work("gun"), tolerance=tolerance, **task)
     return make_cell(robot, part=fixed_part(part, np.eye(4)), tasks=(own,))
 

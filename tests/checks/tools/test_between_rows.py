@@ -16,7 +16,7 @@ from cellplan.model.between_rows import BetweenRows
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Check
 from cellplan.model.robot import RobotModel
-from cellplan.model.task import Tolerance
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.scene.scene import Scene
 
 CELLS = Path(__file__).resolve().parents[3] / "cells"
@@ -56,7 +56,7 @@ class Known(Schedule):
 
 
 def looked(
-    turn: float, tolerance: Tolerance, corner: float = 0.0, jumps: tuple[float, ...] = ()
+    turn: float, tolerance: ToleranceEntry, corner: float = 0.0, jumps: tuple[float, ...] = ()
 ) -> tuple[BetweenRows, tuple[Check, ...]]:
     """The arm swings by ``turn`` in each step of 0.1 s, and is desired on the chords of its circle."""
     task = replace(work("arm"), axes=(0, 1, 2), tolerance=tolerance)
@@ -77,7 +77,7 @@ def looked(
 def test_an_arm_that_is_desired_on_chords_strays_by_the_height_of_its_arc(turn: float) -> None:
     sagitta = ARM * (1.0 - np.cos(0.5 * turn))
 
-    between, checks = looked(turn, Tolerance(position=10.0 * sagitta, orientation=1.0))
+    between, checks = looked(turn, ToleranceEntry(position_mm=1e3 * 10.0 * sagitta, orientation_deg=np.degrees(1.0)))
 
     assert between.position.largest == pytest.approx(sagitta, rel=1e-9)
     assert between.position.bound is not None
@@ -89,7 +89,7 @@ def test_an_arm_that_is_desired_on_chords_strays_by_the_height_of_its_arc(turn: 
 def test_a_step_that_is_too_long_fails_and_names_one_that_keeps_the_tolerance() -> None:
     allowed = 1e-4
 
-    between, checks = looked(0.1, Tolerance(position=allowed, orientation=1.0))
+    between, checks = looked(0.1, ToleranceEntry(position_mm=1e3 * allowed, orientation_deg=np.degrees(1.0)))
 
     step = between.position.longest_step
     assert step is not None
@@ -104,14 +104,14 @@ def test_a_step_that_is_too_long_fails_and_names_one_that_keeps_the_tolerance() 
 
 
 def test_what_is_allowed_between_the_rows_may_differ_from_what_is_at_them() -> None:
-    _, checks = looked(0.1, Tolerance(position=1e-4, orientation=1.0, position_between=2e-3))
+    _, checks = looked(0.1, ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1.0), between_rows_mm=2.0))
     assert all(check.passed for check in checks)
-    _, checks = looked(0.1, Tolerance(position=1e-2, orientation=1.0, position_between=2e-4))
+    _, checks = looked(0.1, ToleranceEntry(position_mm=10.0, orientation_deg=np.degrees(1.0), between_rows_mm=0.2))
     assert not all(check.passed for check in checks)
 
 
 def test_a_corner_within_a_step_is_found_and_shrinks_with_the_step_itself() -> None:
-    between, _ = looked(1e-4, Tolerance(position=1e-3, orientation=1.0), corner=4e-3)
+    between, _ = looked(1e-4, ToleranceEntry(position_mm=1.0, orientation_deg=np.degrees(1.0)), corner=4e-3)
 
     assert between.position.largest == pytest.approx(4e-3, rel=1e-3)
     assert between.position.at_s == pytest.approx(0.35)
@@ -120,7 +120,8 @@ def test_a_corner_within_a_step_is_found_and_shrinks_with_the_step_itself() -> N
 
 def test_a_corner_that_lies_on_a_row_by_chance_shortens_the_step_that_is_named() -> None:
     allowed, turn = 1e-4, 0.1
-    chance = looked(turn, Tolerance(position=allowed, orientation=1.0), jumps=(0.3,))[0].position.longest_step
+    tolerance = ToleranceEntry(position_mm=1e3 * allowed, orientation_deg=np.degrees(1.0))
+    chance = looked(turn, tolerance, jumps=(0.3,))[0].position.longest_step
     corner = ARM * np.sin(0.5 * turn) ** 2  # a quarter of a step and of the change between two chords
 
     assert chance is not None
@@ -129,7 +130,7 @@ def test_a_corner_that_lies_on_a_row_by_chance_shortens_the_step_that_is_named()
 
 def test_a_tool_that_stops_at_once_gets_a_step_of_which_the_duration_is_a_multiple() -> None:
     end = 0.1 * (ROWS - 1)
-    tolerance = Tolerance(position=1e-4, orientation=1.0)
+    tolerance = ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1.0))
 
     any_step = looked(0.1, tolerance)[0].position.longest_step
     fitting = looked(0.1, tolerance, jumps=(end,))[0].position.longest_step
@@ -142,7 +143,7 @@ def test_a_tool_that_stops_at_once_gets_a_step_of_which_the_duration_is_a_multip
 
 
 def test_a_corner_that_lies_on_a_row_by_chance_fails_no_step_that_keeps_what_is_allowed() -> None:
-    between, checks = looked(0.1, Tolerance(position=1.5e-3, orientation=1.0), jumps=(0.3,))
+    between, checks = looked(0.1, ToleranceEntry(position_mm=1.5, orientation_deg=np.degrees(1.0)), jumps=(0.3,))
 
     assert between.position.longest_step is None
     assert all(check.passed for check in checks)
@@ -155,7 +156,11 @@ def test_no_instant_is_worse_than_the_bound(seed: int) -> None:
     step = float(rng.choice([0.02, 0.05, 0.1]))
     cell = replace(cell, motion=replace(cell.motion, step=step), checks=cell.checks.changed(clearance_mm=0.0))
     cell = replace(
-        cell, tasks=tuple(replace(task, tolerance=Tolerance(position=1.0, orientation=3.0)) for task in cell.tasks)
+        cell,
+        tasks=tuple(
+            replace(task, tolerance=ToleranceEntry(position_mm=1000.0, orientation_deg=np.degrees(3.0)))
+            for task in cell.tasks
+        ),
     )
     (run,) = solve(cell).runs
     desired, report = run.schedule, run.report

@@ -12,7 +12,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
-from cellplan.model.task import Tolerance
+from cellplan.model.settings.task import ToleranceEntry
 
 RNG = np.random.default_rng(3)
 
@@ -46,7 +46,9 @@ def accuracy_at(scheduled, X_WT, X_WP):
 
 def scheduled_task(X_PT, **changes):
     n = len(X_PT)
-    task = make_task("arm", name="ring", tolerance=Tolerance(position=1e-4, orientation=1e-3), **changes)
+    task = make_task(
+        "arm", name="ring", tolerance=ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-3)), **changes
+    )
     return TaskSchedule(task=task, X_PT=X_PT, V_PT_P=np.zeros((n, 6)), travelled=np.zeros(n), length=1.0, end=1.0)
 
 

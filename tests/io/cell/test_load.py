@@ -53,7 +53,7 @@ def test_the_base_cell_is_read_in_metres_and_radians(load: Load) -> None:
     assert task.tool_axis is None
     assert (task.start, task.duration, task.feed, task.blend) == (0.0, None, None, None)
     assert task.axes == (0, 1, 2, 3, 4, 5)
-    assert task.tolerance.position == pytest.approx(1e-4)
+    assert task.tolerance.position_mm.si == pytest.approx(1e-4)
     assert cell.motion.mode is Mode.SIMULTANEOUS
     assert (cell.motion.duration, cell.motion.step) == (4.0, 0.001)
     assert (cell.solver.gain, cell.solver.damping, cell.solver.seed) == (500.0, None, 0)

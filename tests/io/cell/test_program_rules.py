@@ -10,7 +10,7 @@ import pytest
 from cellplan.io.cell.load import load_cell
 from cellplan.io.cell.write import render_cell
 from cellplan.model.cell import Cell, Mode
-from cellplan.model.program import Mark
+from cellplan.model.settings.program import MarkEntry
 from cellplan.model.task import StraightMove
 from cellplan.planning.sequence.only_task import with_only_task
 
@@ -218,7 +218,7 @@ def test_a_written_program_loads_to_the_same_program(load: Load, tmp_path: Path)
     for one in (cell, again):
         assert one.program is not None
         assert one.program.attach is not None
-        assert one.program.marks == (Mark(name="m1"), Mark(name="m2", dwell=0.5))
+        assert one.program.all_marks == (MarkEntry(name="m1"), MarkEntry(name="m2", dwell_s=0.5))
         assert (one.program.cycles, one.program.attach.rests_on, one.program.attach.lift) == (3, "floor", 0.07)
         np.testing.assert_allclose(one.program.attach.X_WP[:3, 3], [0.1, 0.0, 0.3333], rtol=1e-15)
         np.testing.assert_array_equal(one.tasks[1].start_posture, cell.tasks[1].start_posture)

@@ -12,13 +12,13 @@ from cellplan.errors import InputError
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell_errors import Amount, CellErrors, PoseAmounts, RobotErrors, Spread
 from cellplan.model.rehearsal import Outcome
+from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
-from cellplan.model.task import Tolerance
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 
-TOLERANCE = Tolerance(position=1e-4, orientation=np.deg2rad(0.01))
+TOLERANCE = ToleranceEntry(position_mm=0.1, orientation_deg=0.01)
 SMALL = CellErrors(
     robots={
         "left": RobotErrors(joint_offsets={"B": Amount(size=np.deg2rad(0.05))}),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell, Mode
 from cellplan.model.phase import Hold
-from cellplan.model.program import Mark, ProgramSettings
+from cellplan.model.settings.program import MarkEntry, ProgramEntry
 from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.stages import program_stages
 
@@ -38,7 +38,7 @@ def cell_of(
         robots=tuple(replace(robot, order=tuple(orders.get(robot.name, "").split())) for robot in CELL.robots),
         tasks=tasks,
         motion=replace(CELL.motion, mode=mode),
-        program=ProgramSettings(marks=tuple(Mark(name=name, dwell=dwell) for name, dwell in (marks or {}).items())),
+        program=ProgramEntry(marks=tuple(MarkEntry(name=name, dwell_s=dwell) for name, dwell in (marks or {}).items())),
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from cellplan.model.check_kinds import CHECK_KINDS
 from cellplan.model.report import Check
-from cellplan.model.task import Process
+from cellplan.model.settings.task import ProcessEntry
 from cellplan.report.page.checks import MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
 from cellplan.report.page.render import report_page
@@ -79,7 +79,7 @@ def test_the_worst_instant_is_that_of_the_closest_pair_unless_a_check_fails(pass
 
 
 def test_a_demanded_feed_stands_beside_the_speed_and_a_missed_one_comes_first(passed_run: Any) -> None:
-    process = Process(feed=0.04, tolerance=0.05)
+    process = ProcessEntry(feed_mm_s=40.0)
     tasks = tuple(
         replace(task, process=process) if task.name == "rectangle" else task for task in passed_run.cell.tasks
     )

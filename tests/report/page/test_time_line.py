@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from cellplan.model.phase import Carry, Hold, Phase, Transfer, Work
-from cellplan.model.task import Process, StraightMove
+from cellplan.model.settings.task import ProcessEntry
+from cellplan.model.task import StraightMove
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.record.run import run_record
 
@@ -17,7 +18,7 @@ OVER = {"process", "settle"}  # drawn over other spans
 def busy(passed_run: Any) -> Any:
     """A run of which one task has a process, a dwell and an approach, and begins late."""
     circle = next(task for task in passed_run.cell.tasks if task.name == "circle")
-    process = Process(feed=0.2, tolerance=0.05, on_delay=0.3, off_delay=0.2)
+    process = ProcessEntry(feed_mm_s=200.0, on_delay_s=0.3, off_delay_s=0.2)
     own = replace(circle, process=process, dwell=0.25, approach=StraightMove(distance=0.05, duration=0.5), settle=0.1)
     tasks = tuple(own if task is circle else task for task in passed_run.cell.tasks)
     accuracy = tuple(

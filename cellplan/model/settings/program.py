@@ -4,8 +4,9 @@ from typing import Annotated, Final
 
 from pydantic import Field, Tag
 
-from cellplan.io.schema.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
+from cellplan.geometry.transforms import Array
 from cellplan.model.settings.entry import Entry, Name, PoseEntry, by_kind
+from cellplan.model.settings.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
 from cellplan.model.settings.units import Mm, Within
 
 MARK_LIMIT: Final = 200
@@ -68,6 +69,11 @@ class PartPlaceEntry(Entry):
         default=Mm(50.0),
         description="Height over which the part is moved straight up from its place, or down to it.",
     )
+
+    @property
+    def X_WP(self) -> Array:
+        """The part frame in the world, shape (4, 4)."""
+        return self.at.matrix
 
     @property
     def supports(self) -> tuple[str, ...]:

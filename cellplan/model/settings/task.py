@@ -1,0 +1,63 @@
+"""Tolerance and process of a task, as a cell file states them, and bounds that tasks and programs share."""
+
+from typing import Annotated, Final
+
+from pydantic import Field
+
+from cellplan.model.settings.entry import Entry, SlidingSpeed
+from cellplan.model.settings.units import Deg, Mm, Within
+
+FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
+LONGEST_S: Final = 1e6  # [s] eleven days: longer is a wrong unit
+MOST_CYCLES: Final = 10_000  # more turns of one path are a shift, not a job
+
+
+class ToleranceEntry(Entry):
+    """Largest allowed tool error on the part."""
+
+    position_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] = Field(
+        default=Mm(0.1), description="Largest position error."
+    )
+    orientation_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
+        default=Deg(0.01), description="Largest orientation error."
+    )
+    between_rows_mm: Annotated[Mm, Within(gt=0.0, le=1000.0)] | None = Field(
+        default=None,
+        description="Largest position error between the rows of the tables, where joints move evenly from row to row; "
+        "position_mm when left out. A larger one is for steps that something else prescribes.",
+    )
+    between_rows_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] | None = Field(
+        default=None, description="Likewise for the orientation; orientation_deg when left out."
+    )
+
+    @property
+    def between(self) -> tuple[float, float]:
+        """Largest position error in [m] and orientation error in [rad] between the rows."""
+        return (self.between_rows_mm or self.position_mm).si, (self.between_rows_deg or self.orientation_deg).si
+
+
+class ProcessEntry(Entry):
+    """A process that demands a feed: welding, sealing, dispensing."""
+
+    feed_mm_s: SlidingSpeed = Field(
+        description="Demanded speed of the tool along its path on the surface, but for the ramps beside each stop."
+    )
+    tolerance_percent: Annotated[float, Field(gt=0.0, le=50.0)] = Field(
+        default=5.0, description="By how much the speed between two rows may differ from the feed."
+    )
+    on_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Time for which the tool rests at the start of its path with the process on."
+    )
+    off_delay_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0, description="Time for which the tool rests at the end of its path with the process on."
+    )
+    ramp_s: Annotated[float, Field(gt=0.0, le=10.0)] = Field(
+        default=0.1,
+        description="Time in which the tool comes from rest to the feed and back, at both ends of the path and at "
+        "corners at which it stops; the process is on, the feed is not judged.",
+    )
+
+    @property
+    def tolerance(self) -> float:
+        """Share of the feed by which the speed may differ from it."""
+        return self.tolerance_percent / 100.0
