@@ -24,9 +24,9 @@ from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.kinematics.pinocchio_model import CombinedModel, LinkState
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule
 from cellplan.model.robot import BASE
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.stops import StopReport, running_on
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -66,14 +66,14 @@ def cases(path: Path) -> Iterator[Case]:
 def stopping(cell: Cell, stated: Cell) -> Cell:
     """A cell with the controllers of another one; where that does not state how robots stop, they stop alike."""
     controllers = dict(stated.controllers)
-    control = {robot.name: robot.control or RobotControl(controller=robot.name) for robot in stated.robots}
+    control = {robot.name: robot.control or RobotControlEntry(id=robot.name) for robot in stated.robots}
     for each in control.values():
-        controllers.setdefault(each.controller, Controller(name=each.controller, kind=ControllerKind.OTHER))
+        controllers.setdefault(each.id, ControllerEntry(kind="other"))
     robots = tuple(replace(robot, control=control[robot.name]) for robot in cell.robots)
     cell = replace(cell, robots=robots, controllers=controllers)
     if running_on(cell):
         return cell
-    alike = {name: replace(each, reaction=REACTION, brake=BRAKE) for name, each in controllers.items()}
+    alike = {name: each.changed(reaction_ms=1e3 * REACTION, brake_s=BRAKE) for name, each in controllers.items()}
     return replace(cell, controllers=alike)
 
 

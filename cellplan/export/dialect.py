@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, Targets
+from cellplan.model.settings.controllers import KindName
 
 Render = Callable[[ExportJob], dict[str, str]]
 Read = Callable[[ExportFrame, Mapping[str, str]], tuple[ProgramRows, ...]]
@@ -39,7 +39,7 @@ class Dialect:
     decimals: int
     promises: tuple[Promise, ...]  # what the format can hold, the best first
     interpolation: Interpolation = Interpolation.LINEAR  # how its target moves the joints between two rows
-    kinds: frozenset[ControllerKind] = field(default_factory=frozenset)  # controllers that play it; empty for any
+    kinds: frozenset[KindName] = field(default_factory=frozenset)  # controllers that play it; empty for any
     at_cycle: bool = False  # whether rows lie on the cycle of the controller
     is_thinned: bool = False
     is_rounded: bool = False

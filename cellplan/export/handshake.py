@@ -10,8 +10,8 @@ from functools import partial
 from typing import NamedTuple
 
 from cellplan.errors import InputError, raise_findings, refusals
-from cellplan.model.controllers import Handshake
 from cellplan.model.exported import ExportFrame
+from cellplan.model.settings.controllers import HandshakeEntry
 
 
 class Step(NamedTuple):
@@ -38,11 +38,11 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
     leader, others = names[0], names[1:]
     signals = _signals(frame, robot)
     if robot != leader:
-        output, go = signals.output, _input(signals, robot, leader)
+        output, go = str(signals.output), _input(signals, robot, leader)
         return (Step(False, output, True), Step(True, go, True), Step(False, output, False), Step(True, go, False))
     inputs = [_input(signals, robot, other) for other in others]
     up, down = ([Step(True, signal, is_on) for signal in inputs] for is_on in (True, False))
-    return (*up, Step(False, signals.output, True), *down, Step(False, signals.output, False))
+    return (*up, Step(False, str(signals.output), True), *down, Step(False, str(signals.output), False))
 
 
 def lowering_step(frame: ExportFrame, robot: str) -> Step:
@@ -66,8 +66,8 @@ def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
     if control is None or control.handshake is None:
         return {}
     key = f"robots.{robot}.controller.handshake"
-    inputs = {f"{key}.inputs.{other}": signal for other, signal in control.handshake.inputs.items()}
-    return {f"{key}.output": control.handshake.output} | inputs
+    inputs = {f"{key}.inputs.{other}": str(signal) for other, signal in control.handshake.inputs.items()}
+    return {f"{key}.output": str(control.handshake.output)} | inputs
 
 
 def require_signals(frame: ExportFrame, robot: str) -> None:
@@ -83,7 +83,7 @@ def require_signals(frame: ExportFrame, robot: str) -> None:
         raise_findings(refusals(*(partial(_input, stated, robot, other) for other in others)))
 
 
-def _signals(frame: ExportFrame, robot: str) -> Handshake:
+def _signals(frame: ExportFrame, robot: str) -> HandshakeEntry:
     """The signals of a robot."""
     control = frame.robot(robot).control
     if control is None or control.handshake is None:
@@ -94,10 +94,10 @@ def _signals(frame: ExportFrame, robot: str) -> Handshake:
     return control.handshake
 
 
-def _input(handshake: Handshake, robot: str, other: str) -> str:
+def _input(handshake: HandshakeEntry, robot: str, other: str) -> str:
     """The input at which a robot reads the output of another one."""
     if other not in handshake.inputs:
         raise InputError(
             f"robots.{robot}.controller.handshake.inputs: expected the input that '{other}' sets, got none"
         )
-    return handshake.inputs[other]
+    return str(handshake.inputs[other])

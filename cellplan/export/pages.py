@@ -44,11 +44,9 @@ def _kind(frame: ExportFrame, robot: str, dialect: Dialect) -> str:
     control = frame.robot(robot).control
     if control is None:
         raise InputError(f"robots.{robot}.controller: expected the controller that plays {dialect.name}, got none")
-    if control.controller not in frame.cell.controllers:
-        raise InputError(
-            f"robots.{robot}.controller: expected one of the controllers of the cell, got '{control.controller}'"
-        )
-    return frame.cell.controllers[control.controller].kind
+    if control.id not in frame.cell.controllers:
+        raise InputError(f"robots.{robot}.controller: expected one of the controllers of the cell, got '{control.id}'")
+    return frame.cell.controllers[control.id].kind
 
 
 def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:

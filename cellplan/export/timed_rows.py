@@ -28,8 +28,8 @@ def decimals_of(robot: Robot, usual: int) -> int:
 
 def cycle_of(robot: Robot) -> float:
     """Cycle in [s] at which the controller of a robot takes positions."""
-    stated = None if robot.control is None else robot.control.cycle
-    return robot.controller_cycle if stated is None else stated
+    stated = None if robot.control is None else robot.control.cycle_ms
+    return robot.controller_cycle if stated is None else stated.si
 
 
 def times_of(rows: RobotRows) -> Array:

@@ -11,7 +11,6 @@ from cellplan.errors import InputError
 from cellplan.geometry.shapes import Shape, Solid
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.acceleration import USUAL_ACCELERATION, USUAL_CYCLE, AccelerationRule
-from cellplan.model.controllers import Controller, RobotControl
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.joint_spline import JointSpline
 from cellplan.model.layout import LayoutSettings
@@ -21,6 +20,7 @@ from cellplan.model.presented import Presented
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.rod import Rod
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.solver import SolverSettings
 from cellplan.model.task import Frame, Task
@@ -95,7 +95,7 @@ class Robot:
     gripper: tuple[str, ...] = ()
     order: tuple[str, ...] = ()
     path: JointSpline | None = None
-    control: RobotControl | None = None
+    control: RobotControlEntry | None = None
 
     @property
     def bodies_at_work(self) -> tuple[Body, ...]:
@@ -280,7 +280,7 @@ class Cell(Presented):
     remarks: tuple[tuple[str, str], ...] = ()
     program: ProgramEntry | None = None
     layout: LayoutSettings | None = None
-    controllers: Mapping[str, Controller] = field(default_factory=dict)
+    controllers: Mapping[str, ControllerEntry] = field(default_factory=dict)
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Controller
+from cellplan.model.settings.controllers import ControllerEntry
+from cellplan.model.settings.units import si_or_none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,21 +104,21 @@ class StopReport:
         return min(self.distances, key=lambda each: (each.proved, each.distance), default=None)
 
 
-def runs_on(controller: Controller) -> float | None:
+def runs_on(controller: ControllerEntry) -> float | None:
     """Time in [s] of its program that a robot covers after another one stopped; None where it is not stated.
 
     It goes on for the reaction time and then brakes evenly: in half of the braking time it would cover as much.
     """
-    if controller.reaction is None and controller.brake is None:
+    if controller.reaction_ms is None and controller.brake_s is None:
         return None
-    return (controller.reaction or 0.0) + 0.5 * (controller.brake or 0.0)
+    return (si_or_none(controller.reaction_ms) or 0.0) + 0.5 * (controller.brake_s or 0.0)
 
 
 def running_on(cell: Cell) -> dict[str, float]:
     """``runs_on`` of all robots of a cell whose controllers state it, by robot."""
     found = {}
     for robot in cell.robots:
-        own = None if robot.control is None else runs_on(cell.controllers[robot.control.controller])
+        own = None if robot.control is None else runs_on(cell.controllers[robot.control.id])
         if own is not None and own > 0.0:
             found[robot.name] = own
     return found

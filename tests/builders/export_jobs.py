@@ -11,9 +11,9 @@ from cellplan.export.dialect import Dialect
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.controller import ControllerZero
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
 
 NAMES = ("alpha", "beta", "gamma", "delta")
 
@@ -54,33 +54,33 @@ def positioner_model() -> RobotModel:
 
 def controlled(name: str, model: RobotModel, **control: object) -> Robot:
     """A robot with a controller of its own, named after it."""
-    settings = {"controller": f"{name}_controller", **control}
-    return replace(placed(name, model), control=RobotControl(**settings))  # type: ignore[arg-type]
+    settings = {"id": f"{name}_controller", **control}
+    return replace(placed(name, model), control=RobotControlEntry(**settings))  # type: ignore[arg-type]
 
 
-def signals(names: Sequence[str]) -> dict[str, Handshake]:
+def signals(names: Sequence[str]) -> dict[str, HandshakeEntry]:
     """Handshake signals between all robots, whole numbers that differ."""
     return {
-        name: Handshake(
-            output=str(10 + place),
-            inputs={other: str(100 + 10 * place + k) for k, other in enumerate(names) if other != name},
+        name: HandshakeEntry(
+            output=10 + place,
+            inputs={other: 100 + 10 * place + k for k, other in enumerate(names) if other != name},
         )
         for place, name in enumerate(names)
     }
 
 
-def cell_of(*robots: Robot, kind: ControllerKind) -> Cell:
+def cell_of(*robots: Robot, kind: KindName) -> Cell:
     """A cell whose robots have controllers of one kind, and handshake signals where there are several robots."""
     if len(robots) > 1:
         own = signals([robot.name for robot in robots])
         robots = tuple(
             robot
             if robot.control is None or robot.control.handshake is not None
-            else replace(robot, control=replace(robot.control, handshake=own[robot.name]))
+            else replace(robot, control=robot.control.changed(handshake=own[robot.name]))
             for robot in robots
         )
-    names = dict.fromkeys(robot.control.controller for robot in robots if robot.control is not None)
-    controllers = {name: Controller(name=name, kind=kind) for name in names}
+    names = dict.fromkeys(robot.control.id for robot in robots if robot.control is not None)
+    controllers = {name: ControllerEntry(kind=kind) for name in names}
     return replace(make_cell(*robots), controllers=controllers)
 
 
@@ -138,14 +138,14 @@ def job_of(
     return replace(job, **changes)  # type: ignore[arg-type]
 
 
-def one_arm(kind: ControllerKind, *, seed: int = 0, rows: int = 20, **changes: object) -> ExportJob:
+def one_arm(kind: KindName, *, seed: int = 0, rows: int = 20, **changes: object) -> ExportJob:
     """A job of one six-axis arm with drawn limits and a controller that counts otherwise than the model."""
     model = replace(drawn_limits(arm_model(), np.random.default_rng(seed)), controller=zero_of(6))
     cell = cell_of(controlled(NAMES[0], model), kind=kind)
     return job_of(cell, random_program(cell, rows=rows, seed=seed), **changes)
 
 
-def arm_on_a_rail(kind: ControllerKind, *, seed: int = 0, rows: int = 20, **changes: object) -> ExportJob:
+def arm_on_a_rail(kind: KindName, *, seed: int = 0, rows: int = 20, **changes: object) -> ExportJob:
     """A job of one arm on a rail: one external axis in [mm]."""
     model = replace(drawn_limits(rail_model(), np.random.default_rng(seed)), controller=zero_of(7))
     cell = cell_of(controlled(NAMES[0], model), kind=kind)
@@ -153,7 +153,7 @@ def arm_on_a_rail(kind: ControllerKind, *, seed: int = 0, rows: int = 20, **chan
 
 
 def two_arms(
-    kind: ControllerKind, *, seed: int = 0, rows: int = 20, marks: Sequence[int] = (0, 7, 19), **changes: object
+    kind: KindName, *, seed: int = 0, rows: int = 20, marks: Sequence[int] = (0, 7, 19), **changes: object
 ) -> ExportJob:
     """A job of two arms that wait for one another at marks."""
     rng = np.random.default_rng(seed)

@@ -20,18 +20,20 @@ from builders.scene_builders import arm_model, held_part, work
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.controllers import Controller, ControllerKind, Handshake
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows, Targets
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry
 
-ABB = ControllerKind.ABB
+ABB = "abb"
 CONTROLLER = "irc5"
 
 
-def named_signals(names: Sequence[str]) -> dict[str, Handshake]:
+def named_signals(names: Sequence[str]) -> dict[str, HandshakeEntry]:
     """Handshake signals between all robots, each with a name."""
     return {
-        name: Handshake(output=f"do_{name}", inputs={other: f"di_{name}_{other}" for other in names if other != name})
+        name: HandshakeEntry(
+            output=f"do_{name}", inputs={other: f"di_{name}_{other}" for other in names if other != name}
+        )
         for name in names
     }
 
@@ -39,7 +41,7 @@ def named_signals(names: Sequence[str]) -> dict[str, Handshake]:
 def multimove_cell(models: Mapping[str, RobotModel]) -> Cell:
     """Robots on one controller, each with a task and a mechanical unit of its own."""
     robots: list[Robot] = [
-        controlled(name, model, controller=CONTROLLER, task=f"T_ROB{number}")
+        controlled(name, model, id=CONTROLLER, task=f"T_ROB{number}")
         for number, (name, model) in enumerate(models.items(), start=1)
     ]
     cell = cell_of(*robots, kind=ABB)
@@ -47,7 +49,7 @@ def multimove_cell(models: Mapping[str, RobotModel]) -> Cell:
         f"T_ROB{number}": f"ROB_{number}" if len(model.joints) >= 6 else f"STN_{number}"
         for number, model in enumerate(models.values(), start=1)
     }
-    controllers = {CONTROLLER: Controller(name=CONTROLLER, kind=ABB, tasks=units)}
+    controllers = {CONTROLLER: ControllerEntry(kind=ABB, tasks=units)}
     return replace(cell, controllers=controllers)
 
 

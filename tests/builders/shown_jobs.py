@@ -11,9 +11,9 @@ from builders.scene_builders import arm_model
 from builders.stream_jobs import with_latency
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Robot, Tool
-from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import HandshakeEntry, KindName
 
 ARMS = {
     "weld": [
@@ -25,17 +25,23 @@ ARMS = {
     "hold": [[0, -90, 90, 0, 45, 0], [0, -90, 90, 0, 45, 0], [5, -90, 90, 0, 45, 0], [5, -90, 90, 0, 45, 0]],
 }  # [deg] four rows of two arms
 TABLE = [[0, 0], [0.5, -1], [1.5, -3], [2, -4]]  # [deg] four rows of a positioner
-NUMBERS = {"weld": Handshake(output="10", inputs={"hold": "11"}), "hold": Handshake(output="20", inputs={"weld": "21"})}
-NAMES = {
-    "weld": Handshake(output="doThere", inputs={"hold": "diGo"}),
-    "hold": Handshake(output="doThere", inputs={"weld": "diGo"}),
+NUMBERS = {
+    "weld": HandshakeEntry(output=10, inputs={"hold": 11}),
+    "hold": HandshakeEntry(output=20, inputs={"weld": 21}),
 }
-STANDARD = {"weld": Handshake(output="1", inputs={"hold": "0"}), "hold": Handshake(output="1", inputs={"weld": "0"})}
+NAMES = {
+    "weld": HandshakeEntry(output="doThere", inputs={"hold": "diGo"}),
+    "hold": HandshakeEntry(output="doThere", inputs={"weld": "diGo"}),
+}
+STANDARD = {
+    "weld": HandshakeEntry(output=1, inputs={"hold": 0}),
+    "hold": HandshakeEntry(output=1, inputs={"weld": 0}),
+}
 STEP = 0.04  # [s] between rows of the synchronised program
 SLOW_CYCLE = 0.02  # [s] of the stream, so that its rest takes few rows
 
 
-def waiting_arms(kind: ControllerKind, signals: Mapping[str, Handshake]) -> ExportJob:
+def waiting_arms(kind: KindName, signals: Mapping[str, HandshakeEntry]) -> ExportJob:
     """Two arms, four rows, one mark at the third row."""
     tools = {"weld": 1, "hold": None}
     model = _named("kr16")
@@ -56,7 +62,7 @@ def arm_and_positioner() -> ExportJob:
     return job_of(cell, ProgramRows(name=None, robots=rows), promise=Promise.SYNCHRONISED, blend=0.25)
 
 
-def timed_table(kind: ControllerKind = ControllerKind.OTHER) -> ExportJob:
+def timed_table(kind: KindName = "other") -> ExportJob:
     """A positioner whose rows have times, in process in the middle."""
     table = controlled("table", positioner_model())
     times = np.arange(4) * 0.5
@@ -68,32 +74,32 @@ def timed_table(kind: ControllerKind = ControllerKind.OTHER) -> ExportJob:
 
 def streamed_table() -> ExportJob:
     """A positioner at the cycle of its controller, at rest for 0.1 s at both ends."""
-    table = controlled("table", positioner_model(), cycle=SLOW_CYCLE)
+    table = controlled("table", positioner_model(), cycle_ms=1e3 * SLOW_CYCLE)
     share = np.clip((np.arange(16) - 5) / 5, 0.0, 1.0)
     q = np.outer(share**3 * (10 - 15 * share + 6 * share**2), [0.1, -0.2])
     process = (share > 0.0) & (share < 1.0)
     rows = _rows("table", q, times=np.arange(16) * SLOW_CYCLE, process=process)
-    cell = cell_of(table, kind=ControllerKind.KUKA)
+    cell = cell_of(table, kind="kuka")
     return job_of(cell, ProgramRows(name=None, robots={"table": rows}), promise=Promise.TIMED)
 
 
 def streamed_arm() -> ExportJob:
     """An arm at the cycle of its controller, at rest for 0.1 s at both ends."""
-    arm = controlled("weld", _named("arm"), cycle=SLOW_CYCLE)
+    arm = controlled("weld", _named("arm"), cycle_ms=1e3 * SLOW_CYCLE)
     share = np.clip((np.arange(16) - 5) / 5, 0.0, 1.0)
     q = np.array(ARMS["weld"][0], dtype=float) + np.outer(share**2 * (3 - 2 * share), [1, 2, -1, 0, 3, 1])
     rows = _rows("weld", q, times=np.arange(16) * SLOW_CYCLE)
-    cell = cell_of(arm, kind=ControllerKind.KUKA)
+    cell = cell_of(arm, kind="kuka")
     return job_of(cell, ProgramRows(name=None, robots={"weld": rows}), promise=Promise.TIMED)
 
 
 def servoed_arm() -> ExportJob:
     """An arm that follows four rows at the cycle of its controller."""
-    arm: Robot = controlled("weld", _named("arm"), cycle=0.008)
+    arm: Robot = controlled("weld", _named("arm"), cycle_ms=8.0)
     start = np.array(ARMS["weld"][0], dtype=float)
     q = start + np.outer([0.0, 0.001, 0.003, 0.004], [1, 2, -1, 0, 3, 1])
     rows = _rows("weld", q, times=np.arange(4) * 0.008)
-    cell = with_latency(cell_of(arm, kind=ControllerKind.UR), 0.1)
+    cell = with_latency(cell_of(arm, kind="ur"), 100.0)
     return job_of(cell, ProgramRows(name=None, robots={"weld": rows}), promise=Promise.TIMED)
 
 

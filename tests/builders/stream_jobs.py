@@ -20,8 +20,8 @@ from builders.scene_builders import arm_model
 from cellplan.export.dialect import Dialect
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.settings.controllers import HandshakeEntry, KindName
 
 REST = 0.1  # [s] at both ends
 
@@ -66,10 +66,10 @@ def smooth_program(
     return ProgramRows(name=name, robots=robots)
 
 
-def cell_for(kind: ControllerKind, *, seed: int = 0, cycle: float = 0.004, decimals: int | None = None) -> Cell:
+def cell_for(kind: KindName, *, seed: int = 0, cycle: float = 0.004, decimals: int | None = None) -> Cell:
     """An arm that its controller counts otherwise, one on a rail, and a positioner with two axes; limits are drawn."""
     rng = np.random.default_rng(seed)
-    settings = {"cycle": cycle, "decimals": decimals}
+    settings = {"cycle_ms": 1e3 * cycle, "decimals": decimals}
     models = (
         replace(drawn_limits(arm_model(), rng), controller=zero_of(6)),
         replace(drawn_limits(rail_model(), rng), controller=zero_of(7, coupling=-1.0)),
@@ -78,16 +78,16 @@ def cell_for(kind: ControllerKind, *, seed: int = 0, cycle: float = 0.004, decim
     cell = cell_of(
         *(controlled(name, model, **settings) for name, model in zip(NAMES, models, strict=False)), kind=kind
     )
-    return with_latency(cell, 0.1)
+    return with_latency(cell, 100.0)
 
 
-def with_latency(cell: Cell, latency: float | None) -> Cell:
+def with_latency(cell: Cell, latency_ms: float | None) -> Cell:
     """The cell with one latency of all controllers."""
-    own = {name: replace(controller, latency=latency) for name, controller in cell.controllers.items()}
+    own = {name: controller.changed(latency_ms=latency_ms) for name, controller in cell.controllers.items()}
     return replace(cell, controllers=own)
 
 
-def timed_job(kind: ControllerKind = ControllerKind.KUKA, *, seed: int = 0, **changes: object) -> ExportJob:
+def timed_job(kind: KindName = "kuka", *, seed: int = 0, **changes: object) -> ExportJob:
     """A timed job of the three robots of ``cell_for``; changes are of the program first, then of the job."""
     own = {key: changes.pop(key) for key in ("cycle", "end", "rests", "name") if key in changes}
     cell = cell_for(kind, seed=seed)
@@ -101,10 +101,10 @@ def ur_cell(*, robots: int = 1, seed: int = 0, cycle: float = 0.008, decimals: i
     for k, name in enumerate(names):
         zero = replace(zero_of(6), coupling=np.zeros((6, 6)))
         model = replace(drawn_limits(arm_model(), rng), controller=zero)
-        inputs = {other: str(place) for place, other in enumerate(names) if other != name}
-        shake = Handshake(output=str(k), inputs=inputs) if robots > 1 else None
-        placed.append(controlled(name, model, cycle=cycle, decimals=decimals, handshake=shake))
-    return with_latency(cell_of(*placed, kind=ControllerKind.UR), 0.1)
+        inputs = {other: place for place, other in enumerate(names) if other != name}
+        shake = HandshakeEntry(output=k, inputs=inputs) if robots > 1 else None
+        placed.append(controlled(name, model, cycle_ms=1e3 * cycle, decimals=decimals, handshake=shake))
+    return with_latency(cell_of(*placed, kind="ur"), 100.0)
 
 
 def round_trip(dialect: Dialect, job: ExportJob) -> tuple[dict[str, str], tuple[ProgramRows, ...]]:

@@ -137,7 +137,7 @@ def test_a_reader_finds_the_share_of_each_row_in_its_zone(seed: int, decimals: i
     """The scale of zones has ten sizes to the decade: no share is larger than it may be, or less than 0.79 of it."""
     job = small_steps(seed=seed)
     cell = job.frame.cell
-    robots = tuple(replace(each, control=replace(each.control, decimals=decimals)) for each in cell.robots)
+    robots = tuple(replace(each, control=each.control.changed(decimals=decimals)) for each in cell.robots)
     job = replace(job, frame=replace(job.frame, cell=replace(cell, robots=robots)))
 
     read = read_back(RAPID, job)[0].robots

@@ -8,7 +8,6 @@ import pytest
 from builders.export_jobs import NAMES, two_arms
 from builders.rapid_jobs import sequence_job
 
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 from cellplan.pipeline.export.dialects import DIALECTS
 
@@ -23,7 +22,7 @@ EVENTS = {  # motion, output with its state, wait for a state
 def job_in(form: str, split: int | None, marks: tuple[int, ...]) -> ExportJob:
     if form == "rapid":
         return sequence_job(marks=marks, split=split)
-    kind = {"krl": ControllerKind.KUKA, "val3": ControllerKind.STAUBLI}[form]
+    kind = {"krl": "kuka", "val3": "staubli"}[form]
     return two_arms(kind, marks=marks, split=split)
 
 

@@ -22,7 +22,6 @@ from builders.stream_jobs import (
 from cellplan.errors import InputError
 from cellplan.export.json_tables import read_json, render_json
 from cellplan.export.json_tree import parsed
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ProgramRows, Promise
 from cellplan.pipeline.export.dialects import DIALECTS
 
@@ -89,7 +88,7 @@ def test_numbers_are_plain_decimals() -> None:
 
 
 def test_one_document_for_each_task() -> None:
-    cell = cell_for(ControllerKind.KUKA)
+    cell = cell_for("kuka")
     programs = [smooth_program(cell, name=name, seed=k, end=0.4) for k, name in enumerate(("one", "two"))]
     job = job_of(cell, *programs, promise=Promise.TIMED)
 

@@ -25,11 +25,11 @@ from builders.scene_builders import arm_model
 from cellplan.errors import InputError
 from cellplan.export.corners import row_shares
 from cellplan.export.krl.writer import KRL
-from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, Promise, RobotRows
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import HandshakeEntry
 
-KUKA = ControllerKind.KUKA
+KUKA = "kuka"
 QUANTUM = np.deg2rad(1e-5)
 
 
@@ -254,7 +254,7 @@ def test_robots_with_names_of_any_kind_do_too() -> None:
 def test_robots_of_other_makers_are_left_to_their_formats() -> None:
     job = two_arms(KUKA)
     controllers = dict(job.frame.cell.controllers)
-    controllers["beta_controller"] = replace(controllers["beta_controller"], kind=ControllerKind.ABB)
+    controllers["beta_controller"] = controllers["beta_controller"].changed(kind="abb")
     cell = replace(job.frame.cell, controllers=controllers)
     job = replace(job, frame=replace(job.frame, cell=cell))
 
@@ -272,8 +272,8 @@ def refused(model: RobotModel, **control: object) -> str:
 
 @pytest.mark.parametrize("signal", ["doStart", "0", "-1", "1.5", "8193", "", "１"])
 def test_signals_without_a_number_are_refused(signal: str) -> None:
-    wrong_output = refused(arm_model(), handshake=Handshake(output=signal, inputs={"beta": "3"}))
-    wrong_input = refused(arm_model(), handshake=Handshake(output="3", inputs={"beta": signal}))
+    wrong_output = refused(arm_model(), handshake=HandshakeEntry.model_construct(output=signal, inputs={"beta": "3"}))
+    wrong_input = refused(arm_model(), handshake=HandshakeEntry.model_construct(output="3", inputs={"beta": signal}))
 
     assert wrong_output.startswith("robots.alpha.controller.handshake.output: expected a whole number")
     assert wrong_input.startswith("robots.alpha.controller.handshake.inputs.beta: expected a whole number")
@@ -287,7 +287,7 @@ def test_a_robot_without_a_controller_or_with_that_of_another_maker_is_refused()
     job = one_arm(KUKA)
     robot = job.frame.cell.robots[0]
     without = replace(job.frame, cell=replace(job.frame.cell, robots=(replace(robot, control=None),)))
-    other = one_arm(ControllerKind.ABB)
+    other = one_arm("abb")
 
     with pytest.raises(InputError, match=r"robots.alpha.controller: expected the controller that plays krl, got none"):
         KRL.render(replace(job, frame=without))

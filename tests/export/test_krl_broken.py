@@ -9,13 +9,12 @@ from builders.export_jobs import arm_on_a_rail, one_arm, two_arms
 
 from cellplan.errors import InputError
 from cellplan.export.krl.writer import KRL
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 
 JOBS = {
-    "marks": lambda: two_arms(ControllerKind.KUKA, blend=0.3, marks=(0, 7)),
-    "pages": lambda: two_arms(ControllerKind.KUKA, blend=0.3, marks=(0, 7), split=8),
-    "rail": lambda: arm_on_a_rail(ControllerKind.KUKA),
+    "marks": lambda: two_arms("kuka", blend=0.3, marks=(0, 7)),
+    "pages": lambda: two_arms("kuka", blend=0.3, marks=(0, 7), split=8),
+    "rail": lambda: arm_on_a_rail("kuka"),
 }
 
 
@@ -314,7 +313,7 @@ def test_a_rail_without_its_axis_is_refused() -> None:
 
 
 def test_signals_of_a_cell_with_one_robot_are_refused() -> None:
-    job = one_arm(ControllerKind.KUKA)
+    job = one_arm("kuka")
     files = KRL.render(job)
     text = files["alpha.src"].replace("PTP XP9\r\n", "PTP XP9\r\n$OUT[1]=TRUE\r\n")
 

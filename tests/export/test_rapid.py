@@ -27,7 +27,6 @@ from hypothesis import strategies as st
 from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
 from cellplan.export.rapid.writer import RAPID
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, Targets
 from cellplan.pipeline.export.dialects import DIALECTS
 
@@ -38,7 +37,7 @@ NUDGED = 3.0 * np.deg2rad(2.0 * HALF_UNIT)  # a joint near its limit, and one th
 def with_decimals(job: ExportJob, decimals: int) -> ExportJob:
     """The job with other decimals of every robot."""
     cell = job.frame.cell
-    robots = tuple(replace(each, control=replace(each.control, decimals=decimals)) for each in cell.robots)
+    robots = tuple(replace(each, control=each.control.changed(decimals=decimals)) for each in cell.robots)
     return replace(job, frame=replace(job.frame, cell=replace(cell, robots=robots)))
 
 
@@ -282,7 +281,7 @@ def refusal(job: ExportJob) -> str:
 def changed_cell(job: ExportJob, **controls: dict[str, object]) -> ExportJob:
     """The job with other settings of the controls of robots."""
     robots = tuple(
-        replace(each, control=replace(each.control, **controls.get(each.name, {}))) for each in job.frame.cell.robots
+        replace(each, control=each.control.changed(**controls.get(each.name, {}))) for each in job.frame.cell.robots
     )
     return replace(job, frame=replace(job.frame, cell=replace(job.frame.cell, robots=robots)))
 
@@ -305,7 +304,7 @@ def test_a_robot_without_a_controller_is_refused() -> None:
 
 
 def test_another_kind_of_controller_is_refused() -> None:
-    assert refusal(one_arm(ControllerKind.KUKA)) == (
+    assert refusal(one_arm("kuka")) == (
         "robots.alpha.controller: expected a controller of kind abb for rapid, got kuka"
     )
 

@@ -20,7 +20,6 @@ from builders.stream_jobs import (
 from cellplan.errors import InputError
 from cellplan.export.ros2.reader import read_ros2
 from cellplan.export.ros2.writer import render_ros2
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.pipeline.export.dialects import DIALECTS
 
@@ -245,7 +244,7 @@ def test_one_wrong_speed_is_refused_with_its_line() -> None:
 
 @pytest.mark.parametrize("decimals", [0, 5, 7])
 def test_decimals_of_programs_do_not_count_in_a_trajectory(decimals: int) -> None:
-    cell, plain = (cell_for(ControllerKind.ROS, decimals=stated) for stated in (decimals, None))
+    cell, plain = (cell_for("ros", decimals=stated) for stated in (decimals, None))
     jobs = [job_of(each, smooth_program(each), promise=Promise.TIMED) for each in (cell, plain)]
 
     files, (read,) = round_trip(ROS2, jobs[0])
@@ -274,7 +273,7 @@ def test_same_job_same_text() -> None:
 
 
 def test_tasks_have_folders() -> None:
-    cell = cell_for(ControllerKind.ROS)
+    cell = cell_for("ros")
     programs = [smooth_program(cell, name=name, seed=k, end=0.5) for k, name in enumerate(("one", "two"))]
     job = job_of(cell, *programs, promise=Promise.TIMED)
 

@@ -16,7 +16,6 @@ from builders.shown_jobs import (
     waiting_arms,
 )
 
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 from cellplan.pipeline.export.dialects import DIALECTS
 
@@ -26,19 +25,19 @@ SHOWN = re.compile(r"^`(?P<path>[\w./]+)`[^\n]*:\n\n<!-- not run -->\n```\w+\n(?
 Shown = Sequence[tuple[ExportJob, Sequence[str]]]
 PAGES: dict[str, Shown] = {
     "json": [(timed_table(), ["program.json"])],
-    "krl": [(waiting_arms(ControllerKind.KUKA, NUMBERS), ["weld.src", "weld.dat"])],
+    "krl": [(waiting_arms("kuka", NUMBERS), ["weld.src", "weld.dat"])],
     "rapid": [
         (arm_and_positioner(), ["weld.mod", "weld.pgf", "table.mod"]),
-        (waiting_arms(ControllerKind.ABB, NAMES), ["weld.mod"]),
+        (waiting_arms("abb", NAMES), ["weld.mod"]),
     ],
     "ros2": [(timed_table(), ["table.yaml"])],
     "stream": [(streamed_table(), ["table.csv", "table.json"])],
     "urscript": [
         (servoed_arm(), ["weld.script"]),
-        (waiting_arms(ControllerKind.UR, STANDARD), ["weld.script"]),
+        (waiting_arms("ur", STANDARD), ["weld.script"]),
     ],
     "val3": [
-        (waiting_arms(ControllerKind.STAUBLI, NUMBERS), ["weld/weld.pjx", "weld/weld.dtx", "weld/start.pgx"]),
+        (waiting_arms("staubli", NUMBERS), ["weld/weld.pjx", "weld/weld.dtx", "weld/start.pgx"]),
     ],
 }
 

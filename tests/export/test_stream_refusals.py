@@ -9,10 +9,9 @@ from builders.stream_jobs import cell_for, edited, timed_job, with_line_twice, w
 
 from cellplan.errors import InputError
 from cellplan.export.stream.writer import read_stream, render_stream
-from cellplan.model.controllers import ControllerKind
 
 JOB = timed_job(end=0.6, cycle=0.012, seed=2, robots=("gamma",))
-JOB = replace(JOB, frame=replace(JOB.frame, cell=cell_for(ControllerKind.KUKA, seed=2, cycle=0.012)))
+JOB = replace(JOB, frame=replace(JOB.frame, cell=cell_for("kuka", seed=2, cycle=0.012)))
 FILES = render_stream(JOB)
 TABLE, RECORD = FILES["gamma.csv"], FILES["gamma.json"]
 LAST = TABLE.count("\n")

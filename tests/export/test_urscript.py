@@ -14,8 +14,8 @@ from cellplan.export.urscript.rows import blend_radii, move_acceleration, move_s
 from cellplan.export.urscript.writer import render_urscript
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, ProgramRows, Promise
+from cellplan.model.settings.controllers import HandshakeEntry
 from cellplan.pipeline.export.dialects import DIALECTS
 
 URSCRIPT = DIALECTS["urscript"]
@@ -86,18 +86,18 @@ def test_a_timed_program_moves_to_its_first_row_follows_and_stops() -> None:
 
 
 @pytest.mark.parametrize(
-    ("latency", "expected"), [(0.03, "0.030"), (0.05, "0.050"), (0.2, "0.200"), (0.5, "0.200"), (0.1, "0.100")]
+    ("latency_ms", "expected"), [(30.0, "0.030"), (50.0, "0.050"), (200.0, "0.200"), (500.0, "0.200"), (100.0, "0.100")]
 )
-def test_the_lookahead_time_is_the_latency_that_is_stated(latency: float, expected: str) -> None:
-    text = render_urscript(timed(cell=with_latency(ur_cell(), latency)))["alpha.script"]
+def test_the_lookahead_time_is_the_latency_that_is_stated(latency_ms: float, expected: str) -> None:
+    text = render_urscript(timed(cell=with_latency(ur_cell(), latency_ms)))["alpha.script"]
 
     assert set(re.findall(r"lookahead_time=([0-9.]+)", text)) == {expected}
 
 
-@pytest.mark.parametrize(("latency", "got"), [(None, "none"), (0.0, "0"), (0.02, "20")])
-def test_servoj_without_a_latency_is_refused(latency: float | None, got: str) -> None:
+@pytest.mark.parametrize(("latency_ms", "got"), [(None, "none"), (0.0, "0"), (20.0, "20")])
+def test_servoj_without_a_latency_is_refused(latency_ms: float | None, got: str) -> None:
     with pytest.raises(InputError, match=rf"^controllers\.alpha_controller\.latency_ms: .* got {got}$"):
-        render_urscript(timed(cell=with_latency(ur_cell(), latency)))
+        render_urscript(timed(cell=with_latency(ur_cell(), latency_ms)))
 
 
 def test_other_cycles_are_refused() -> None:
@@ -200,7 +200,7 @@ def test_positions_beyond_two_turns_are_refused() -> None:
 
 
 def test_robots_with_other_joints_are_refused() -> None:
-    job = arm_on_a_rail(ControllerKind.UR)
+    job = arm_on_a_rail("ur")
 
     with pytest.raises(InputError, match=r"^robots\.alpha: expected 6 turning joints for urscript, got 7 joints"):
         render_urscript(job)
@@ -324,12 +324,12 @@ def test_signals_that_are_no_standard_ones_are_refused() -> None:
     cell = ur_cell(robots=2)
     alpha, beta = cell.robots
     for shake, key in (
-        (Handshake(output="DO_1", inputs={"beta": "1"}), "output"),
-        (Handshake(output="8", inputs={"beta": "1"}), "output"),
-        (Handshake(output="1", inputs={"beta": "-1"}), r"inputs\.beta"),
-        (Handshake(output="1", inputs={"beta": "01"}), r"inputs\.beta"),
+        (HandshakeEntry.model_construct(output="DO_1", inputs={"beta": "1"}), "output"),
+        (HandshakeEntry.model_construct(output="8", inputs={"beta": "1"}), "output"),
+        (HandshakeEntry.model_construct(output="1", inputs={"beta": "-1"}), r"inputs\.beta"),
+        (HandshakeEntry.model_construct(output="1", inputs={"beta": "01"}), r"inputs\.beta"),
     ):
-        other = replace(alpha, control=replace(alpha.control, handshake=shake))  # type: ignore[type-var]
+        other = replace(alpha, control=alpha.control.changed(handshake=shake))  # type: ignore[type-var]
         with pytest.raises(
             InputError, match=rf"^robots\.alpha\.controller\.handshake\.{key}: expected a standard digital"
         ):

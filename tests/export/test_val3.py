@@ -27,11 +27,11 @@ from cellplan.export.val3.writer import VAL3
 from cellplan.geometry.transforms import pose_from, rotation_about, rotation_exp
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Tool
-from cellplan.model.controllers import ControllerKind, Handshake
 from cellplan.model.exported import ExportJob, Promise, RobotRows
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import HandshakeEntry
 
-STAUBLI = ControllerKind.STAUBLI
+STAUBLI = "staubli"
 QUANTUM = np.deg2rad(1e-5)
 DATA = "{http://www.staubli.com/robotics/VAL3/Data/2}"
 PROJECT = "{http://www.staubli.com/robotics/VAL3/Project/3}"
@@ -201,7 +201,7 @@ def test_signals_come_after_the_robot_stands() -> None:
 
 
 def test_signals_are_links_and_numbers_are_those_of_the_first_board() -> None:
-    own = Handshake(output=r"ModbusSrv-0\%Q3", inputs={"beta": "7"})
+    own = HandshakeEntry.model_construct(output=r"ModbusSrv-0\%Q3", inputs={"beta": "7"})
     cell = cell_of(controlled("alpha", arm_model(), handshake=own), controlled("beta", arm_model()), kind=STAUBLI)
     job = job_of(cell, random_program(cell, marks=(4,)))
 
@@ -222,7 +222,7 @@ def test_signals_are_links_and_numbers_are_those_of_the_first_board() -> None:
     ],
 )
 def test_signals_with_names_keep_them_where_these_are_free(output: str, entry: str, names: list[str]) -> None:
-    own = Handshake(output=output, inputs={"beta": entry})
+    own = HandshakeEntry.model_construct(output=output, inputs={"beta": entry})
     cell = cell_of(controlled("alpha", arm_model(), handshake=own), controlled("beta", arm_model()), kind=STAUBLI)
     job = job_of(cell, random_program(cell, marks=(4,)))
 
@@ -300,8 +300,8 @@ def refused(model: RobotModel, **control: object) -> str:
 
 @pytest.mark.parametrize("signal", ["", "do 1", 'a"b', "Tür", "a&b", "a\nb"])
 def test_signals_that_are_no_link_are_refused(signal: str) -> None:
-    wrong_output = refused(arm_model(), handshake=Handshake(output=signal, inputs={"beta": "3"}))
-    wrong_input = refused(arm_model(), handshake=Handshake(output="3", inputs={"beta": signal}))
+    wrong_output = refused(arm_model(), handshake=HandshakeEntry.model_construct(output=signal, inputs={"beta": "3"}))
+    wrong_input = refused(arm_model(), handshake=HandshakeEntry.model_construct(output="3", inputs={"beta": signal}))
 
     assert wrong_output.startswith("robots.alpha.controller.handshake.output: expected a number, or the link")
     assert wrong_input.startswith("robots.alpha.controller.handshake.inputs.beta: expected a number, or the link")

@@ -9,12 +9,11 @@ from builders.export_jobs import one_arm, two_arms
 
 from cellplan.errors import InputError
 from cellplan.export.val3.writer import VAL3
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportJob
 
 JOBS = {
-    "marks": lambda: two_arms(ControllerKind.STAUBLI, marks=(0, 7)),
-    "pages": lambda: two_arms(ControllerKind.STAUBLI, marks=(0, 7), split=8),
+    "marks": lambda: two_arms("staubli", marks=(0, 7)),
+    "pages": lambda: two_arms("staubli", marks=(0, 7), split=8),
 }
 
 
@@ -329,7 +328,7 @@ def test_stop_does_nothing_but_forget_motions(code: str) -> None:
     ],
 )
 def test_loops_that_do_not_fit_the_rows_are_refused(loop: str, begin: str) -> None:
-    job = one_arm(ControllerKind.STAUBLI)
+    job = one_arm("staubli")
     files = VAL3.render(job)
     code = "for n=0 to 19\n    movej(jRow[n],tTool[0],mMove[0])\n  endFor\n  "
     text = re.sub(r"(?s)movej.*(?=waitEndMove)", code, files["alpha/start.pgx"])

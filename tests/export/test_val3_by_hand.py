@@ -5,7 +5,6 @@ from builders.export_jobs import cell_of, controlled, job_of, random_program
 from builders.scene_builders import arm_model
 
 from cellplan.export.val3.writer import VAL3
-from cellplan.model.controllers import ControllerKind
 
 HAND_MADE = {
     "weld/weld.pjx": """<?xml version="1.0" encoding="utf-8" ?>
@@ -94,7 +93,7 @@ end
 
 
 def test_a_project_written_by_hand_with_loops_is_read() -> None:
-    cell = cell_of(controlled("weld", arm_model()), kind=ControllerKind.STAUBLI)
+    cell = cell_of(controlled("weld", arm_model()), kind="staubli")
     frame = job_of(cell, random_program(cell)).frame
 
     (read,) = VAL3.read(frame, HAND_MADE)

@@ -79,7 +79,7 @@ def _groups(cell: Cell) -> tuple[tuple[str, ...], ...]:
     """Robots that share a clock, in the order of the cell."""
     groups: dict[tuple[bool, str], list[str]] = {}
     for robot in cell.robots:
-        key = (False, robot.name) if robot.control is None else (True, robot.control.controller)
+        key = (False, robot.name) if robot.control is None else (True, robot.control.id)
         groups.setdefault(key, []).append(robot.name)
     return tuple(tuple(group) for group in groups.values())
 
@@ -95,8 +95,8 @@ def _apart(cell: Cell) -> Iterator[tuple[str, str]]:
 def _stated(cell: Cell, first: str, second: str) -> float | None:
     """Largest difference in [s] of two clocks: each statement holds for all others, so the smaller one does."""
     controls = [cell.robot(name).control for name in (first, second)]
-    controllers = [cell.controllers.get(control.controller) for control in controls if control is not None]
-    stated = [each.skew for each in controllers if each is not None and each.skew is not None]
+    controllers = [cell.controllers.get(control.id) for control in controls if control is not None]
+    stated = [each.skew_ms.si for each in controllers if each is not None and each.skew_ms is not None]
     return min(stated, default=None)
 
 

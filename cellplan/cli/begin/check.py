@@ -87,8 +87,8 @@ def _record(result: "CellCheck") -> dict[str, Any]:
         "path_bulge_mm": {name: number(1e3 * bulge) for name, bulge in result.bulges.items()},
         "controllers": {
             name: {
-                "kind": str(controller.kind),
-                "robots": [it.name for it in result.cell.robots if it.control and it.control.controller == name],
+                "kind": controller.kind,
+                "robots": [it.name for it in result.cell.robots if it.control and it.control.id == name],
             }
             for name, controller in result.cell.controllers.items()
         },

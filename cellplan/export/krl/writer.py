@@ -19,7 +19,6 @@ from cellplan.export.krl.reader import read_krl
 from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.geometry.transforms import Array
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 
 DECIMALS: Final = 5
@@ -175,7 +174,7 @@ KRL: Final[Dialect] = Dialect(
     read=lambda frame, files: read_krl(frame, files, module_paths(frame, KRL)),
     decimals=DECIMALS,
     promises=(Promise.SEQUENCE_ONLY,),
-    kinds=frozenset({ControllerKind.KUKA}),
+    kinds=frozenset({"kuka"}),
     is_thinned=True,
     is_rounded=True,
     split=PAGE,

@@ -1,7 +1,6 @@
 """RAPID programs of a cell: which task plays which robot, under which names, and where the part is held."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,8 +11,8 @@ from cellplan.export.joints import Axes
 from cellplan.export.text import safe_names
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
-from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import ExportFrame, Promise, Targets
+from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.task import Frame
 
 DECIMALS: Final = 4  # of a degree or millimetre
@@ -142,7 +141,7 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     if holder not in frame.robots:
         raise InputError(f"--targets part: expected '{holder}', which holds the part, among the exported robots")
     task, placed = rapid_task(frame, holder), frame.robot(holder)
-    unit = _controller(frame, holder).tasks[task]
+    unit = frame.cell.controllers[_control(frame, holder).id].tasks[task]
     return PartFrame(unit=unit, X_FP=placed.tool.X_FT @ frame.cell.part.X_CP)
 
 
@@ -179,7 +178,7 @@ def quaternions(R: Array) -> Array:
 
 def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> RapidUnit:
     """One robot."""
-    _controller(frame, name)
+    _control(frame, name)
     robot = frame.robot(name)
     axes = Axes.of(robot)
     if len(axes.external) > EXTERNAL_AXES:
@@ -197,45 +196,38 @@ def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> Ra
     )
 
 
-def _controller(frame: ExportFrame, name: str) -> Controller:
-    """The controller of a robot, which must be one that plays these programs."""
+def _control(frame: ExportFrame, name: str) -> RobotControlEntry:
+    """Where a robot is connected: to a controller that plays these programs."""
     control = frame.robot(name).control
-    controllers: Mapping[str, Controller] = frame.cell.controllers
-    if control is None or control.controller not in controllers:
+    controllers = frame.cell.controllers
+    if control is None or control.id not in controllers:
         raise InputError(f"robots.{name}.controller: expected the controller that plays rapid, got none")
-    controller = controllers[control.controller]
-    if controller.kind is not ControllerKind.ABB:
-        raise InputError(
-            f"robots.{name}.controller: expected a controller of kind abb for rapid, got {controller.kind}"
-        )
-    return controller
+    kind = controllers[control.id].kind
+    if kind != "abb":
+        raise InputError(f"robots.{name}.controller: expected a controller of kind abb for rapid, got {kind}")
+    return control
 
 
 def rapid_task(frame: ExportFrame, name: str) -> str:
     """Name of the task that moves a robot."""
-    controller, control = _controller(frame, name), frame.robot(name).control
-    task = None if control is None else control.task
-    known = ", ".join(controller.tasks) or "none"
-    if task is None or task not in controller.tasks:
-        got = "none" if task is None else task
+    control = _control(frame, name)
+    task, tasks = control.task, frame.cell.controllers[control.id].tasks
+    if task is None or task not in tasks:
+        got, known = "none" if task is None else task, ", ".join(tasks) or "none"
         raise InputError(
-            f"robots.{name}.controller.task: expected one of the tasks of controller '{controller.name}' ({known}), "
+            f"robots.{name}.controller.task: expected one of the tasks of controller '{control.id}' ({known}), "
             f"got {got}"
         )
-    for key, value in ((f"robots.{name}.controller.task", task), (_key(controller, task), controller.tasks[task])):
+    unit = f"controllers.{control.id}.tasks.{task}"
+    for key, value in ((f"robots.{name}.controller.task", task), (unit, tasks[task])):
         if not NAME.fullmatch(value):
             raise InputError(f"{key}: expected a name of at most {LONGEST_NAME} letters, digits and _, got {value!r}")
     return task
 
 
-def _key(controller: Controller, task: str) -> str:
-    """Key of the mechanical unit of a task in the cell file."""
-    return f"controllers.{controller.name}.tasks.{task}"
-
-
 def require_one_controller(frame: ExportFrame) -> None:
     """Refuse synchronised programs of robots that no single controller moves."""
-    names = dict.fromkeys(_controller(frame, name).name for name in frame.robots)
+    names = dict.fromkeys(_control(frame, name).id for name in frame.robots)
     if len(names) > 1 or len(frame.robots) < 2:
         got = f"controllers {', '.join(names)}" if len(names) > 1 else f"{len(frame.robots)}"
         raise InputError(f"rapid: expected at least two robots on one controller for synchronised programs, got {got}")

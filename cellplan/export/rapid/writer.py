@@ -45,7 +45,6 @@ from cellplan.export.rapid.units import (
 from cellplan.export.rapid.zones import row_zones, rows_at_part, zone_data
 from cellplan.export.text import comment, fixed, joined, safe_names
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, RobotRows, Targets
 from cellplan.model.units import MM
 
@@ -245,7 +244,7 @@ RAPID: Final = Dialect(
     decimals=DECIMALS,
     promises=(Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY),
     interpolation=Interpolation.LINEAR,
-    kinds=frozenset({ControllerKind.ABB}),
+    kinds=frozenset({"abb"}),
     is_thinned=True,
     is_rounded=True,
     split=LINES,

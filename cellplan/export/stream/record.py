@@ -12,14 +12,14 @@ from cellplan.export.json_tree import Raw, Written
 from cellplan.export.text import fixed
 from cellplan.export.timed_rows import cycle_of
 from cellplan.model.cell import Robot
-from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import ExportFrame
 from cellplan.model.robot import Joint
+from cellplan.model.settings.controllers import ControllerEntry
 
 SCHEMA: Final = "cellplan.stream/1"
 DECIMALS: Final = 6  # of a degree or millimetre
 MICRO: Final = 1_000_000  # [us/s] times and cycles are whole microseconds
-LAGGING: Final = frozenset({ControllerKind.ABB, ControllerKind.UR})  # EGM and servoj follow a stream with a filter
+LAGGING: Final = frozenset({"abb", "ur"})  # EGM and servoj follow a stream with a filter
 FREE: Final = ("notes",)
 FIGURES: Final = 6  # decimals of the figures
 
@@ -86,16 +86,17 @@ def stream_record(
     placed = frame.robot(robot)
     cycle, zero = whole_cycle(placed), placed.model.controller
     controller = stated_controller(frame, placed)
-    latency = None if controller is None else controller.latency
     return {
         "schema": SCHEMA,
         "cell": frame.cell.name,
         "program": program,
         "robot": robot,
         "model": placed.model.name,
-        "controller": None if controller is None else controller.name,
-        "kind": None if controller is None else str(controller.kind),
-        "latency_ms": None if latency is None else Raw(fixed(1000.0 * latency, 3)),
+        "controller": None if placed.control is None else placed.control.id,
+        "kind": None if controller is None else controller.kind,
+        "latency_ms": None
+        if controller is None or controller.latency_ms is None
+        else Raw(fixed(controller.latency_ms, 3)),
         "promise": str(frame.promise),
         "notes": list(notes),
         "file": f"{robot}.csv",
@@ -112,7 +113,7 @@ def stream_record(
     }
 
 
-def stated_controller(frame: ExportFrame, robot: Robot) -> Controller | None:
+def stated_controller(frame: ExportFrame, robot: Robot) -> ControllerEntry | None:
     """The controller of a robot; None when none is stated.
 
     Raises:
@@ -120,13 +121,13 @@ def stated_controller(frame: ExportFrame, robot: Robot) -> Controller | None:
     """
     if robot.control is None:
         return None
-    controller = frame.cell.controllers[robot.control.controller]
-    if controller.kind in LAGGING and controller.latency is None:
+    controller = frame.cell.controllers[robot.control.id]
+    if controller.kind in LAGGING and controller.latency_ms is None:
         raise InputError(
-            f"controllers.{controller.name}.latency_ms: expected the time by which its robots follow a stream, as "
+            f"controllers.{robot.control.id}.latency_ms: expected the time by which its robots follow a stream, as "
             f"controllers of kind {controller.kind} filter it, got none"
         )
-    if controller.kind == ControllerKind.FANUC and robot.model.controller is None and Axes.of(robot).arm:
+    if controller.kind == "fanuc" and robot.model.controller is None and Axes.of(robot).arm:
         raise InputError(
             f"robots.{robot.name}.controller_zero: expected how the controller counts axis 3, which is counted "
             f"against the horizontal there, got none"

@@ -15,6 +15,7 @@ from cellplan.export.urscript.rows import APPROACH_ACCELERATION, APPROACH_SPEED,
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, Promise
+from cellplan.model.settings.units import si_or_none
 
 DECIMALS: Final = 9  # of a radian
 FEWEST_TIMED: Final = 8  # decimals of a radian: as fine as the six of a degree that a stream has
@@ -104,12 +105,12 @@ def servo_call(frame: ExportFrame, robot: Robot) -> str:
         )
     if robot.control is None:
         raise InputError(f"robots.{robot.name}.controller: expected the controller that plays urscript, got none")
-    controller = frame.cell.controllers[robot.control.controller]
-    latency, shortest, longest = controller.latency, *LOOKAHEAD
+    controller = frame.cell.controllers[robot.control.id]
+    latency, shortest, longest = si_or_none(controller.latency_ms), *LOOKAHEAD
     if latency is None or latency < shortest:
         shown = "none" if latency is None else f"{1000.0 * latency:g}"
         raise InputError(
-            f"controllers.{controller.name}.latency_ms: expected {1000.0 * shortest:g} or more, as servoj follows its "
+            f"controllers.{robot.control.id}.latency_ms: expected {1000.0 * shortest:g} or more, as servoj follows its "
             f"rows with a lookahead time of {1000.0 * shortest:g} to {1000.0 * longest:g} ms, got {shown}"
         )
     return f"a=0, v=0, t={cycle:.3f}, lookahead_time={min(latency, longest):.3f}, gain={GAIN}"

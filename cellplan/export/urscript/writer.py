@@ -38,7 +38,6 @@ from cellplan.export.urscript.text import (
     stop_call,
 )
 from cellplan.model.cell import Robot
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportFrame, ExportJob, Promise, RobotRows
 
 
@@ -132,7 +131,7 @@ URSCRIPT: Final[Dialect] = Dialect(
     read=read_urscript,
     decimals=DECIMALS,
     promises=(Promise.TIMED, Promise.SEQUENCE_ONLY),
-    kinds=frozenset({ControllerKind.UR}),
+    kinds=frozenset({"ur"}),
     at_cycle=True,
     is_thinned=True,
     is_rounded=True,

@@ -36,7 +36,6 @@ from cellplan.export.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, T
 from cellplan.export.zones import tool_zones
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
-from cellplan.model.controllers import ControllerKind
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.units import DEG, MM
 
@@ -294,7 +293,7 @@ VAL3: Final[Dialect] = Dialect(
     read=lambda frame, files: read_val3(frame, files, project_paths(frame, VAL3)),
     decimals=DECIMALS,
     promises=(Promise.SEQUENCE_ONLY,),
-    kinds=frozenset({ControllerKind.STAUBLI}),
+    kinds=frozenset({"staubli"}),
     is_thinned=True,
     is_rounded=True,
     split=PAGE,

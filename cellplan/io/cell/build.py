@@ -8,7 +8,6 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
-from cellplan.io.cell.build_controllers import build_control
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
 from cellplan.io.cell.build_program import build_order, written_program
@@ -82,7 +81,7 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
         order=build_order(name, document),
-        control=build_control(entry.controller),
+        control=entry.controller,
     )
 
 

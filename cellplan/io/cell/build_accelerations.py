@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 from cellplan.io.input.findings import Finding, KeyPath, key_text, listed
-from cellplan.io.schema.acceleration import AccelerationChoice, AccelerationRuleEntry
 from cellplan.io.schema.cell import CellDocument
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
@@ -13,6 +12,7 @@ from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.acceleration import USUAL_ACCELERATION, AccelerationRule
 from cellplan.model.cell import Robot
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.acceleration import AccelerationChoice, AccelerationRuleEntry
 
 
 def acceleration_rule(entry: RobotEntry, cell: AccelerationChoice | None, *, joints: int) -> AccelerationRule:

@@ -4,59 +4,20 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from cellplan.io.input.findings import Finding, KeyPath, key_text, listed, unknown_name
-from cellplan.io.schema.cell import CellDocument
-from cellplan.io.schema.controllers import ControllerEntry, RobotControlEntry
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.units import si_or_none
 
 ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
 EXTERNAL: Final = 6  # external axes that a row of these programs holds
-OF_SIX_AXES: Final = frozenset({ControllerKind.ABB, ControllerKind.KUKA, ControllerKind.STAUBLI})
+OF_SIX_AXES: Final = frozenset({"abb", "kuka", "staubli"})
 SIGNALS: Final = {"kuka": (1, 4096), "ur": (0, 7)}  # first and last number, by kinds whose signals are numbers
 FRAMES: Final = {"kuka": 128}  # largest number of a tool or base, by kind
-WITH_GROUPS: Final = (ControllerKind.FANUC, ControllerKind.YASKAWA)
+WITH_GROUPS: Final = ("fanuc", "yaskawa")
 Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
-
-
-def build_controllers(document: CellDocument) -> dict[str, Controller]:
-    """Controllers by name, times in [s]."""
-    return {
-        name: Controller(
-            name=name,
-            kind=ControllerKind(entry.kind),
-            tasks=dict(entry.tasks),
-            latency=si_or_none(entry.latency_ms),
-            skew=si_or_none(entry.skew_ms),
-            reaction=si_or_none(entry.reaction_ms),
-            brake=entry.brake_s,
-        )
-        for name, entry in (document.controllers or {}).items()
-    }
-
-
-def build_control(entry: RobotControlEntry | None) -> RobotControl | None:
-    """Where a robot is connected; None where nothing is stated. Signals are texts, also those given by number."""
-    if entry is None:
-        return None
-    signals = entry.handshake
-    return RobotControl(
-        controller=entry.id,
-        task=entry.task,
-        group=entry.group,
-        decimals=entry.decimals,
-        cycle=si_or_none(entry.cycle_ms),
-        tool_number=entry.tool_number,
-        base_number=entry.base_number,
-        handshake=None
-        if signals is None
-        else Handshake(
-            output=str(signals.output), inputs={robot: str(signal) for robot, signal in signals.inputs.items()}
-        ),
-    )
 
 
 def control_findings(

@@ -17,7 +17,7 @@ from cellplan.io.cell.build import (
     resolved_document,
 )
 from cellplan.io.cell.build_accelerations import acceleration_findings
-from cellplan.io.cell.build_controllers import build_controllers, control_findings
+from cellplan.io.cell.build_controllers import control_findings
 from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_layout import read_layout
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
@@ -271,7 +271,7 @@ def _cell(
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),
         program=whole.program,
-        controllers=build_controllers(whole),
+        controllers=whole.controllers or {},
     )
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, unknown_name
-from cellplan.io.schema.controller import ControllerZeroEntry
 from cellplan.io.schema.messages import validate
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.controller import ControllerZero
 from cellplan.model.robot import Joint, RobotModel
+from cellplan.model.settings.controller import ControllerZeroEntry
 from cellplan.model.settings.units import si_or_none
 
 PARALLEL: Final = 0.999  # [-] cosine of two axes that count as parallel: 2.6 deg

@@ -4,8 +4,6 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
@@ -18,7 +16,9 @@ from cellplan.io.schema.task import (
     TimeLawChoice,
 )
 from cellplan.io.schema.tool import Mass
+from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.settings.entry import (
     Coordinates,
     Entry,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from cellplan.io.input.findings import Finding
-from cellplan.io.schema.acceleration import AccelerationChoice
 from cellplan.io.schema.cell import (
     OBSTACLE_LIMIT,
     ROBOT_LIMIT,
@@ -14,7 +13,6 @@ from cellplan.io.schema.cell import (
     MotionEntry,
     PartEntry,
 )
-from cellplan.io.schema.controllers import ControllerEntry
 from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.robot import RobotEntry
@@ -22,7 +20,9 @@ from cellplan.io.schema.shapes import ObstacleEntry
 from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
+from cellplan.model.settings.acceleration import AccelerationChoice
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.settings.program import ProgramEntry
 
 

@@ -4,12 +4,12 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.acceleration import AccelerationChoice, CycleTime
-from cellplan.io.schema.controllers import RobotControlEntry
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.joint_path import JointPathEntry
 from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
 from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
+from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
+from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.settings.entry import (
     Angle,
     Coordinate,

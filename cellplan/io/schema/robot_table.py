@@ -4,7 +4,6 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.controller import ControllerZeroEntry
 from cellplan.io.schema.robot import (
     AXIS_LIMIT,
     SLIDING_LIMITS,
@@ -19,6 +18,7 @@ from cellplan.io.schema.robot import (
     TurningSpeed,
 )
 from cellplan.io.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
+from cellplan.model.settings.controller import ControllerZeroEntry
 from cellplan.model.settings.entry import (
     NOT_TURNED,
     ORIGIN,

@@ -101,7 +101,7 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
 def _plays(cell: Cell, dialect: Dialect, robot: str) -> bool:
     """Whether the controller of a robot plays a format."""
     control = cell.robot(robot).control
-    return control is not None and cell.controllers[control.controller].kind in dialect.kinds
+    return control is not None and cell.controllers[control.id].kind in dialect.kinds
 
 
 def _not_played(cell: Cell, dialect: Dialect, robot: str) -> str:
@@ -112,5 +112,5 @@ def _not_played(cell: Cell, dialect: Dialect, robot: str) -> str:
     kinds = " or ".join(sorted(dialect.kinds))
     return (
         f"robots.{robot}.controller: expected a controller of kind {kinds}, which plays {dialect.name}, got "
-        f"'{control.controller}' of kind {cell.controllers[control.controller].kind}"
+        f"'{control.id}' of kind {cell.controllers[control.id].kind}"
     )

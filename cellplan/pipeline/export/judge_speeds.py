@@ -12,6 +12,7 @@ from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import part_poses
+from cellplan.export.timed_rows import cycle_of
 from cellplan.geometry.arrays import Array
 from cellplan.model.acceleration import MotionAccelerations
 from cellplan.model.cell import Robot
@@ -88,7 +89,7 @@ def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
     """Times and positions at which the speeds of a robot count: its rows, or a cubic on its controller's cycle."""
     rows = played.rows[robot.name]
     times = times_of(rows)
-    cycle = robot.controller_cycle if robot.control is None or robot.control.cycle is None else robot.control.cycle
+    cycle = cycle_of(robot)
     if played.interpolation is not Interpolation.CUBIC or cycle >= float(np.diff(times).min()):
         return times, rows.q
     fine = np.linspace(times[0], times[-1], int(np.ceil((times[-1] - times[0]) / cycle)) + 1)

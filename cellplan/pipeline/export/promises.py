@@ -8,17 +8,15 @@ from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import listed
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import Promise
+from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.dialects import DIALECTS
 from cellplan.pipeline.export.run_programs import moving_robots, run_programs, spoilt_by_another_order
 from cellplan.pipeline.export.skew import PER_SECOND, ClockPair, RunSkew, skew_text
 
 BEST_FIRST: Final = (Promise.TIMED, Promise.SYNCHRONISED, Promise.SEQUENCE_ONLY)
-LAGGING: Final = {
-    "stream": frozenset({ControllerKind.UR, ControllerKind.ABB})
-}  # servoj and EGM follow 0.03 to 0.2 s late
+LAGGING: Final = {"stream": frozenset({"ur", "abb"})}  # servoj and EGM follow 0.03 to 0.2 s late
 ONE_CLOCK: Final = "timed for one controller; several controllers agree only to their start skew"
 
 
@@ -49,10 +47,10 @@ class _Export:
     asked: Promise | None
 
     @property
-    def controllers(self) -> list[Controller]:
-        """The stated controllers of the robots that are exported, each once."""
-        names = dict.fromkeys(controllers_of(self.run.cell, self.robots).values())
-        return [self.run.cell.controllers[name] for name in names if name in self.run.cell.controllers]
+    def controllers(self) -> dict[str, ControllerEntry]:
+        """The stated controllers of the robots that are exported, by name."""
+        stated = self.run.cell.controllers
+        return {name: stated[name] for name in controllers_of(self.run.cell, self.robots).values() if name in stated}
 
 
 def choose_promise(
@@ -118,7 +116,7 @@ def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:
     found = {}
     for name in robots:
         control = cell.robot(name).control
-        found[name] = f"that of {name}" if control is None else control.controller
+        found[name] = f"that of {name}" if control is None else control.id
     return found
 
 
@@ -140,10 +138,10 @@ def _against(export: _Export, promise: Promise) -> _Against | None:
 def _against_timed(export: _Export) -> _Against | None:
     """Why the rows are not passed at their times."""
     kinds = LAGGING.get(export.dialect.name, frozenset())
-    for controller in export.controllers:
-        if (export.dialect.lags or controller.kind in kinds) and controller.latency is None:
+    for name, controller in export.controllers.items():
+        if (export.dialect.lags or controller.kind in kinds) and controller.latency_ms is None:
             text = (
-                f"controllers.{controller.name}.latency_ms: expected the time by which its robots follow what "
+                f"controllers.{name}.latency_ms: expected the time by which its robots follow what "
                 f"{export.dialect.name} sends to them, got none"
             )
             return _Against(text, is_input=True)
@@ -221,16 +219,16 @@ def _unwritten(cell: Cell) -> Iterator[str]:
 def waits(cell: Cell, robot: str) -> bool:
     """Whether the controller of a robot plays a format whose programs wait for one another at marks."""
     control = cell.robot(robot).control
-    kind = None if control is None else cell.controllers[control.controller].kind
+    kind = None if control is None else cell.controllers[control.id].kind
     return any(kind in each.kinds and Promise.SEQUENCE_ONLY in each.promises for each in DIALECTS.values())
 
 
 def _skew_remarks(export: _Export) -> Iterator[str]:
     """What robots on other controllers, and interfaces that lag, ask for."""
     cell = export.run.cell
-    for controller in export.controllers:
-        if controller.latency is not None:
-            yield f"controller {controller.name} follows {_ms(controller.latency)} late: start it that much earlier"
+    for name, controller in export.controllers.items():
+        if controller.latency_ms is not None:
+            yield f"controller {name} follows {_ms(controller.latency_ms.si)} late: start it that much earlier"
     every = [robot.name for robot in cell.robots]
     for pair in () if export.skew is None else export.skew.broken(every):
         yield f"not to be played together with the robots of other controllers: {_broken_skew(export.skew, pair)}"

@@ -13,10 +13,10 @@ from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Part
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Report, ToolDepth
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.skew import MOST_SKEW, SkewLimit, SkewReport
 from cellplan.model.task import Frame
@@ -47,7 +47,7 @@ def cell_of(
     return replace(
         make_cell(
             *(
-                replace(robot, control=RobotControl(controller=controllers[robot.name]))
+                replace(robot, control=RobotControlEntry(id=controllers[robot.name]))
                 if robot.name in controllers
                 else robot
                 for robot in robots
@@ -57,8 +57,7 @@ def cell_of(
             checks=ChecksEntry(clearance_mm=1e3 * clearance, contact_zone_mm=0.0),
         ),
         controllers={
-            name: Controller(name=name, kind=ControllerKind.OTHER, skew=(skews or {}).get(name))
-            for name in set(controllers.values())
+            name: ControllerEntry(kind="other", skew_ms=(skews or {}).get(name)) for name in set(controllers.values())
         },
     )
 
@@ -116,7 +115,7 @@ def test_bodies_limit_the_pair_that_comes_near() -> None:
 
 @pytest.mark.parametrize("stated", [1e-3, 8e-3])
 def test_a_stated_skew_has_an_error_and_a_shortest_cycle(stated: float) -> None:
-    found = skew_of(cell_of(APART, skews={"a": stated, "b": 2.0 * stated}))
+    found = skew_of(cell_of(APART, skews={"a": 1e3 * stated, "b": 2e3 * stated}))
 
     (tool,) = found.tools
     pair = next(each for each in found.pairs if {each.first, each.second} == {"holder", "operator"})
@@ -171,7 +170,7 @@ def test_a_task_in_the_world_depends_on_no_other_clock() -> None:
 
 
 def test_notes_are_ascii_and_name_what_limits() -> None:
-    lines = skew_notes(skew_of(cell_of(APART, skews={"a": 8e-3})))
+    lines = skew_notes(skew_of(cell_of(APART, skews={"a": 8.0})))
 
     assert all(line.isascii() for line in lines)
     assert lines[0] == "allowed skew between any two clocks: 4 ms; of each clock alone: +-2 ms"

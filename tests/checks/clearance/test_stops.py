@@ -14,9 +14,9 @@ from cellplan.checks.clearance.stops import BAND_PARTS, check_stops, one_stop, s
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.settings.checks import ChecksEntry, StopEntry
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.scene.scene import Scene
 
 SPEED = 0.8  # [m/s] of both robots
@@ -27,13 +27,13 @@ PEN = Tool(
 
 
 def controlled(robot: Robot, controller: str) -> Robot:
-    return replace(robot, control=RobotControl(controller=controller))
+    return replace(robot, control=RobotControlEntry(id=controller))
 
 
-def controllers(**seconds: tuple[float, float]) -> dict[str, Controller]:
+def controllers(**seconds: tuple[float, float]) -> dict[str, ControllerEntry]:
     """Controllers by name, with the times in [s] in which they react and brake."""
     return {
-        name: Controller(name=name, kind=ControllerKind.OTHER, reaction=reaction, brake=brake)
+        name: ControllerEntry(kind="other", reaction_ms=1e3 * reaction, brake_s=brake)
         for name, (reaction, brake) in seconds.items()
     }
 
@@ -166,7 +166,8 @@ def test_a_part_that_nobody_carries_is_run_onto_by_no_stop() -> None:
 def test_nothing_is_said_where_no_controller_states_how_its_robots_go_on() -> None:
     cell, schedule, q = convoy(StopEntry(clearance_mm=10.0))
     silent = replace(
-        cell, controllers={name: replace(each, reaction=None, brake=None) for name, each in cell.controllers.items()}
+        cell,
+        controllers={name: each.changed(reaction_ms=None, brake_s=None) for name, each in cell.controllers.items()},
     )
 
     assert stop_report(Scene.from_cell(silent), schedule, q) is None

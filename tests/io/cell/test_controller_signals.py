@@ -8,7 +8,7 @@ import pytest
 from cellplan.errors import InvalidFileError
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Handshake
+from cellplan.model.settings.controllers import HandshakeEntry
 
 KUKA = "    model: kuka_kr6\n"
 LEADS = "{id: c1, handshake: {output: 5, inputs: {worker: 7}}}"
@@ -44,7 +44,7 @@ def test_the_first_and_the_last_signal_of_a_kind_can_be_stated(
     holder = connected(("kind: kuka", f"kind: {kind}"), signals).robot("holder").control
 
     assert holder is not None
-    assert holder.handshake == Handshake(output=str(first), inputs={"worker": str(last)})
+    assert holder.handshake == HandshakeEntry(output=first, inputs={"worker": last})
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import get_args
 
 import pytest
 
 from cellplan.errors import InvalidFileError
 from cellplan.io.cell.load import load_cell
 from cellplan.io.cell.write import render_cell
-from cellplan.io.schema.controllers import KindName
 from cellplan.model.cell import Cell
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
 from cellplan.model.settings.checks import StopEntry
+from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, RobotControlEntry
 
 KUKA = "    model: kuka_kr6\n"
 ABB = "    weights: [1, 1, 1, 1, 1, 1]\n"
@@ -46,30 +44,26 @@ def connected(base_cell: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     return load_changed
 
 
-def test_controllers_are_read_in_seconds_and_signals_as_texts(connected: Load) -> None:
+def test_controllers_are_read_with_their_units_and_signals(connected: Load) -> None:
     cell = connected()
 
     assert cell.controllers == {
-        "c1": Controller(name="c1", kind=ControllerKind.KUKA, latency=0.012, skew=0.004, reaction=0.1, brake=0.5),
-        "c2": Controller(name="c2", kind=ControllerKind.ABB, tasks={"T_ROB1": "ROB_1"}),
+        "c1": ControllerEntry(kind="kuka", latency_ms=12.0, skew_ms=4.0, reaction_ms=100.0, brake_s=0.5),
+        "c2": ControllerEntry(kind="abb", tasks={"T_ROB1": "ROB_1"}),
     }
-    assert cell.robot("holder").control == RobotControl(
-        controller="c1", handshake=Handshake(output="5", inputs={"worker": "7"})
+    assert cell.robot("holder").control == RobotControlEntry(
+        id="c1", handshake=HandshakeEntry(output=5, inputs={"worker": 7})
     )
-    assert cell.robot("worker").control == RobotControl(
-        controller="c2",
+    assert cell.robot("worker").control == RobotControlEntry(
+        id="c2",
         task="T_ROB1",
         decimals=3,
-        cycle=0.008,
+        cycle_ms=8.0,
         tool_number=1,
         base_number=2,
-        handshake=Handshake(output="do_there", inputs={"holder": "di_go"}),
+        handshake=HandshakeEntry(output="do_there", inputs={"holder": "di_go"}),
     )
     assert cell.checks.stop == StopEntry(depth_mm=2.0, clearance_mm=1.5)
-
-
-def test_every_kind_of_controller_can_be_stated() -> None:
-    assert set(get_args(KindName)) == {str(kind) for kind in ControllerKind}
 
 
 def test_a_cell_without_controllers_knows_none(load: Load) -> None:
@@ -116,12 +110,12 @@ def test_values_of_controllers_are_changed_by_address(connected: Load) -> None:
         }
     )
 
-    assert changed.controllers["c1"].skew == 0.006
+    assert changed.controllers["c1"].skew_ms == 6.0
     worker, holder = changed.robot("worker").control, changed.robot("holder").control
     assert worker is not None
     assert (worker.decimals, worker.task) == (5, None)
     assert holder is not None
-    assert holder.handshake == Handshake(output="5", inputs={"worker": "9"})
+    assert holder.handshake == HandshakeEntry(output=5, inputs={"worker": 9})
     assert changed.checks.stop == StopEntry(clearance_mm=1.5)
 
 
@@ -136,7 +130,7 @@ def test_several_robots_share_a_controller_with_tasks_and_signals_of_their_own(c
         ),
     )
 
-    assert [robot.control.controller for robot in cell.robots if robot.control] == ["c2", "c2"]
+    assert [robot.control.id for robot in cell.robots if robot.control] == ["c2", "c2"]
 
 
 @pytest.mark.parametrize(
@@ -318,7 +312,7 @@ def test_the_same_number_may_be_an_output_and_an_input(connected: Load) -> None:
     holder = connected(("inputs: {worker: 7}", "inputs: {worker: 5}")).robot("holder").control
 
     assert holder is not None
-    assert holder.handshake == Handshake(output="5", inputs={"worker": "5"})
+    assert holder.handshake == HandshakeEntry(output=5, inputs={"worker": 5})
 
 
 RIGHT, RAIL = "    base: {xyz_mm: [2000, 0, 0], rpy_deg: [0, 0, 180]}\n", "axis: +y, lower_mm: 0, upper_mm: 9"

@@ -10,8 +10,8 @@ from builders.vendor_cells import solve_into, write_cell
 
 from cellplan import VerifiedRun, open_gate
 from cellplan.errors import InputError
-from cellplan.model.controllers import Controller, ControllerKind
 from cellplan.model.exported import Promise
+from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.verified_run import ACCESS_TOKEN
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.dialects import DIALECTS
@@ -70,7 +70,7 @@ def test_a_promise_that_is_not_kept_is_not_replaced_by_a_lesser_one(folder: Path
 
 
 def test_a_latency_that_is_not_stated_is_asked_for_where_times_are(run: VerifiedRun) -> None:
-    unstated = {name: replace(each, latency=None) for name, each in run.cell.controllers.items()}
+    unstated = {name: each.changed(latency_ms=None) for name, each in run.cell.controllers.items()}
     bare = replace(run, cell=replace(run.cell, controllers=unstated), token=ACCESS_TOKEN)
 
     assert choose_promise(bare, URSCRIPT, ("right",)).promise is Promise.SEQUENCE_ONLY
@@ -80,7 +80,7 @@ def test_a_latency_that_is_not_stated_is_asked_for_where_times_are(run: Verified
 
 def test_robots_whose_waits_no_format_writes_are_named(run: VerifiedRun) -> None:
     assert not any("no format writes" in remark for remark in choose_promise(run, VAL3, ("left",)).remarks)
-    other = Controller(name="other", kind=ControllerKind.REIS)
+    other = ControllerEntry(kind="reis")
     mixed = replace(run.cell, controllers={**run.cell.controllers, "other": other})
 
     found = choose_promise(replace(run, cell=mixed, token=ACCESS_TOKEN), VAL3, ("left",))

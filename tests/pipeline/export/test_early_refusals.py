@@ -10,8 +10,8 @@ import pytest
 from cellplan import open_gate
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.model.controllers import Controller, ControllerKind, Handshake, RobotControl
 from cellplan.model.exported import Promise
+from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
 from cellplan.model.verified_run import ReadRun
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.dialects import DIALECTS
@@ -30,11 +30,11 @@ def read(sound: Path) -> ReadRun:
     return found[0]
 
 
-def on(read: ReadRun, kind: ControllerKind, *, handshake: Handshake | None = None, **stated: float) -> ReadRun:
+def on(read: ReadRun, kind: KindName, *, handshake: HandshakeEntry | None = None, **stated: float) -> ReadRun:
     """The run with all robots on one controller."""
-    control = RobotControl(controller="c", handshake=handshake)
+    control = RobotControlEntry(id="c", handshake=handshake)
     robots = tuple(replace(robot, control=control) for robot in read.cell.robots)
-    controllers = {"c": Controller(name="c", kind=kind, **stated)}
+    controllers = {"c": ControllerEntry(kind=kind, **stated)}
     return replace(read, cell=replace(read.cell, robots=robots, controllers=controllers))
 
 
@@ -85,7 +85,7 @@ def test_every_robot_without_a_controller_is_named(read: ReadRun) -> None:
 
 
 def test_all_that_a_stream_needs_is_said_at_once(read: ReadRun) -> None:
-    lagging = on(read, ControllerKind.UR)
+    lagging = on(read, "ur")
 
     with pytest.raises(InputError) as refusal:
         refuse_unfit(lagging, DIALECTS["stream"], Choice(thin_mm=None))
@@ -95,7 +95,7 @@ def test_all_that_a_stream_needs_is_said_at_once(read: ReadRun) -> None:
 
 def test_signals_of_all_robots_and_their_names_are_said_at_once(read: ReadRun) -> None:
     """The motion allows no other order: what else is missing is said beside that, with a cure."""
-    urs = on(read, ControllerKind.KUKA, handshake=Handshake(output="x", inputs={"left": "y"}))
+    urs = on(read, "kuka", handshake=HandshakeEntry(output="x", inputs={"left": "y"}))
 
     with pytest.raises(NotVerifiedError) as refusal:
         refuse_unfit(urs, DIALECTS["krl"], Choice())
@@ -111,7 +111,7 @@ def test_signals_of_all_robots_and_their_names_are_said_at_once(read: ReadRun) -
 
 
 def test_the_cure_is_no_controller_that_all_robots_have_already(read: ReadRun) -> None:
-    for kind, form in ((ControllerKind.STAUBLI, "val3"), (ControllerKind.KUKA, "krl")):
+    for kind, form in (("staubli", "val3"), ("kuka", "krl")):
         with pytest.raises(NotVerifiedError) as refusal:
             refuse_unfit(on(read, kind), DIALECTS[form], Choice())
 

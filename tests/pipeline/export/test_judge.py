@@ -12,8 +12,8 @@ from builders.two_phases import PAIR
 
 from cellplan import load_cell, open_gate, solve, write_run
 from cellplan.export.corners import row_shares
-from cellplan.model.controllers import ControllerKind, RobotControl
 from cellplan.model.exported import Interpolation, ProgramRows, Promise, RobotRows
+from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.pipeline.export.compare_rows import other_rows
 from cellplan.pipeline.export.judge import judge
@@ -254,14 +254,14 @@ def test_rows_on_the_cycle_of_a_controller_are_judged_as_they_are_played(run: Ve
 
 
 def test_decimals_of_a_robot_count_in_the_language_of_its_controller_only(run: VerifiedRun) -> None:
-    stated = replace(run.cell.robot("right"), control=RobotControl(controller="one", decimals=2))
+    stated = replace(run.cell.robot("right"), control=RobotControlEntry(id="one", decimals=2))
     cell = replace(run.cell, robots=tuple(stated if each.name == "right" else each for each in run.cell.robots))
     job = job_of(run, full_rows(run))
     job = replace(job, frame=replace(job.frame, cell=cell))
     read = _changed(read_back(job, decimals=9), "right", lambda rows: replace(rows, q=rows.q + 0.004 * DEGREE))
     table = dialect(decimals=9)
 
-    assert list(other_rows(replace(table, kinds=frozenset({ControllerKind.KUKA})), job, read)) == []
+    assert list(other_rows(replace(table, kinds=frozenset({"kuka"})), job, read)) == []
     assert len(list(other_rows(table, job, read))) == 1
 
 

@@ -11,8 +11,8 @@ from cellplan.errors import NotVerifiedError
 from cellplan.export.krl.writer import KRL
 from cellplan.export.rapid.writer import RAPID
 from cellplan.geometry.transforms import Array
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.exported import ProgramRows, Promise, RobotRows
+from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.verified_run import ACCESS_TOKEN
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.judge import Judgement, judge
@@ -159,9 +159,9 @@ def at_times(program: ProgramRows, robot: str, times: Array) -> Array:
     return np.stack([np.interp(times, rows.times, column) for column in rows.q.T], axis=1)
 
 
-def on_controllers(run: VerifiedRun, kind: ControllerKind, **of: str) -> VerifiedRun:
-    placed = tuple(replace(each, control=RobotControl(controller=of[each.name])) for each in run.cell.robots)
-    controllers = {name: Controller(name=name, kind=kind) for name in of.values()}
+def on_controllers(run: VerifiedRun, kind: KindName, **of: str) -> VerifiedRun:
+    placed = tuple(replace(each, control=RobotControlEntry(id=of[each.name])) for each in run.cell.robots)
+    controllers = {name: ControllerEntry(kind=kind) for name in of.values()}
     return replace(run, cell=replace(run.cell, robots=placed, controllers=controllers), token=ACCESS_TOKEN)
 
 
@@ -169,7 +169,7 @@ def on_controllers(run: VerifiedRun, kind: ControllerKind, **of: str) -> Verifie
 @pytest.mark.parametrize("form", [KRL, RAPID])
 def test_holders_that_move_are_never_free_in_their_order(run: VerifiedRun, form, robots: tuple[str, ...]) -> None:
     """Whichever of them is exported, although no tool is in process on the part."""
-    apart = on_controllers(run, ControllerKind.KUKA, left="a", right="b")
+    apart = on_controllers(run, "kuka", left="a", right="b")
 
     with pytest.raises(NotVerifiedError) as refusal:
         choose_promise(apart, form, robots)
@@ -183,7 +183,7 @@ def test_holders_that_move_are_never_free_in_their_order(run: VerifiedRun, form,
 
 
 def test_holders_of_one_controller_may_be_in_step(run: VerifiedRun) -> None:
-    one = on_controllers(run, ControllerKind.ABB, left="a", right="a")
+    one = on_controllers(run, "abb", left="a", right="a")
 
     assert choose_promise(one, RAPID, HOLDERS).promise is Promise.SYNCHRONISED
     with pytest.raises(NotVerifiedError, match="rapid: not sequence only"):
@@ -191,7 +191,7 @@ def test_holders_of_one_controller_may_be_in_step(run: VerifiedRun) -> None:
 
 
 def test_holders_whose_clocks_are_too_far_apart_are_not_timed(run: VerifiedRun) -> None:
-    apart = on_controllers(run, ControllerKind.OTHER, left="a", right="b")
+    apart = on_controllers(run, "other", left="a", right="b")
     skew = RunSkew(
         pairs=(ClockPair(first="left", second="right", allowed=1e-4, stated=2e-4, reason="grip"),), cycle=3.0
     )
@@ -202,10 +202,10 @@ def test_holders_whose_clocks_are_too_far_apart_are_not_timed(run: VerifiedRun) 
 
 def test_holders_of_different_cycles_are_named_where_they_strain_the_part(run: VerifiedRun) -> None:
     """0.005 mm between rows of 4 and 36 ms; with the demand below it the refusal says which keys differ."""
-    apart = on_controllers(run, ControllerKind.OTHER, left="a", right="b")
+    apart = on_controllers(run, "other", left="a", right="b")
     cycles = {"left": 0.004, "right": 0.036}
     robots = tuple(
-        replace(each, control=replace(each.control, cycle=cycles[each.name]))
+        replace(each, control=each.control.changed(cycle_ms=1e3 * cycles[each.name]))
         for each in apart.cell.robots
         if each.control is not None
     )

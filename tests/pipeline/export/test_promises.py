@@ -9,8 +9,8 @@ from builders.commands import run_command
 from cellplan import VerifiedRun, open_gate
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.csv import CSV
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
 from cellplan.model.exported import Promise
+from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.verified_run import ACCESS_TOKEN
 from cellplan.pipeline.export.choice import Choice, exported_robots
 from cellplan.pipeline.export.dialects import DIALECTS
@@ -27,18 +27,18 @@ def run(sound: Path) -> VerifiedRun:
     return open_gate(sound / "run", cell=sound / "cell" / "small.yaml")
 
 
-def on_controllers(run: VerifiedRun, *controllers: Controller, **robots: str) -> VerifiedRun:
+def on_controllers(run: VerifiedRun, controllers: dict[str, ControllerEntry], **robots: str) -> VerifiedRun:
     """The run with some of its robots on controllers."""
     placed = tuple(
-        replace(robot, control=RobotControl(controller=robots[robot.name])) if robot.name in robots else robot
+        replace(robot, control=RobotControlEntry(id=robots[robot.name])) if robot.name in robots else robot
         for robot in run.cell.robots
     )
-    cell = replace(run.cell, robots=placed, controllers={each.name: each for each in controllers})
+    cell = replace(run.cell, robots=placed, controllers=controllers)
     return replace(run, cell=cell, token=ACCESS_TOKEN)
 
 
-def controller(name: str, kind: ControllerKind = ControllerKind.KUKA, **stated: float) -> Controller:
-    return Controller(name=name, kind=kind, **stated)
+def controllers(*names: str, kind: KindName = "kuka", latency_ms: float | None = None) -> dict[str, ControllerEntry]:
+    return dict.fromkeys(names, ControllerEntry(kind=kind, latency_ms=latency_ms))
 
 
 def test_robots_without_controllers_are_timed_for_one_controller(run: VerifiedRun) -> None:
@@ -48,18 +48,16 @@ def test_robots_without_controllers_are_timed_for_one_controller(run: VerifiedRu
 
 
 def test_robots_of_one_controller_share_its_clock(run: VerifiedRun) -> None:
-    one = on_controllers(run, controller("c"), left="c", right="c", idle="c")
+    one = on_controllers(run, controllers("c"), left="c", right="c", idle="c")
 
     assert choose_promise(one, CSV, EVERY).remarks == ()
 
 
-@pytest.mark.parametrize(
-    ("form", "kind"), [("stream", ControllerKind.UR), ("stream", ControllerKind.ABB), ("any", None)]
-)
-def test_an_interface_that_lags_needs_its_latency(run: VerifiedRun, form: str, kind: ControllerKind | None) -> None:
+@pytest.mark.parametrize(("form", "kind"), [("stream", "ur"), ("stream", "abb"), ("any", None)])
+def test_an_interface_that_lags_needs_its_latency(run: VerifiedRun, form: str, kind: KindName | None) -> None:
     dialect = replace(CSV, name=form, lags=kind is None)
-    bare = on_controllers(run, controller("c", kind or ControllerKind.KUKA), left="c")
-    stated = on_controllers(run, controller("c", kind or ControllerKind.KUKA, latency=0.05), left="c")
+    bare = on_controllers(run, controllers("c", kind=kind or "kuka"), left="c")
+    stated = on_controllers(run, controllers("c", kind=kind or "kuka", latency_ms=50.0), left="c")
 
     with pytest.raises(InputError, match=rf"controllers\.c\.latency_ms: expected .* {form} sends to them, got none"):
         choose_promise(bare, dialect, EVERY)
@@ -86,7 +84,7 @@ def test_a_stated_skew_beyond_the_allowed_one_is_not_timed(run: VerifiedRun) -> 
 
 
 def test_two_robots_of_one_controller_are_synchronised(run: VerifiedRun) -> None:
-    both = on_controllers(run, controller("c"), controller("d"), left="c", right="c", idle="d")
+    both = on_controllers(run, controllers("c", "d"), left="c", right="c", idle="d")
 
     found = choose_promise(both, IN_STEP, ("left", "right"))
 
@@ -105,7 +103,7 @@ def test_two_robots_of_one_controller_are_synchronised(run: VerifiedRun) -> None
 def test_what_is_not_synchronised_and_no_free_order_either_is_refused(
     run: VerifiedRun, robots: tuple[str, ...], reason: str
 ) -> None:
-    apart = on_controllers(run, controller("c"), controller("d"), left="c", right="d", idle="d")
+    apart = on_controllers(run, controllers("c", "d"), left="c", right="d", idle="d")
 
     with pytest.raises(NotVerifiedError, match=reason) as refusal:
         choose_promise(apart, IN_STEP, robots)
@@ -120,8 +118,8 @@ def test_what_is_not_synchronised_and_no_free_order_either_is_refused(
 
 
 def test_a_format_of_a_maker_writes_the_robots_of_its_controllers(run: VerifiedRun) -> None:
-    dialect = replace(CSV, name="krl", kinds=frozenset({ControllerKind.KUKA}))
-    cell = on_controllers(run, controller("c"), controller("d", ControllerKind.ABB), left="c", right="d").cell
+    dialect = replace(CSV, name="krl", kinds=frozenset({"kuka"}))
+    cell = on_controllers(run, controllers("c") | controllers("d", kind="abb"), left="c", right="d").cell
 
     assert exported_robots(cell, dialect, ()) == ("left",)
     assert exported_robots(cell, CSV, ("idle", "left")) == ("left", "idle")
@@ -175,10 +173,10 @@ def test_a_choice_that_no_run_allows_is_refused_before_the_run_is_opened(
 
 
 def test_robots_that_are_exported_apart_start_and_end_together(run: VerifiedRun) -> None:
-    placed = on_controllers(run, controller("a"), controller("b"), left="a", right="b")
+    placed = on_controllers(run, controllers("a", "b"), left="a", right="b")
     cycles = {"left": 0.004, "right": 0.012}
     robots = tuple(
-        replace(robot, control=robot.control and replace(robot.control, cycle=cycles[robot.name]))
+        replace(robot, control=robot.control and robot.control.changed(cycle_ms=1e3 * cycles[robot.name]))
         for robot in placed.cell.robots
     )
     apart = replace(placed, cell=replace(placed.cell, robots=robots), token=ACCESS_TOKEN)

@@ -6,7 +6,7 @@ import pytest
 
 from cellplan import VerifiedRun, load_cell, open_gate, solve, write_run
 from cellplan.errors import NotVerifiedError
-from cellplan.model.controllers import Controller, ControllerKind, RobotControl
+from cellplan.model.settings.controllers import ControllerEntry, KindName, RobotControlEntry
 from cellplan.model.verified_run import ACCESS_TOKEN
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.program import exported
@@ -43,19 +43,19 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> VerifiedRun:
 @pytest.mark.parametrize(
     ("form", "kind"),
     [
-        ("krl", ControllerKind.KUKA),
-        ("rapid", ControllerKind.ABB),
-        ("urscript", ControllerKind.UR),
-        ("val3", ControllerKind.STAUBLI),
+        ("krl", "kuka"),
+        ("rapid", "abb"),
+        ("urscript", "ur"),
+        ("val3", "staubli"),
     ],
 )
-def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str, kind: ControllerKind) -> None:
-    control = RobotControl(controller="c", task="T_ROB1" if kind is ControllerKind.ABB else None)
-    tasks = {"T_ROB1": "ROB_1"} if kind is ControllerKind.ABB else {}
+def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str, kind: KindName) -> None:
+    control = RobotControlEntry(id="c", task="T_ROB1" if kind == "abb" else None)
+    tasks = {"T_ROB1": "ROB_1"} if kind == "abb" else {}
     cell = replace(
         alone.cell,
         robots=(replace(alone.cell.robots[0], control=control),),
-        controllers={"c": Controller(name="c", kind=kind, tasks=tasks)},
+        controllers={"c": ControllerEntry(kind=kind, tasks=tasks)},
     )
 
     files, record = exported(replace(alone, cell=cell, token=ACCESS_TOKEN), form, Choice())
@@ -66,11 +66,11 @@ def test_a_single_robot_has_programs_without_waits(alone: VerifiedRun, form: str
 
 
 def test_few_decimals_are_named_where_they_spoil_the_path(alone: VerifiedRun) -> None:
-    control = RobotControl(controller="c", decimals=0)
+    control = RobotControlEntry(id="c", decimals=0)
     cell = replace(
         alone.cell,
         robots=(replace(alone.cell.robots[0], control=control),),
-        controllers={"c": Controller(name="c", kind=ControllerKind.KUKA)},
+        controllers={"c": ControllerEntry(kind="kuka")},
     )
 
     with pytest.raises(NotVerifiedError) as refusal:

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.io.schema.acceleration import CycleTime
-from cellplan.io.schema.controller import ControllerZeroEntry
+from cellplan.model.settings.acceleration import CycleTime
+from cellplan.model.settings.controller import ControllerZeroEntry
 from cellplan.model.settings.entry import Entry, Name, by_kind, rule
 from cellplan.model.settings.units import Ms, Within
 
