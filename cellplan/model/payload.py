@@ -1,54 +1,11 @@
-"""Payload: rated loads as published by the manufacturer, and loads in a run."""
+"""Payload: loads in a run."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AxisLimit:
-    """Limits of the load about one axis of the wrist.
-
-    Attributes:
-        joint: Name of the joint.
-        moment: Largest moment of the load about its axis in [N m]; None when it is not published.
-        inertia: Largest moment of inertia of the load about its axis in [kg m^2]; None when it is not published.
-    """
-
-    joint: str
-    moment: float | None = None
-    inertia: float | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Payload:
-    """Rated load of a robot.
-
-    Attributes:
-        mass: Largest mass in [kg].
-        source: Where the figures come from.
-        along: Largest distance of the centre of mass of the load from the flange plane in [m], along the flange's z;
-            None when not published.
-        across: Largest distance of it from the flange's z axis in [m]; None when not published.
-        axes: Limits of axes of the wrist.
-    """
-
-    mass: float
-    source: str
-    along: float | None = None
-    across: float | None = None
-    axes: tuple[AxisLimit, ...] = ()
-
-    @property
-    def is_mass_only(self) -> bool:
-        """Whether nothing but the mass is published."""
-        return self.along is None and self.across is None and not self.axes
-
-    def axis(self, joint: str) -> AxisLimit:
-        """Limits of an axis; without figures when none are published."""
-        return next((limit for limit in self.axes if limit.joint == joint), AxisLimit(joint=joint))
+from cellplan.model.settings.robot import PayloadEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +52,7 @@ class LoadUse:
     tool_mass: float | None
     part_mass: float | None
     holders: int
-    limits: Payload | None
+    limits: PayloadEntry | None
     centre_F: Array | None = None
     felt: float | None = None
     felt_at_s: float | None = None

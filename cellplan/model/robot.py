@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
 from cellplan.model.controller import ControllerZero
-from cellplan.model.payload import Payload
+from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry, ReachEntry
 from cellplan.model.units import DisplayUnit, joint_unit
 
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
@@ -128,34 +128,6 @@ class Body:
     link_name: str | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BodyAccuracy:
-    """How far the real arm may stick out of the bodies that stand for it.
-
-    Attributes:
-        distance: Largest distance in [m].
-        source: Where the figure comes from.
-    """
-
-    distance: float
-    source: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PublishedReach:
-    """Reach as the maker publishes it.
-
-    Attributes:
-        distance: Largest distance from the first axis in [m].
-        to: The word flange, or the joint to whose point it is measured; None when it is not published.
-        source: Where the figure comes from.
-    """
-
-    distance: float
-    to: str | None
-    source: str
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Link:
     """A link by name, so that things can be mounted on it.
@@ -199,11 +171,11 @@ class RobotModel:
     bodies: tuple[Body, ...]
     followers: tuple[FollowerJoint, ...] = ()
     links: tuple[Link, ...] = ()
-    body_accuracy: BodyAccuracy | None = None
-    payload: Payload | None = None
+    body_accuracy: BodyAccuracyEntry | None = None
+    payload: PayloadEntry | None = None
     disabled: tuple[tuple[str, str, str], ...] = ()
     controller: ControllerZero | None = None
-    reach: PublishedReach | None = None
+    reach: ReachEntry | None = None
 
     def __post_init__(self) -> None:
         """Check the order of the joints and the frames once, so that no later stage has to."""
@@ -220,7 +192,7 @@ class RobotModel:
         """How far the real arm may stick out of one of its bodies in [m]; None when it is not stated."""
         if body.accuracy is not None or self.body_accuracy is None:
             return body.accuracy
-        return self.body_accuracy.distance
+        return self.body_accuracy.accuracy_mm.si
 
     def bodies_named(self, name: str) -> tuple[Body, ...]:
         """All bodies of a link of the robot's file, or else the body that reports show under a name."""

@@ -312,7 +312,7 @@ def test_bodies_hold_the_real_arm(name: str, shared_robots: Path) -> None:
         missed = np.maximum(distance_to_link(model, link, vertices / 1000.0), 0.0)
         assert np.percentile(missed, 95) < 0.030, f"link {link}"  # [m] half the width of a forearm
         assert model.body_accuracy is not None
-        assert missed.max() < model.body_accuracy.distance <= 0.050, f"link {link}"
+        assert missed.max() < model.body_accuracy.accuracy_mm.si <= 0.050, f"link {link}"
 
 
 @pytest.mark.parametrize("name", REAL_ARMS)

@@ -176,12 +176,12 @@ def test_the_arm_reaches_as_far_as_its_maker_publishes(name: str) -> None:
     assert model.reach is not None
     if model.reach.to is None:  # then the published point lies between the wrist and the flange
         wrist = replace(model, X_BF=pose(model.joints[3].point_B, np.zeros(3)), flange_link=3)
-        assert arm_reach(wrist) <= model.reach.distance <= arm_reach(model)
+        assert arm_reach(wrist) <= model.reach.distance_mm.si <= arm_reach(model)
         return
     if model.reach.to != "flange":
         index = model.joint_names.index(model.reach.to)
         model = replace(model, X_BF=pose(model.joints[index].point_B, np.zeros(3)), flange_link=index)
-    assert arm_reach(model) == pytest.approx(model.reach.distance, abs=5e-4)  # rounded to millimetres
+    assert arm_reach(model) == pytest.approx(model.reach.distance_mm.si, abs=5e-4)  # rounded to millimetres
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -262,7 +262,7 @@ def test_the_reference_page_shows_the_figures_of_the_table(name: str, repository
         assert f"| {joint.name} | {figures[0]:g} | {figures[1]:g} | {figures[2]:g} |" in section
     row = next(row for row in page.splitlines() if row.startswith(f"| `{name}` |"))
     assert model.body_accuracy is not None
-    assert f"{1e3 * model.body_accuracy.distance:g} mm, {len(model.bodies)} solids" in row
+    assert f"{model.body_accuracy.accuracy_mm:g} mm, {len(model.bodies)} solids" in row
     assert (repository / "docs" / "images" / f"robot_{name}.png").stat().st_size < 60_000
 
 
@@ -280,7 +280,7 @@ def test_bodies_hold_the_real_robot_as_well_as_they_say(name: str, shared_robots
     assert model.body_accuracy is not None
     assert len(found) == len(model.joints) + 1
     for row in found:
-        assert row.outside < model.body_accuracy.distance <= 0.050, row.link
+        assert row.outside < model.body_accuracy.accuracy_mm.si <= 0.050, row.link
         assert row.usual < 0.025, row.link  # [m] half of it: a box round a casting with rounded edges
         assert row.fat < 0.040, row.link
 

@@ -11,9 +11,10 @@ from cellplan.geometry.inertia import centre_and_inertia
 from cellplan.geometry.transforms import Array, inverse, transform_points
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Robot
-from cellplan.model.payload import AxisLimit, AxisUse, LoadUse, Payload
+from cellplan.model.payload import AxisUse, LoadUse
 from cellplan.model.report import Check
 from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.model.units import MM
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
@@ -164,17 +165,17 @@ def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array)
 def _checks(use: LoadUse) -> list[Check]:
     """The checks of one robot: its mass where that is known or too large already, the rest where all is known."""
     limits = use.limits
-    if limits is None or (not use.is_known and use.known_mass <= limits.mass):
+    if limits is None or (not use.is_known and use.known_mass <= limits.mass_kg):
         return []
     checks = [_mass_check(use, limits)]
     if use.centre_F is not None:
         checks += _centre_checks(use, limits)
-        for axis in use.axes:
-            checks += _axis_checks(use, axis, limits.axis(axis.joint))
+        for axis in (each for each in use.axes if each.joint in limits.axes):
+            checks += _axis_checks(use, axis, limits.axes[axis.joint])
     return checks
 
 
-def _mass_check(use: LoadUse, limits: Payload) -> Check:
+def _mass_check(use: LoadUse, limits: PayloadEntry) -> Check:
     """The mass against the payload."""
     masses = []
     if use.tool_mass is None or use.tool_mass > 0.0:
@@ -186,31 +187,31 @@ def _mass_check(use: LoadUse, limits: Payload) -> Check:
     return Check(
         name="payload",
         subject=use.robot,
-        passed=use.known_mass <= limits.mass,
+        passed=use.known_mass <= limits.mass_kg,
         value=use.known_mass,
-        limit=limits.mass,
+        limit=limits.mass_kg,
         unit="kg",
         at_s=None,
-        message=f"payload {use.robot}: {carried}, allowed {limits.mass:g} kg",
+        message=f"payload {use.robot}: {carried}, allowed {limits.mass_kg:g} kg",
     )
 
 
-def _centre_checks(use: LoadUse, limits: Payload) -> list[Check]:
+def _centre_checks(use: LoadUse, limits: PayloadEntry) -> list[Check]:
     """The centre of mass of the load against the published distances."""
     checks = []
     for where, origin, value, limit in (
-        ("along", "from the flange plane", use.along, limits.along),
-        ("across", "from the flange axis", use.across, limits.across),
+        ("along", "from the flange plane", use.along, limits.along_mm),
+        ("across", "from the flange axis", use.across, limits.across_mm),
     ):
         if limit is not None:
-            text = f"payload {use.robot}: centre of mass {MM * value:.1f} mm {origin}, allowed {MM * limit:g} mm"
+            text = f"payload {use.robot}: centre of mass {MM * value:.1f} mm {origin}, allowed {limit:g} mm"
             checks.append(
                 Check(
                     name="payload_centre",
                     subject=f"{use.robot} {where}",
-                    passed=value <= limit,
+                    passed=value <= limit.si,
                     value=MM * value,
-                    limit=MM * limit,
+                    limit=limit,
                     unit="mm",
                     at_s=None,
                     message=text,
@@ -219,39 +220,39 @@ def _centre_checks(use: LoadUse, limits: Payload) -> list[Check]:
     return checks
 
 
-def _axis_checks(use: LoadUse, axis: AxisUse, limit: AxisLimit) -> list[Check]:
+def _axis_checks(use: LoadUse, axis: AxisUse, limit: AxisLimitEntry) -> list[Check]:
     """Moment and inertia about one axis against what is published."""
     subject, checks = f"{use.robot}/{axis.joint}", []
-    if limit.moment is not None:
+    if limit.moment_nm is not None:
         worst, at_s = max((axis.moment, axis.moment_at_s), (axis.static_moment, axis.static_at_s))
         text = (
             f"payload {subject}: moment of the load {worst:.2f} Nm at {at_s:.3f} s "
-            f"({axis.static_moment:.2f} Nm at rest), allowed {limit.moment:g} Nm"
+            f"({axis.static_moment:.2f} Nm at rest), allowed {limit.moment_nm:g} Nm"
         )
         checks.append(
             Check(
                 name="payload_moment",
                 subject=subject,
-                passed=worst <= limit.moment,
+                passed=worst <= limit.moment_nm,
                 value=worst,
-                limit=limit.moment,
+                limit=limit.moment_nm,
                 unit="Nm",
                 at_s=at_s,
                 message=text,
             )
         )
-    if limit.inertia is not None:
+    if limit.inertia_kg_m2 is not None:
         text = (
             f"payload {subject}: inertia of the load {axis.inertia:.4f} kg m² at {axis.inertia_at_s:.3f} s, "
-            f"allowed {limit.inertia:g} kg m²"
+            f"allowed {limit.inertia_kg_m2:g} kg m²"
         )
         checks.append(
             Check(
                 name="payload_inertia",
                 subject=subject,
-                passed=axis.inertia <= limit.inertia,
+                passed=axis.inertia <= limit.inertia_kg_m2,
                 value=axis.inertia,
-                limit=limit.inertia,
+                limit=limit.inertia_kg_m2,
                 unit="kg m²",
                 at_s=axis.inertia_at_s,
                 message=text,

@@ -85,7 +85,7 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
             schedule.times[first:],
             MM * position[first:],
             subject=task.name,
-            limit=MM * allowed.position,
+            limit=allowed.position_mm,
             words=("mm", f"of task '{task.name}'"),
         ),
         worst_error(
@@ -93,7 +93,7 @@ def check_accuracy(schedule: Schedule, accuracy: TaskAccuracy, task: Task) -> tu
             schedule.times[first:],
             DEG * orientation[first:],
             subject=task.name,
-            limit=DEG * allowed.orientation,
+            limit=allowed.orientation_deg,
             words=("deg", f"of task '{task.name}'"),
         ),
     )

@@ -1,28 +1,10 @@
-"""What a robot may carry: entries of a robot file or a cell become the model's data."""
+"""What a robot may carry: limits of axes that it does not have."""
 
 from collections.abc import Iterator
 
 from cellplan.io.input.findings import Finding, KeyPath, unknown_name
-from cellplan.io.schema.robot import PayloadEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.payload import AxisLimit, Payload
-from cellplan.model.settings.units import si_or_none
-
-
-def build_payload(entry: PayloadEntry | None) -> Payload | None:
-    """What a robot may carry, in [kg], [m], [N m] and [kg m^2]."""
-    if entry is None:
-        return None
-    return Payload(
-        mass=entry.mass_kg,
-        source=entry.source,
-        along=si_or_none(entry.along_mm),
-        across=si_or_none(entry.across_mm),
-        axes=tuple(
-            AxisLimit(joint=joint, moment=limit.moment_nm, inertia=limit.inertia_kg_m2)
-            for joint, limit in entry.axes.items()
-        ),
-    )
+from cellplan.model.settings.robot import PayloadEntry
 
 
 def payload_findings(

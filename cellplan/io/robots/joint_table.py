@@ -17,15 +17,16 @@ from cellplan.guard import Guard, in_child
 from cellplan.io.input.allowed_folders import AllowedFolders
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
 from cellplan.io.robots.build_controller import build_controller, controller_findings, sense_findings
-from cellplan.io.robots.build_payload import build_payload, payload_findings
+from cellplan.io.robots.build_payload import payload_findings
 from cellplan.io.robots.limits import RATES
 from cellplan.io.schema import RobotTableDocument
 from cellplan.io.schema.messages import validate
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS
-from cellplan.io.schema.robot_table import BodiesEntry, JointEntry, ReachEntry
+from cellplan.io.schema.robot_table import BodiesEntry, JointEntry
 from cellplan.io.shapes import link_solid
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
-from cellplan.model.robot import BASE, Body, BodyAccuracy, Joint, JointKind, Link, PublishedReach, RobotModel
+from cellplan.model.robot import BASE, Body, Joint, JointKind, Link, RobotModel
+from cellplan.model.settings.robot import BodyAccuracyEntry
 from cellplan.model.settings.units import in_si, si_or_none
 
 FOOT: Final = "base"  # word for the link that does not move
@@ -168,28 +169,21 @@ def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:
         X_BF=table.flange.matrix,
         bodies=bodies,
         body_accuracy=_body_accuracy(table),
-        payload=build_payload(table.payload),
+        payload=table.payload,
         controller=build_controller(table.controller, joints),
-        reach=_reach(table.reach),
+        reach=table.reach,
         links=tuple(
             Link(name=name, index=index - 1, X_BL=np.eye(4)) for index, name in enumerate((FOOT, *table.joints))
         ),
     )
 
 
-def _body_accuracy(table: RobotTableDocument) -> BodyAccuracy | None:
+def _body_accuracy(table: RobotTableDocument) -> BodyAccuracyEntry | None:
     """How good the bodies are, if the table says so."""
     bodies = table.bodies
     if not isinstance(bodies, BodiesEntry) or bodies.accuracy_mm is None:
         return None
-    return BodyAccuracy(distance=bodies.accuracy_mm.si, source=bodies.source)
-
-
-def _reach(entry: ReachEntry | None) -> PublishedReach | None:
-    """Reach as published, if the table says so."""
-    if entry is None:
-        return None
-    return PublishedReach(distance=entry.distance_mm.si, to=entry.to, source=entry.source)
+    return BodyAccuracyEntry(accuracy_mm=bodies.accuracy_mm, source=bodies.source)
 
 
 def _joint(name: str, entry: JointEntry, parent: int) -> Joint:

@@ -8,11 +8,11 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
-from cellplan.io.robots.build_payload import build_payload, payload_findings
+from cellplan.io.robots.build_payload import payload_findings
 from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.robot import BodyAccuracy, Joint, RobotModel
+from cellplan.model.robot import Joint, RobotModel
 from cellplan.model.settings.units import Deg, Mm, in_si, si_or_none
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
@@ -143,7 +143,6 @@ def _within(joint: Joint, limits: StatedLimits, *, is_slowed: bool) -> Joint:
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
     """The model with what the cell states in place of the robot's own file."""
     if entry.bodies is not None:
-        accuracy = BodyAccuracy(distance=entry.bodies.accuracy_mm.si, source=entry.bodies.source)
         bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
-        model = replace(model, body_accuracy=accuracy, bodies=bodies)
-    return model if entry.payload is None else replace(model, payload=build_payload(entry.payload))
+        model = replace(model, body_accuracy=entry.bodies, bodies=bodies)
+    return model if entry.payload is None else replace(model, payload=entry.payload)

@@ -7,7 +7,7 @@ from pydantic import ConfigDict, Field, Tag, model_validator
 from cellplan.io.schema.gripper import GripperEntry
 from cellplan.io.schema.joint_path import JointPathEntry
 from cellplan.io.schema.mounting import AttachmentEntry, HangingEntry, PedestalEntry, RailBodyEntry, WallEntry
-from cellplan.io.schema.tool import HEAVIEST_KG, ToolEntry
+from cellplan.io.schema.tool import ToolEntry
 from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
 from cellplan.model.settings.controllers import RobotControlEntry
 from cellplan.model.settings.entry import (
@@ -17,7 +17,6 @@ from cellplan.model.settings.entry import (
     Entry,
     Name,
     PoseEntry,
-    Size,
     SlidingSpeed,
     Text,
     by_kind,
@@ -25,6 +24,7 @@ from cellplan.model.settings.entry import (
     require_one,
     rule,
 )
+from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry
 from cellplan.model.settings.units import (
     Deg,
     DegPerS,
@@ -41,7 +41,6 @@ LARGEST_JOINT_DEG: Final = 3600.0  # ten turns: a wider range is a wrong unit
 FASTEST_DEG_S: Final = 3_600.0  # ten turns a second: faster is a wrong unit
 STEEPEST: Final = 1e9  # deg/s2 or mm/s2, as in robot files
 WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses all its digits
-ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
 AXIS_LIMIT: Final = 64  # joints of one robot
 ORDER_LIMIT: Final = 400  # tasks and marks of one robot
 SOLID_LIMIT: Final = 50  # solids of a track or a carriage
@@ -53,8 +52,6 @@ TurningAcceleration = Annotated[DegPerS2, Within(gt=0.0, le=STEEPEST)]
 SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
 TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]
 SlidingJerk = Annotated[MmPerS3, Within(gt=0.0, le=STEEPEST)]
-Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
-LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
 FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
 JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
@@ -131,34 +128,6 @@ class LimitsEntry(Entry):
         """``deg`` or ``mm``; None when neither occurs."""
         given = self.model_dump(exclude_none=True, exclude={"wrap"})
         return None if not given else "mm" if any("_mm" in name for name in given) else "deg"
-
-
-class BodyAccuracyEntry(Entry):
-    """How good the link bodies of a robot are, in place of what its own file says."""
-
-    accuracy_mm: Accuracy = Field(description="Largest distance by which the real arm sticks out of its link bodies.")
-    source: Text = Field(default="stated in the cell", description="Where the figure comes from.")
-
-
-class AxisLimitEntry(Entry):
-    """What the load may do to one axis of the wrist."""
-
-    moment_nm: LoadFigure | None = Field(default=None, description="Largest moment of the load about the axis.")
-    inertia_kg_m2: LoadFigure | None = Field(
-        default=None, description="Largest moment of inertia of the load about the axis."
-    )
-
-
-class PayloadEntry(Entry):
-    """What a robot may carry on its flange, as far as it is published."""
-
-    mass_kg: LoadFigure = Field(description="Largest mass of tool and part.")
-    along_mm: Size | None = Field(
-        default=None, description="Farthest centre of the load from the flange plane, along the flange's z."
-    )
-    across_mm: Size | None = Field(default=None, description="Farthest centre of the load from the flange's z axis.")
-    axes: dict[str, AxisLimitEntry] = Field(default={}, description="Limits of axes of the wrist by joint name.")
-    source: Text = Field(default="not stated", description="Where the figures come from.")
 
 
 class RailEntry(Entry):

@@ -8,9 +8,7 @@ from cellplan.io.schema.robot import (
     AXIS_LIMIT,
     SLIDING_LIMITS,
     TURNING_LIMITS,
-    Accuracy,
     JointAngle,
-    PayloadEntry,
     SlidingAcceleration,
     SlidingJerk,
     TurningAcceleration,
@@ -37,6 +35,7 @@ from cellplan.model.settings.entry import (
     require_one,
     rule,
 )
+from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
 
 BODY_LIMIT: Final = 200  # solids of one robot
 UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
@@ -167,17 +166,6 @@ BodiesChoice = Annotated[
     | Annotated[tuple[LinkBodyEntry, ...], Field(max_length=BODY_LIMIT), Tag("<list>")],
     by_kind(BODIES_WORDS, mapping=dict, list=tuple),
 ]
-
-
-class ReachEntry(Entry):
-    """The maker's figure of the reach, from the first axis."""
-
-    distance_mm: Size = Field(description="Largest distance from the first axis.")
-    to: Text | None = Field(
-        default=None,
-        description="The word flange, or the joint to whose point the maker measures; absent when it is not published.",
-    )
-    source: Text = Field(default="not stated", description="Where the figure comes from.")
 
 
 class RobotTableDocument(Entry):

@@ -6,9 +6,9 @@ from pydantic import Field, model_validator
 
 from cellplan.io.schema.shapes import ToolBodyEntry, ToolShapeEntry
 from cellplan.model.settings.entry import Coordinates, Entry, FrameAngle, PoseEntry, Size, rule
+from cellplan.model.settings.robot import HEAVIEST_KG
 from cellplan.model.settings.units import Deg, Mm, Within
 
-HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 WIDEST_TILT_DEG: Final = 180.0
 OF_ROD: Final = ("xyz_mm", "rpy_deg", "geometry")  # keys that a rod stands for
 

@@ -154,13 +154,10 @@ def relaxed(schedule: Schedule) -> Schedule:
     """The schedule with what is allowed between rows everywhere."""
     tasks = []
     for scheduled in schedule.tasks:
-        position, orientation = scheduled.task.tolerance.between
-        allowed = replace(
-            scheduled.task.tolerance,
-            position=position,
-            orientation=orientation,
-            position_between=position,
-            orientation_between=orientation,
+        tolerance = scheduled.task.tolerance
+        allowed = tolerance.changed(
+            position_mm=tolerance.between_rows_mm or tolerance.position_mm,
+            orientation_deg=tolerance.between_rows_deg or tolerance.orientation_deg,
         )
         tasks.append(replace(scheduled, task=replace(scheduled.task, tolerance=allowed)))
     return replace(schedule, tasks=tuple(tasks))

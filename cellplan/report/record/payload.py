@@ -74,25 +74,25 @@ def _load_record(use: LoadUse) -> LoadRecord:
         "allowed": None
         if limits is None
         else {
-            "mass_kg": number(limits.mass),
-            "along_mm": None if limits.along is None else number(MM * limits.along),
-            "across_mm": None if limits.across is None else number(MM * limits.across),
+            "mass_kg": number(limits.mass_kg),
+            "along_mm": number(limits.along_mm),
+            "across_mm": number(limits.across_mm),
             "source": limits.source,
         },
     }
 
 
 def _axis_record(axis: AxisUse, use: LoadUse) -> AxisLoadRecord:
-    limit = None if use.limits is None else use.limits.axis(axis.joint)
+    limit = None if use.limits is None else use.limits.axes.get(axis.joint)
     return {
         "static_moment_nm": number(axis.static_moment),
         "static_moment_at_s": number(axis.static_at_s),
         "moment_nm": number(axis.moment),
         "moment_at_s": number(axis.moment_at_s),
-        "moment_allowed_nm": None if limit is None else number(limit.moment),
+        "moment_allowed_nm": None if limit is None else number(limit.moment_nm),
         "inertia_kg_m2": number(axis.inertia),
         "inertia_at_s": number(axis.inertia_at_s),
-        "inertia_allowed_kg_m2": None if limit is None else number(limit.inertia),
+        "inertia_allowed_kg_m2": None if limit is None else number(limit.inertia_kg_m2),
     }
 
 

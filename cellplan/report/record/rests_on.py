@@ -62,7 +62,7 @@ def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:
         stated, own = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
         if robot.model.bodies:
             record[robot.name] = {
-                "accuracy_mm": None if stated is None else number(MM * stated.distance),
+                "accuracy_mm": None if stated is None else number(stated.accuracy_mm),
                 "source": "not stated" if stated is None else stated.source,
                 "own_accuracy_mm": {body.name: number(MM * (body.accuracy or 0.0)) for body in own},
             }

@@ -53,7 +53,7 @@ def published_reach(model: RobotModel) -> dict[str, Any] | None:
     """The reach as it is published; None where it is not."""
     if model.reach is None:
         return None
-    return {"mm": round(MM * model.reach.distance, 1), "to": model.reach.to, "source": model.reach.source}
+    return {"mm": round(float(model.reach.distance_mm), 1), "to": model.reach.to, "source": model.reach.source}
 
 
 def _joint(joint: DescribedJoint) -> dict[str, Any]:

@@ -11,17 +11,17 @@ from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.model.cell import Cell
 from cellplan.model.report import Check, ClearanceClass, ClearanceReport
-from cellplan.model.robot import BodyAccuracy
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.robot import BodyAccuracyEntry
 from cellplan.report.record.rests_on import unstated_bodies
 from cellplan.report.text.notes import accuracy_note
 from cellplan.scene.scene import Scene
 
-GOOD = BodyAccuracy(distance=0.030, source="test")
-EXACT = BodyAccuracy(distance=0.0, source="test")
+GOOD = BodyAccuracyEntry(accuracy_mm=30.0, source="test")
+EXACT = BodyAccuracyEntry(accuracy_mm=0.0, source="test")
 
 
-def cell_of(gap: float, *, near: BodyAccuracy | None, adds: bool, far_gap: float = 0.5) -> Cell:
+def cell_of(gap: float, *, near: BodyAccuracyEntry | None, adds: bool, far_gap: float = 0.5) -> Cell:
     """A ball that slides past two posts, the nearer one of the surroundings; a second, exact ball passes closer by."""
     model = replace(slide_model(Sphere(0.1)), body_accuracy=near)
     exact = replace(slide_model(Sphere(0.1)), body_accuracy=EXACT)

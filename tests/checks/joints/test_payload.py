@@ -21,16 +21,17 @@ from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Robot, Tool
-from cellplan.model.payload import AxisLimit, LoadUse, Payload
+from cellplan.model.payload import LoadUse
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.report.record.payload import unjudged_loads
 
 TIMES = np.linspace(0.0, 1.0, 1001)
 STILL = np.zeros((1001, 1))
-SIX_KG = Payload(mass=6.0, source="test")
+SIX_KG = PayloadEntry(mass_kg=6.0, source="test")
 
 
-def arm(*, axis=(0.0, 1.0, 0.0), payload: Payload | None = SIX_KG) -> RobotModel:
+def arm(*, axis=(0.0, 1.0, 0.0), payload: PayloadEntry | None = SIX_KG) -> RobotModel:
     """One turning joint at the origin; the flange 0.5 m along x, its z along x."""
     return RobotModel(
         name="one",
@@ -107,7 +108,7 @@ def test_the_part_weighs_at_its_centre_with_the_inertia_of_its_shape() -> None:
 
 
 def test_the_load_at_rest_is_judged_without_a_motion() -> None:
-    limits = replace(SIX_KG, axes=(AxisLimit(joint="a", moment=11.0),))
+    limits = SIX_KG.changed(axes={"a": AxisLimitEntry(moment_nm=11.0)})
     cell = make_cell(robot(arm(payload=limits), with_tool=tool(2.0)))
     chains = {"a": ScrewChain(cell.robot("a"))}
 
@@ -136,7 +137,9 @@ def test_the_mass_is_held_against_the_payload(mass: float, passed: bool) -> None
 
 @pytest.mark.parametrize(("moment", "inertia"), [(11.0, 0.7), (13.0, 0.75)])
 def test_moments_and_inertias_are_held_against_what_is_published(moment: float, inertia: float) -> None:
-    limits = replace(SIX_KG, axes=(AxisLimit(joint="a", moment=moment, inertia=inertia),), along=0.05, across=0.01)
+    limits = SIX_KG.changed(
+        axes={"a": AxisLimitEntry(moment_nm=moment, inertia_kg_m2=inertia)}, along_mm=50.0, across_mm=10.0
+    )
 
     checks = check_payload((use_of(make_cell(robot(arm(payload=limits), with_tool=tool(2.0)))),))
 

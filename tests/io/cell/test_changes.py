@@ -101,7 +101,7 @@ def test_changes_add_up_and_the_last_value_of_an_address_counts(cell: Cell) -> N
 
     again = once.with_values({"motion.duration_s": 4})
 
-    assert (again.motion.duration, again.checks.clearance) == (4.0, 0.006)
+    assert (again.motion.duration, again.checks.clearance_mm) == (4.0, 6.0)
     assert dict(again.origin.changes) == {"checks.clearance_mm": 6, "motion.duration_s": 4}
     assert once.motion.duration == 3.0
 

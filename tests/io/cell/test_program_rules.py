@@ -177,7 +177,7 @@ def test_what_holds_a_part_where_it_lies_survives_being_written(load: Load, tmp_
         assert one.program is not None
         lying = one.program.attach
         assert lying is not None
-        assert (lying.supports, lying.is_clamped, lying.rest_gap, lying.contact) == (("floor",), True, 0.003, 0.03)
+        assert (lying.supports, lying.clamped, lying.rest_gap_mm, lying.contact_mm) == (("floor",), True, 3.0, 30.0)
 
 
 def test_an_empty_program_makes_a_sequence_with_room_round_the_part(load: Load) -> None:
@@ -219,7 +219,7 @@ def test_a_written_program_loads_to_the_same_program(load: Load, tmp_path: Path)
         assert one.program is not None
         assert one.program.attach is not None
         assert one.program.all_marks == (MarkEntry(name="m1"), MarkEntry(name="m2", dwell_s=0.5))
-        assert (one.program.cycles, one.program.attach.rests_on, one.program.attach.lift) == (3, "floor", 0.07)
+        assert (one.program.cycles, one.program.attach.rests_on, one.program.attach.lift_mm) == (3, "floor", 70.0)
         np.testing.assert_allclose(one.program.attach.X_WP[:3, 3], [0.1, 0.0, 0.3333], rtol=1e-15)
         np.testing.assert_array_equal(one.tasks[1].start_posture, cell.tasks[1].start_posture)
         np.testing.assert_array_equal(one.tasks[1].holder_posture, cell.tasks[1].holder_posture)

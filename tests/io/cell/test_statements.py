@@ -9,8 +9,7 @@ import pytest
 from cellplan.errors import InvalidFileError
 from cellplan.io.robots.joint_table import read_robot_table
 from cellplan.model.cell import Cell
-from cellplan.model.payload import AxisLimit, Payload
-from cellplan.model.robot import BodyAccuracy
+from cellplan.model.settings.robot import AxisLimitEntry, BodyAccuracyEntry, PayloadEntry
 
 WEIGHTS = "    weights: [1, 1, 1, 1, 1, 1]"
 TABLE = """\
@@ -33,7 +32,7 @@ def test_bodies_are_a_list_or_a_mapping_that_says_how_good_they_are(tmp_path: Pa
     stated = read_robot_table(table(tmp_path, f"bodies: {{accuracy_mm: 3, source: scan, solids: [{SOLID}]}}\n"))
 
     assert (len(plain.bodies), plain.body_accuracy) == (1, None)
-    assert (len(stated.bodies), stated.body_accuracy) == (1, BodyAccuracy(distance=0.003, source="scan"))
+    assert (len(stated.bodies), stated.body_accuracy) == (1, BodyAccuracyEntry(accuracy_mm=3.0, source="scan"))
 
 
 def test_a_solid_may_say_itself_how_good_it_is(tmp_path: Path) -> None:
@@ -85,10 +84,14 @@ def test_the_cell_goes_before_the_file_of_the_robot(load: Callable[..., Cell]) -
     cell = load((WEIGHTS, stated))
 
     model = cell.robot("worker").model
-    assert model.body_accuracy == BodyAccuracy(distance=0.002, source="stated in the cell")
+    assert model.body_accuracy == BodyAccuracyEntry(accuracy_mm=2.0, source="stated in the cell")
     assert {model.accuracy_of(body) for body in model.bodies} == {0.002}
-    assert model.payload == Payload(
-        mass=8.0, along=0.1, across=0.05, axes=(AxisLimit(joint="F3", moment=6.0, inertia=0.1),), source="sheet"
+    assert model.payload == PayloadEntry(
+        mass_kg=8.0,
+        along_mm=100.0,
+        across_mm=50.0,
+        axes={"F3": AxisLimitEntry(moment_nm=6.0, inertia_kg_m2=0.1)},
+        source="sheet",
     )
     own = cell.robot("holder").model
     assert own.body_accuracy is not None
