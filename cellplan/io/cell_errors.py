@@ -7,21 +7,12 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.io.input.findings import Finding, KeyPath, raise_findings, unknown_name
-from cellplan.io.schema.cell_errors import (
-    ErrorsDocument,
-    PoseErrorEntry,
-    RobotErrorsEntry,
-    ShiftSpreadEntry,
-    TurnSpreadEntry,
-)
 from cellplan.io.schema.messages import validate
 from cellplan.io.yaml.reader import YamlDocument, read_yaml
 from cellplan.model.cell import Cell
-from cellplan.model.cell_errors import SHORTEST_LINK, Amount, CellErrors, PoseAmounts, RobotErrors, Spread, link_vector
+from cellplan.model.cell_errors import SHORTEST_LINK, CellErrors, link_vector
 from cellplan.model.robot import RobotModel
-from cellplan.model.units import DEG, MM
-
-Written = float | ShiftSpreadEntry | TurnSpreadEntry
+from cellplan.model.settings.cell_errors import ErrorsDocument
 
 
 def load_errors(path: Path | str, cell: Cell) -> CellErrors:
@@ -45,10 +36,10 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
         raise InputError(f"{file}: the errors cannot be understood")
     noise = whole.measurement
     return CellErrors(
-        robots={name: _robot_errors(entry) for name, entry in whole.robots.items()},
-        grasps={name: _pose_amounts(entry) for name, entry in whole.grasp.items()},
-        position_noise=noise.position_noise_mm / MM,
-        orientation_noise=noise.orientation_noise_deg / DEG,
+        robots=whole.robots,
+        grasps=whole.grasp,
+        position_noise=noise.position_noise_mm.si,
+        orientation_noise=noise.orientation_noise_deg.si,
         seed=whole.seed,
         trials=whole.trials,
         file=file,
@@ -99,31 +90,3 @@ def _mapping(root: Mapping[str, object], key: str) -> Mapping[str, object]:
     """A section by name; empty when it is no mapping, which validation has reported already."""
     section = root.get(key)
     return section if isinstance(section, dict) else {}
-
-
-def _robot_errors(entry: RobotErrorsEntry) -> RobotErrors:
-    """Errors of one robot in [m] and [rad]."""
-    turns = {name: _amount(written, DEG) for name, written in entry.joint_offsets_deg.items()}
-    slides = {name: _amount(written, MM) for name, written in entry.joint_offsets_mm.items()}
-    return RobotErrors(
-        joint_offsets=turns | slides,
-        link_lengths={name: _amount(written, MM) for name, written in entry.link_lengths_mm.items()},
-        base=_pose_amounts(entry.base),
-        tool=_pose_amounts(entry.tool),
-    )
-
-
-def _pose_amounts(entry: PoseErrorEntry) -> PoseAmounts:
-    """A pose of amounts in [m] and [rad]."""
-    x, y, z = (_amount(written, MM) for written in entry.xyz_mm)
-    roll, pitch, yaw = (_amount(written, DEG) for written in entry.rpy_deg)
-    return PoseAmounts(xyz=(x, y, z), rpy=(roll, pitch, yaw))
-
-
-def _amount(written: Written, per_si: float) -> Amount:
-    """An amount in SI units."""
-    if isinstance(written, ShiftSpreadEntry | TurnSpreadEntry):
-        if written.normal is not None:
-            return Amount(Spread.NORMAL, written.normal / per_si)
-        return Amount(Spread.UNIFORM, (written.uniform or 0.0) / per_si)
-    return Amount(Spread.FIXED, written / per_si)

@@ -8,20 +8,14 @@ import numpy as np
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, transform_points
 from cellplan.kinematics.screw_chain import screw_displacement
 from cellplan.model.cell import Cell, Grasp, Robot
-from cellplan.model.cell_errors import (
-    EXACT,
-    SHORTEST_LINK,
-    CellErrors,
-    Draw,
-    PoseAmounts,
-    RobotDraw,
-    RobotErrors,
-    link_vector,
-)
+from cellplan.model.cell_errors import SHORTEST_LINK, CellErrors, Draw, RobotDraw, drawn, link_vector
 from cellplan.model.robot import FollowerJoint, Joint, RobotModel
+from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry
+from cellplan.model.settings.units import Mm
 
 Axis = TypeVar("Axis", Joint, FollowerJoint)
 
+EXACT: Final = Mm(0.0)
 CELL_STREAM: Final = 0  # stream of random numbers of the cells; the measurements have another
 
 
@@ -37,10 +31,10 @@ def draw_errors(cell: Cell, errors: CellErrors, trial: int) -> Draw:
     """
     rng = np.random.default_rng([errors.seed, trial, CELL_STREAM])
     robots = {
-        robot.name: _draw_robot(robot, errors.robots.get(robot.name, RobotErrors()), rng) for robot in cell.robots
+        robot.name: _draw_robot(robot, errors.robots.get(robot.name, RobotErrorsEntry()), rng) for robot in cell.robots
     }
     grasps = {
-        grasp.robot: _draw_pose(errors.grasps.get(grasp.robot, PoseAmounts()), rng) for grasp in cell.part.held_by
+        grasp.robot: _draw_pose(errors.grasps.get(grasp.robot, PoseErrorEntry()), rng) for grasp in cell.part.held_by
     }
     return Draw(robots=robots, X_grasps=grasps)
 
@@ -61,20 +55,20 @@ def perturbed_cell(cell: Cell, draw: Draw) -> Cell:
     return replace(cell, robots=robots, part=replace(cell.part, held_by=held_by))
 
 
-def _draw_robot(robot: Robot, errors: RobotErrors, rng: np.random.Generator) -> RobotDraw:
+def _draw_robot(robot: Robot, errors: RobotErrorsEntry, rng: np.random.Generator) -> RobotDraw:
     """Errors of one robot, in the order of its joints."""
     names = robot.model.joint_names
     return RobotDraw(
-        joint_offsets=np.array([errors.joint_offsets.get(name, EXACT).drawn(rng) for name in names]),
-        link_lengths=np.array([errors.link_lengths.get(name, EXACT).drawn(rng) for name in names]),
+        joint_offsets=np.array([drawn(errors.joint_offsets.get(name, EXACT), rng) for name in names]),
+        link_lengths=np.array([drawn(errors.link_lengths_mm.get(name, EXACT), rng) for name in names]),
         X_base=_draw_pose(errors.base, rng),
         X_tool=_draw_pose(errors.tool, rng),
     )
 
 
-def _draw_pose(amounts: PoseAmounts, rng: np.random.Generator) -> Array:
+def _draw_pose(amounts: PoseErrorEntry, rng: np.random.Generator) -> Array:
     """A small pose."""
-    return pose([amount.drawn(rng) for amount in amounts.xyz], [amount.drawn(rng) for amount in amounts.rpy])
+    return pose([drawn(each, rng) for each in amounts.xyz_mm], [drawn(each, rng) for each in amounts.rpy_deg])
 
 
 def _perturbed_robot(robot: Robot, draw: RobotDraw) -> Robot:

@@ -2,72 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import BASE, FollowerJoint, Joint, RobotModel
+from cellplan.model.settings.cell_errors import Amount, PoseErrorEntry, RobotErrorsEntry, Spread
+from cellplan.model.settings.units import si_or_none
 
 SHORTEST_LINK: Final = 1e-9  # [m] axis points nearer than this give a link no direction
-
-
-class Spread(StrEnum):
-    """How an amount is meant."""
-
-    FIXED = "fixed"
-    NORMAL = "normal"
-    UNIFORM = "uniform"
-
-
-@dataclass(frozen=True, slots=True)
-class Amount:
-    """One stated error in [m] or [rad].
-
-    Attributes:
-        spread: Fixed, or a distribution with its centre at zero.
-        size: The error itself, the standard deviation, or the half width.
-    """
-
-    spread: Spread = Spread.FIXED
-    size: float = 0.0
-
-    def drawn(self, rng: np.random.Generator) -> float:
-        """A value; a fixed amount takes no number from the generator."""
-        if self.spread is Spread.NORMAL:
-            return self.size * float(rng.standard_normal())
-        if self.spread is Spread.UNIFORM:
-            return self.size * float(rng.uniform(-1.0, 1.0))
-        return self.size
-
-
-EXACT: Final = Amount()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PoseAmounts:
-    """Pose of the real frame seen from the written one: position in [m]; roll, pitch and yaw in [rad]."""
-
-    xyz: tuple[Amount, Amount, Amount] = (EXACT, EXACT, EXACT)
-    rpy: tuple[Amount, Amount, Amount] = (EXACT, EXACT, EXACT)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobotErrors:
-    """Deviations of one robot from its data sheet and its pose.
-
-    Attributes:
-        joint_offsets: Actual minus commanded joint position in [rad] or [m], by joint name.
-        link_lengths: Lengthening of the link before a joint in [m], by joint name.
-        base: Pose of the actual base in the nominal base frame.
-        tool: The real tool tip seen from the written one.
-    """
-
-    joint_offsets: Mapping[str, Amount] = field(default_factory=dict)
-    link_lengths: Mapping[str, Amount] = field(default_factory=dict)
-    base: PoseAmounts = PoseAmounts()
-    tool: PoseAmounts = PoseAmounts()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,8 +29,8 @@ class CellErrors:
         digest: SHA-256 of the file; empty when there is none.
     """
 
-    robots: Mapping[str, RobotErrors] = field(default_factory=dict)
-    grasps: Mapping[str, PoseAmounts] = field(default_factory=dict)
+    robots: Mapping[str, RobotErrorsEntry] = field(default_factory=dict)
+    grasps: Mapping[str, PoseErrorEntry] = field(default_factory=dict)
     position_noise: float = 0.0
     orientation_noise: float = 0.0
     seed: int = 0
@@ -100,14 +44,14 @@ class CellErrors:
         poses = [*self.grasps.values()]
         found: list[Amount] = []
         for errors in self.robots.values():
-            found += [*errors.joint_offsets.values(), *errors.link_lengths.values()]
+            found += [*errors.joint_offsets.values(), *errors.link_lengths_mm.values()]
             poses += [errors.base, errors.tool]
-        return (*found, *(amount for placed in poses for amount in (*placed.xyz, *placed.rpy)))
+        return (*found, *(amount for placed in poses for amount in (*placed.xyz_mm, *placed.rpy_deg)))
 
     @property
     def is_random(self) -> bool:
         """Whether two trials differ: an amount is a distribution."""
-        return any(amount.spread is not Spread.FIXED for amount in self.amounts)
+        return any(isinstance(amount, Spread) for amount in self.amounts)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -133,6 +77,15 @@ class Draw:
 
     robots: Mapping[str, RobotDraw]
     X_grasps: Mapping[str, Array]
+
+
+def drawn(amount: Amount, rng: np.random.Generator) -> float:
+    """A value in [m] or [rad]; a fixed amount takes no number from the generator."""
+    if not isinstance(amount, Spread):
+        return amount.si
+    if amount.normal is not None:
+        return amount.normal.si * float(rng.standard_normal())
+    return (si_or_none(amount.uniform) or 0.0) * float(rng.uniform(-1.0, 1.0))
 
 
 def link_vector(model: RobotModel, joint: int) -> Array:

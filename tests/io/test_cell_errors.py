@@ -8,7 +8,7 @@ import pytest
 from cellplan import load_cell
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.cell_errors import load_errors
-from cellplan.model.cell_errors import Amount, PoseAmounts, Spread
+from cellplan.model.settings.cell_errors import PoseErrorEntry, ShiftSpreadEntry, TurnSpreadEntry
 
 WHOLE = """\
 cellplan_errors: 1
@@ -50,18 +50,20 @@ def refuse(load, cell):
     return findings
 
 
-def test_every_amount_comes_in_metres_and_radians(load):
+def test_every_amount_has_its_value_in_metres_and_radians(load):
     errors = load(WHOLE)
 
     left = errors.robots["left"]
-    assert left.joint_offsets["A"] == Amount(Spread.FIXED, pytest.approx(np.deg2rad(0.02)))
-    assert left.joint_offsets["B"] == Amount(Spread.NORMAL, pytest.approx(np.deg2rad(0.01)))
-    assert left.joint_offsets["C"] == Amount(Spread.UNIFORM, pytest.approx(np.deg2rad(0.03)))
-    assert left.link_lengths == {"B": Amount(Spread.NORMAL, 2e-4)}
-    assert left.base.xyz == (Amount(Spread.FIXED, 5e-4), Amount(), Amount(Spread.NORMAL, 1e-4))
-    assert left.base.rpy[2].size == pytest.approx(np.deg2rad(0.01))
-    assert left.tool == PoseAmounts()
-    assert errors.grasps["left"].xyz == (Amount(size=1e-3), Amount(size=2e-3), Amount(size=3e-3))
+    assert left.joint_offsets["A"].si == pytest.approx(np.deg2rad(0.02))
+    assert left.joint_offsets["B"] == TurnSpreadEntry(normal=0.01)
+    assert left.joint_offsets["C"] == TurnSpreadEntry(uniform=0.03)
+    assert left.joint_offsets["C"].uniform.si == pytest.approx(np.deg2rad(0.03))
+    assert left.link_lengths_mm == {"B": ShiftSpreadEntry(normal=0.2)}
+    assert left.link_lengths_mm["B"].normal.si == 2e-4
+    assert left.base.xyz_mm == (0.5, 0.0, ShiftSpreadEntry(normal=0.1))
+    assert left.base.rpy_deg[2].si == pytest.approx(np.deg2rad(0.01))
+    assert left.tool == PoseErrorEntry()
+    assert [amount.si for amount in errors.grasps["left"].xyz_mm] == [1e-3, 2e-3, 3e-3]
     assert (errors.seed, errors.trials, errors.is_random, errors.file) == (7, 12, True, "e")
     assert (errors.position_noise, errors.orientation_noise) == (2e-5, pytest.approx(np.deg2rad(0.003)))
 
@@ -122,7 +124,7 @@ def test_a_joint_that_slides_is_offset_in_millimetres(refuse, load, cells):
 
     assert load(f"cellplan_errors: 1\nrobots: {{{robot}: {{joint_offsets_mm: {{rail: 0.5}}}}}}\n", rail).robots[
         robot
-    ].joint_offsets == {"rail": Amount(size=5e-4)}
+    ].joint_offsets == {"rail": 0.5}
     assert refuse(f"robots: {{{robot}: {{joint_offsets_deg: {{rail: 0.5}}}}}}", rail) == [
         f"e:2: robots.{robot}.joint_offsets_deg.rail: joint 'rail' is prismatic: state its offset under "
         "joint_offsets_mm"

@@ -11,16 +11,9 @@ from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
-from cellplan.model.cell_errors import (
-    Amount,
-    CellErrors,
-    Draw,
-    PoseAmounts,
-    RobotDraw,
-    RobotErrors,
-    Spread,
-    link_vector,
-)
+from cellplan.model.cell_errors import CellErrors, Draw, RobotDraw, drawn, link_vector
+from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry, TurnSpreadEntry
+from cellplan.model.settings.units import Mm
 
 ROUNDING = 1e-12  # [m], [-] a few hundred operations on numbers near one
 
@@ -132,12 +125,12 @@ def test_no_errors_give_the_same_cell(cell):
 
 
 def test_draws_follow_the_cell_and_not_the_order_of_the_file(cell):
-    wide = Amount(Spread.NORMAL, 1.0)
+    wide, turning = ShiftSpreadEntry(normal=1000.0), TurnSpreadEntry(normal=45.0)
     names = [joint.name for joint in cell.robot("left").model.joints]
-    left = RobotErrors(joint_offsets=dict.fromkeys(names, wide))
-    right = RobotErrors(base=PoseAmounts(xyz=(wide, wide, wide)))
+    left = RobotErrorsEntry(joint_offsets_deg=dict.fromkeys(names, turning))
+    right = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(wide, wide, wide)))
     forwards = CellErrors(robots={"left": left, "right": right}, seed=4)
-    turned = RobotErrors(joint_offsets=dict.fromkeys(reversed(names), wide))
+    turned = RobotErrorsEntry(joint_offsets_deg=dict.fromkeys(reversed(names), turning))
     backwards = CellErrors(robots={"right": right, "left": turned}, seed=4)
 
     first, second = draw_errors(cell, forwards, 0), draw_errors(cell, backwards, 0)
@@ -149,14 +142,14 @@ def test_draws_follow_the_cell_and_not_the_order_of_the_file(cell):
 
 def test_distributions_are_centred_and_as_wide_as_stated():
     rng = np.random.default_rng(5)
-    normal = np.array([Amount(Spread.NORMAL, 2.0).drawn(rng) for _ in range(4000)])
-    uniform = np.array([Amount(Spread.UNIFORM, 3.0).drawn(rng) for _ in range(4000)])
+    normal = np.array([1e3 * drawn(ShiftSpreadEntry(normal=2.0), rng) for _ in range(4000)])
+    uniform = np.array([1e3 * drawn(ShiftSpreadEntry(uniform=3.0), rng) for _ in range(4000)])
 
     assert abs(normal.mean()) < 4 * 2.0 / np.sqrt(4000)  # four standard errors of the mean
     assert normal.std() == pytest.approx(2.0, rel=4 / np.sqrt(2 * 4000))
     assert np.abs(uniform).max() <= 3.0
     assert uniform.std() == pytest.approx(3.0 / np.sqrt(3), rel=0.05)
-    assert Amount(Spread.FIXED, 0.5).drawn(rng) == 0.5
+    assert drawn(Mm(0.5), rng) == 5e-4
 
 
 def test_what_is_mounted_on_a_link_goes_with_it_as_its_own_bodies_do(cell):

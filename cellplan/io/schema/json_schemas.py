@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from cellplan.io.schema.cell import CellDocument
-from cellplan.io.schema.cell_errors import ErrorsDocument
 from cellplan.io.schema.robot_table import RobotTableDocument
+from cellplan.model.settings.cell_errors import ErrorsDocument
 
 
 def json_schema(models: Iterable[str] = ()) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from pydantic import Field, Tag
 from cellplan.io.schema.robot import JointPosition
 from cellplan.model.settings.entry import Entry, Name, by_kind
 from cellplan.model.settings.solver import (
+    LARGEST_SEED,
     DampedLeastSquaresEntry,
     FilteredInverseEntry,
     Gain,
@@ -17,7 +18,6 @@ from cellplan.model.settings.solver import (
 from cellplan.model.settings.units import Mm, Within
 from cellplan.model.solver import MethodName
 
-LARGEST_SEED: Final = 2**32 - 1
 DAMPING_WORDS: Final = "auto or a number of at least 0"
 
 DampingChoice = Annotated[

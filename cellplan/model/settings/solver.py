@@ -7,6 +7,7 @@ from pydantic import Field
 from cellplan.model.settings.entry import Entry, Name, Text
 from cellplan.model.settings.units import Mm, Within
 
+LARGEST_SEED: Final = 2**32 - 1
 MOST_ROUNDS: Final = 1_000_000
 Gain = Annotated[float, Field(gt=0.0, le=1e9)]
 

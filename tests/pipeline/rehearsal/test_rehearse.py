@@ -10,8 +10,9 @@ from cellplan import load_cell, rehearse, solve
 from cellplan.checks.real_cell.true_errors import worst_share
 from cellplan.errors import InputError
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell_errors import Amount, CellErrors, PoseAmounts, RobotErrors, Spread
+from cellplan.model.cell_errors import CellErrors
 from cellplan.model.rehearsal import Outcome
+from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
 from cellplan.pipeline.overrides import with_overrides
@@ -21,10 +22,8 @@ pytestmark = pytest.mark.usefixtures("kept_solutions")
 TOLERANCE = ToleranceEntry(position_mm=0.1, orientation_deg=0.01)
 SMALL = CellErrors(
     robots={
-        "left": RobotErrors(joint_offsets={"B": Amount(size=np.deg2rad(0.05))}),
-        "right": RobotErrors(
-            link_lengths={"C": Amount(size=5e-4)}, base=PoseAmounts(xyz=(Amount(size=1e-3), Amount(), Amount()))
-        ),
+        "left": RobotErrorsEntry(joint_offsets_deg={"B": 0.05}),
+        "right": RobotErrorsEntry(link_lengths_mm={"C": 0.5}, base=PoseErrorEntry(xyz_mm=(1.0, 0.0, 0.0))),
     }
 )
 
@@ -54,7 +53,7 @@ def test_an_exact_cell_shows_the_errors_of_the_program_and_nothing_else(pair):
 
 def test_one_joint_offset_displaces_the_tool_by_lever_times_angle(pair):
     offset = 1e-5
-    stated = CellErrors(robots={"right": RobotErrors(joint_offsets={"A": Amount(size=offset)})})
+    stated = CellErrors(robots={"right": RobotErrorsEntry(joint_offsets_deg={"A": np.degrees(offset)})})
 
     (run,) = rehearse(pair, stated).runs
 
@@ -93,7 +92,7 @@ def test_the_corrected_program_is_released_for_one_real_cell_and_says_so(pair):
 
 
 def test_no_program_is_released_for_many_real_cells(pair):
-    spread = RobotErrors(base=PoseAmounts(xyz=(Amount(Spread.NORMAL, 5e-4), Amount(), Amount())))
+    spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(ShiftSpreadEntry(normal=0.5), 0.0, 0.0)))
     made = rehearse(pair, CellErrors(robots={"right": spread}, trials=2), feedback=True)
 
     (run,) = made.runs
@@ -131,7 +130,7 @@ def test_used_up_rounds_are_reported(pair):
 
 
 def test_errors_that_lead_the_arms_away_diverge_and_the_solved_program_is_kept(pair):
-    far = RobotErrors(joint_offsets={"A": Amount(size=np.deg2rad(45)), "B": Amount(size=np.deg2rad(-45))})
+    far = RobotErrorsEntry(joint_offsets_deg={"A": 45.0, "B": -45.0})
     made = rehearse(pair, CellErrors(robots={"right": far, "left": far}), feedback=True, in_pass=True)
 
     (trial,) = made.runs[0].trials
@@ -144,7 +143,7 @@ def test_errors_that_lead_the_arms_away_diverge_and_the_solved_program_is_kept(p
 def test_a_normal_shift_of_one_base_repeats_as_its_distribution_says(pair):
     """Folded normal distribution: RP_l = RT_p = sigma (sqrt(2/pi) + 3 sqrt(1 - 2/pi)) for shifts along one line."""
     sigma, trials = 3e-4, 200
-    spread = RobotErrors(base=PoseAmounts(xyz=(Amount(), Amount(Spread.NORMAL, sigma), Amount())))
+    spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(0.0, ShiftSpreadEntry(normal=1e3 * sigma), 0.0)))
     (run,) = rehearse(pair, CellErrors(robots={"right": spread}, trials=trials)).runs
 
     figures = run.before["circle"]
@@ -163,7 +162,7 @@ def test_fixed_errors_make_one_trial_however_many_are_asked_for(pair):
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(pair):
-    spread = RobotErrors(base=PoseAmounts(xyz=(Amount(Spread.NORMAL, 5e-4), Amount(), Amount())))
+    spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(ShiftSpreadEntry(normal=0.5), 0.0, 0.0)))
     stated = CellErrors(robots={"right": spread}, position_noise=1e-6, trials=2, seed=5)
 
     def errors(of):
@@ -176,7 +175,7 @@ def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(pair):
 
 
 def test_more_trials_than_can_be_kept_are_refused(pair):
-    spread = RobotErrors(base=PoseAmounts(xyz=(Amount(Spread.NORMAL, 5e-4), Amount(), Amount())))
+    spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(ShiftSpreadEntry(normal=0.5), 0.0, 0.0)))
 
     with pytest.raises(InputError, match=r"^e: trials: expected at most 16597 for this cell \(241 samples "):
         rehearse(pair, CellErrors(robots={"right": spread}, trials=20_000, file="e"))
@@ -193,11 +192,11 @@ def test_feedback_brings_the_four_robots_within_tolerance(cells, mode):
     cell = with_overrides(load_cell(cells / "four_robots.yaml"), mode=mode)
     stated = CellErrors(
         robots={
-            "kuka": RobotErrors(joint_offsets={"A2": Amount(size=np.deg2rad(0.02))}),
-            "reis": RobotErrors(base=PoseAmounts(rpy=(Amount(size=np.deg2rad(0.03)), Amount(), Amount()))),
-            "staubli": RobotErrors(link_lengths={"C4": Amount(size=3e-4)}),
+            "kuka": RobotErrorsEntry(joint_offsets_deg={"A2": 0.02}),
+            "reis": RobotErrorsEntry(base=PoseErrorEntry(rpy_deg=(0.03, 0.0, 0.0))),
+            "staubli": RobotErrorsEntry(link_lengths_mm={"C4": 0.3}),
         },
-        grasps={"reis": PoseAmounts(xyz=(Amount(size=3e-4), Amount(), Amount()))},
+        grasps={"reis": PoseErrorEntry(xyz_mm=(0.3, 0.0, 0.0))},
     )
 
     made = rehearse(cell, stated, feedback=True)

@@ -1,11 +1,12 @@
 """Errors of the real cell: joint zeros, link lengths, bases, tools, grasps, and the noise of the measuring system."""
 
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import ConfigDict, Field, Tag, model_validator
 
-from cellplan.io.schema.solver import LARGEST_SEED
-from cellplan.model.settings.entry import Entry, Name, by_kind, one_of_keys, require_one
+from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, by_kind, one_of_keys, require_one
+from cellplan.model.settings.solver import LARGEST_SEED
+from cellplan.model.settings.units import Deg, Mm, Quantity, Within
 
 LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a wrong unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn
@@ -13,40 +14,39 @@ TRIAL_LIMIT: Final = 10_000
 AMOUNT_WORDS: Final = "a number, {normal: NUMBER} or {uniform: NUMBER}"
 SPREADS: Final = ("normal", "uniform")
 
-Shift = Annotated[float, Field(ge=-LARGEST_SHIFT_MM, le=LARGEST_SHIFT_MM)]
-Turn = Annotated[float, Field(ge=-LARGEST_TURN_ERROR_DEG, le=LARGEST_TURN_ERROR_DEG)]
-ShiftWidth = Annotated[float, Field(ge=0.0, le=LARGEST_SHIFT_MM)]
-TurnWidth = Annotated[float, Field(ge=0.0, le=LARGEST_TURN_ERROR_DEG)]
+Shift = Annotated[Mm, Within(ge=-LARGEST_SHIFT_MM, le=LARGEST_SHIFT_MM)]
+Turn = Annotated[Deg, Within(ge=-LARGEST_TURN_ERROR_DEG, le=LARGEST_TURN_ERROR_DEG)]
+ShiftWidth = Annotated[Mm, Within(ge=0.0, le=LARGEST_SHIFT_MM)]
+TurnWidth = Annotated[Deg, Within(ge=0.0, le=LARGEST_TURN_ERROR_DEG)]
 
 
-class ShiftSpreadEntry(Entry):
-    """A length that varies from trial to trial, with mean zero."""
+class Spread(Entry):
+    """An amount that varies from trial to trial, with mean zero."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SPREADS))
+
+    normal: Quantity | None
+    uniform: Quantity | None
+
+    @model_validator(mode="after")
+    def _is_one_spread(self) -> Self:
+        """Exactly one distribution."""
+        require_one(self, SPREADS)
+        return self
+
+
+class ShiftSpreadEntry(Spread):
+    """A length that varies from trial to trial, with mean zero."""
 
     normal: ShiftWidth | None = Field(default=None, description="Standard deviation of a normal distribution.")
     uniform: ShiftWidth | None = Field(default=None, description="Half width of a uniform distribution.")
 
-    @model_validator(mode="after")
-    def _is_one_spread(self) -> "ShiftSpreadEntry":
-        """Exactly one distribution."""
-        require_one(self, SPREADS)
-        return self
 
-
-class TurnSpreadEntry(Entry):
+class TurnSpreadEntry(Spread):
     """An angle that varies from trial to trial, with mean zero."""
-
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SPREADS))
 
     normal: TurnWidth | None = Field(default=None, description="Standard deviation of a normal distribution.")
     uniform: TurnWidth | None = Field(default=None, description="Half width of a uniform distribution.")
-
-    @model_validator(mode="after")
-    def _is_one_spread(self) -> "TurnSpreadEntry":
-        """Exactly one distribution."""
-        require_one(self, SPREADS)
-        return self
 
 
 ShiftAmount = Annotated[
@@ -57,14 +57,15 @@ TurnAmount = Annotated[
     Annotated[Turn, Tag("<number>")] | Annotated[TurnSpreadEntry, Tag("<mapping>")],
     by_kind(AMOUNT_WORDS, number=(int, float), mapping=dict),
 ]
+Amount = Quantity | Spread
 
 
 class PoseErrorEntry(Entry):
     """Pose of an actual frame in the nominal one."""
 
-    xyz_mm: tuple[ShiftAmount, ShiftAmount, ShiftAmount] = Field(default=(0.0, 0.0, 0.0), description="Position.")
+    xyz_mm: tuple[ShiftAmount, ShiftAmount, ShiftAmount] = Field(default=ORIGIN, description="Position.")
     rpy_deg: tuple[TurnAmount, TurnAmount, TurnAmount] = Field(
-        default=(0.0, 0.0, 0.0), description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll)."
+        default=NOT_TURNED, description="Roll, pitch and yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll)."
     )
 
 
@@ -90,15 +91,20 @@ class RobotErrorsEntry(Entry):
         description="Pose of the actual tool tip in the nominal tool frame, z out of the tool.",
     )
 
+    @property
+    def joint_offsets(self) -> dict[str, Amount]:
+        """Actual minus commanded joint position, by joint name."""
+        return {**self.joint_offsets_deg, **self.joint_offsets_mm}
+
 
 class MeasurementEntry(Entry):
     """The measuring system that measures the tools relative to the part."""
 
     position_noise_mm: ShiftWidth = Field(
-        default=0.0, description="Standard deviation of each measured coordinate of a tool tip."
+        default=Mm(0.0), description="Standard deviation of each measured coordinate of a tool tip."
     )
     orientation_noise_deg: TurnWidth = Field(
-        default=0.0, description="Standard deviation of each measured small turn about the part's axes."
+        default=Deg(0.0), description="Standard deviation of each measured small turn about the part's axes."
     )
 
 
