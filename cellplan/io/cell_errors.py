@@ -34,12 +34,10 @@ def load_errors(path: Path | str, cell: Cell) -> CellErrors:
     raise_findings(file, findings)
     if whole is None:
         raise InputError(f"{file}: the errors cannot be understood")
-    noise = whole.measurement
     return CellErrors(
         robots=whole.robots,
         grasps=whole.grasp,
-        position_noise=noise.position_noise_mm.si,
-        orientation_noise=noise.orientation_noise_deg.si,
+        measurement=whole.measurement,
         seed=whole.seed,
         trials=whole.trials,
         file=file,

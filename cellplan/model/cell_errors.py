@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot import BASE, FollowerJoint, Joint, RobotModel
-from cellplan.model.settings.cell_errors import Amount, PoseErrorEntry, RobotErrorsEntry, Spread
+from cellplan.model.settings.cell_errors import Amount, MeasurementEntry, PoseErrorEntry, RobotErrorsEntry, Spread
 from cellplan.model.settings.units import si_or_none
 
 SHORTEST_LINK: Final = 1e-9  # [m] axis points nearer than this give a link no direction
@@ -21,8 +21,7 @@ class CellErrors:
     Attributes:
         robots: Errors by robot; robots that are not named are exact.
         grasps: The real part seen from where it should be, by the robot that holds it.
-        position_noise: Standard deviation of each measured coordinate of a tool tip on the part in [m].
-        orientation_noise: Standard deviation of each measured small turn of a tool on the part in [rad].
+        measurement: Noise of the measuring system.
         seed: Seed of all samples.
         trials: Number of real cells that are drawn.
         file: File name as the user gave it.
@@ -31,8 +30,7 @@ class CellErrors:
 
     robots: Mapping[str, RobotErrorsEntry] = field(default_factory=dict)
     grasps: Mapping[str, PoseErrorEntry] = field(default_factory=dict)
-    position_noise: float = 0.0
-    orientation_noise: float = 0.0
+    measurement: MeasurementEntry = field(default_factory=MeasurementEntry)
     seed: int = 0
     trials: int = 1
     file: str = "<errors>"

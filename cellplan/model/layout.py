@@ -7,6 +7,7 @@ from enum import StrEnum
 
 from cellplan.geometry.shapes import Box, Cylinder
 from cellplan.geometry.transforms import Array
+from cellplan.model.settings.layout import MisplacementEntry
 
 
 class VariableKind(StrEnum):
@@ -111,19 +112,6 @@ class KeepOut:
     X_WS: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Misplacement:
-    """By how much every base may be off its place, all of them at once.
-
-    Attributes:
-        position: In [m], along each axis of the world.
-        orientation: In [rad], about the vertical through the origin of the base.
-    """
-
-    position: float
-    orientation: float
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LayoutSettings:
     """What a layout search may change, and within which bounds.
@@ -156,7 +144,7 @@ class LayoutSettings:
     margin_sliding: float = 0.0
     cost: Mapping[str, float] = field(default_factory=dict)
     singular: float | None = None
-    misplacement: Misplacement | None = None
+    misplacement: MisplacementEntry | None = None
     is_default: bool = True
 
     def without(self, addresses: Container[str]) -> "LayoutSettings":

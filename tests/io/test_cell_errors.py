@@ -65,7 +65,8 @@ def test_every_amount_has_its_value_in_metres_and_radians(load):
     assert left.tool == PoseErrorEntry()
     assert [amount.si for amount in errors.grasps["left"].xyz_mm] == [1e-3, 2e-3, 3e-3]
     assert (errors.seed, errors.trials, errors.is_random, errors.file) == (7, 12, True, "e")
-    assert (errors.position_noise, errors.orientation_noise) == (2e-5, pytest.approx(np.deg2rad(0.003)))
+    assert errors.measurement.position_noise_mm.si == 2e-5
+    assert errors.measurement.orientation_noise_deg.si == pytest.approx(np.deg2rad(0.003))
 
 
 def test_a_file_of_nothing_but_its_version_states_an_exact_cell(load):

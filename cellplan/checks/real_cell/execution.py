@@ -1,7 +1,6 @@
 """Execution: poses of the tools of a real cell on the part when its joints follow the commanded positions."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,15 +10,8 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.report import TaskAccuracy
+from cellplan.model.settings.cell_errors import MeasurementEntry
 from cellplan.model.task import Frame
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Measurement:
-    """A measuring system for tool poses on the part: standard deviations in [m] and [rad]."""
-
-    position_noise: float = 0.0
-    orientation_noise: float = 0.0
 
 
 class RealCell:
@@ -55,7 +47,7 @@ class RealCell:
         return tuple(pose_accuracy(scheduled, X_PT) for scheduled, X_PT in zip(schedule.tasks, poses, strict=True))
 
 
-def measured_poses(X_PT: Sequence[Array], system: Measurement, rng: np.random.Generator) -> tuple[Array, ...]:
+def measured_poses(X_PT: Sequence[Array], system: MeasurementEntry, rng: np.random.Generator) -> tuple[Array, ...]:
     """Measurements of tool poses on the part, shape (N, 4, 4) each.
 
     Each coordinate of the tip in P, and each component of a small turn about the axes of P, has normal noise of its
@@ -64,12 +56,12 @@ def measured_poses(X_PT: Sequence[Array], system: Measurement, rng: np.random.Ge
     return tuple(_measured(poses, system, rng) for poses in X_PT)
 
 
-def _measured(X_PT: Array, system: Measurement, rng: np.random.Generator) -> Array:
+def _measured(X_PT: Array, system: MeasurementEntry, rng: np.random.Generator) -> Array:
     """Poses of one tool with noise."""
     measured = X_PT.copy()
-    if system.position_noise > 0.0:
-        measured[:, :3, 3] += system.position_noise * rng.standard_normal((len(measured), 3))
-    if system.orientation_noise > 0.0:
-        turns = rotation_exp(system.orientation_noise * rng.standard_normal((len(measured), 3)))
+    if system.position_noise_mm > 0.0:
+        measured[:, :3, 3] += system.position_noise_mm.si * rng.standard_normal((len(measured), 3))
+    if system.orientation_noise_deg > 0.0:
+        turns = rotation_exp(system.orientation_noise_deg.si * rng.standard_normal((len(measured), 3)))
         measured[:, :3, :3] = turns @ measured[:, :3, :3]
     return measured

@@ -10,7 +10,6 @@ from cellplan.geometry.transforms import Array
 from cellplan.io.cell.build_accelerations import acceleration_rule, controller_cycle
 from cellplan.io.cell.build_grips import grip_bodies, gripper_bodies
 from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail_bodies, with_floor_height
-from cellplan.io.cell.build_program import build_order, written_program
 from cellplan.io.cell.build_tool import build_tool
 from cellplan.io.cell.path_rules import build_path
 from cellplan.io.cell.rules import needs_surface
@@ -80,9 +79,17 @@ def build_robot(name: str, document: CellDocument, model: RobotModel, read_mesh:
         attachments=build_attachments(entry.attachments, model, read_mesh),
         pedestal=build_mount(entry, document.environment),
         gripper=gripper_bodies(entry, model),
-        order=build_order(name, document),
+        order=_order(name, document),
         control=entry.controller,
     )
+
+
+def _order(robot: str, document: CellDocument) -> tuple[str, ...]:
+    """Tasks and marks of a robot in their order; none in a cell without a program."""
+    if document.program is None:
+        return ()
+    order = document.robots[robot].order
+    return tuple(name for name, task in document.tasks.items() if task.robot == robot) if order is None else order
 
 
 def build_part(document: CellDocument, models: Mapping[str, RobotModel], read_mesh: MeshReader) -> Part:
@@ -204,7 +211,7 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
         document: The file.
         timed: Names of the tasks whose path brings its own clock.
     """
-    values = document.model_dump(exclude_none=True) | written_program(document)
+    values = document.model_dump(exclude_none=True) | _written_program(document)
     motion = values["motion"]
     for name, task in document.tasks.items():
         entry = values["tasks"][name]
@@ -230,6 +237,14 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
     for grasp in values["part"]["held_by"][:1]:
         del grasp["axes"]  # the first holder has no choice
     return values
+
+
+def _written_program(document: CellDocument) -> dict[str, Any]:
+    """The program as plain values, its marks with their dwells; nothing when the cell has none."""
+    if document.program is None:
+        return {}
+    values = document.program.model_dump(exclude_none=True)
+    return {"program": {**values, "marks": tuple(mark.model_dump() for mark in document.program.all_marks)}}
 
 
 def _path(name: str, entry: PathEntry, read_targets: TargetReader) -> PathSpec:

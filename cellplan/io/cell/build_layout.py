@@ -14,11 +14,11 @@ from cellplan.io.cell.layout_choices import read_choice, read_path
 from cellplan.io.cell.layout_ranges import Context, read_ranges
 from cellplan.io.cell.layout_ties import Ties
 from cellplan.io.input.findings import Finding, KeyPath
-from cellplan.io.schema.layout import KeepOutEntry, LayoutEntry
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.layout import Choice, KeepOut, LayoutSettings, Misplacement, PathRange, VariableKind, VaryRange
+from cellplan.model.layout import Choice, KeepOut, LayoutSettings, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.layout import KeepOutEntry, LayoutEntry
 from cellplan.model.settings.units import in_si
 from cellplan.model.units import MM
 
@@ -67,7 +67,7 @@ def read_layout(
         margin_sliding=entry.margin_mm.si,
         cost=ties.cost(),
         singular=entry.singular_share,
-        misplacement=_misplacement(entry),
+        misplacement=entry.misplacement,
         is_default=entry.vary is None,
     )
     return settings, found.findings
@@ -159,13 +159,6 @@ def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) ->
                 f"got {MM * lower:g} to {MM * upper:g}"
             )
             found.findings.append(document.finding(("layout", "floor", f"{SIDES[each.index]}_mm"), text))
-
-
-def _misplacement(entry: LayoutEntry) -> Misplacement | None:
-    """By how much every base may be off."""
-    if entry.misplacement is None:
-        return None
-    return Misplacement(position=entry.misplacement.position_mm.si, orientation=entry.misplacement.orientation_deg.si)
 
 
 def _floor(entry: LayoutEntry) -> Array | None:

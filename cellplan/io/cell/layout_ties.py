@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from cellplan.io.cell.layout_addresses import Address, AddressError, read_address
 from cellplan.io.cell.layout_ranges import Context
 from cellplan.io.input.findings import Finding, KeyPath, listed, shown
-from cellplan.io.schema.layout import LayoutEntry, MirroredEntry
 from cellplan.model.layout import Mirrored, VaryRange, mirror_image
+from cellplan.model.settings.layout import LayoutEntry, MirroredEntry
 
 
 class Ties:

@@ -4,7 +4,6 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
-from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.io.schema.solver import SolverEntry
@@ -29,6 +28,7 @@ from cellplan.model.settings.entry import (
     require_each_once,
     rule,
 )
+from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.settings.task import LONGEST_S
 from cellplan.model.settings.units import Mm, Ms, Within

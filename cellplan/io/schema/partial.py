@@ -13,7 +13,6 @@ from cellplan.io.schema.cell import (
     MotionEntry,
     PartEntry,
 )
-from cellplan.io.schema.layout import LayoutEntry
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
@@ -23,6 +22,7 @@ from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.settings.acceleration import AccelerationChoice
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
+from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.program import ProgramEntry
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
-from cellplan.model.layout import Misplacement
 from cellplan.model.seeds import generator
+from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import whole_steps
@@ -75,7 +75,7 @@ class _Verdict:
 class MisplacedFinish(Finish):
     """The finish of layouts that must keep all demands with all bases off their places."""
 
-    misplacement: Misplacement  # by how much
+    misplacement: MisplacementEntry  # by how much
     _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
 
     def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
@@ -298,8 +298,8 @@ class MisplacedFinish(Finish):
         groups = (verdicts[: robust.worst_ones], verdicts[robust.worst_ones : ends], verdicts[ends:])
         kept = [sum(not each.reason for each in group) for group in groups]
         return {
-            "position_mm": number(MM * self.misplacement.position),
-            "orientation_deg": number(round(DEG * self.misplacement.orientation, 9)),
+            "position_mm": number(self.misplacement.position_mm),
+            "orientation_deg": number(self.misplacement.orientation_deg),
             "cycle_s": number(round(cycle, 6)),
             "nominal_cycle_s": number(round(robust.nominal, 6)),
             "seeded": len(groups[2]),

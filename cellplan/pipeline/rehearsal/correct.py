@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.real_cell.execution import Measurement, RealCell, measured_poses
+from cellplan.checks.real_cell.execution import RealCell, measured_poses
 from cellplan.checks.real_cell.true_errors import largest, worst_share
 from cellplan.checks.tools.tracking import pose_accuracy
 from cellplan.errors import NoSolutionError
@@ -15,6 +15,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
 from cellplan.model.rehearsal import Correction, Outcome, Round
 from cellplan.model.report import TaskAccuracy
+from cellplan.model.settings.cell_errors import MeasurementEntry
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.euler.measured_feedback import (
@@ -60,7 +61,7 @@ class _Attempt:
 def correct_from_pass_to_pass(
     job: Pass,
     real: RealCell,
-    system: Measurement,
+    system: MeasurementEntry,
     *,
     rng: np.random.Generator,
     rounds: int,
@@ -104,7 +105,7 @@ def correct_from_pass_to_pass(
 
 
 def correct_within_the_pass(
-    job: Pass, real: RealCell, system: Measurement, *, rng: np.random.Generator
+    job: Pass, real: RealCell, system: MeasurementEntry, *, rng: np.random.Generator
 ) -> tuple[TaskAccuracy, ...] | None:
     """True errors when every instant's measured error is fed back at the next one; None when a tool loses its path.
 
@@ -134,7 +135,7 @@ def _planned(job: Pass, references: Schedule, start: Array) -> Array:
 class _Executions:
     """Executions of one job on one real cell."""
 
-    def __init__(self, job: Pass, real: RealCell, system: Measurement, rng: np.random.Generator) -> None:
+    def __init__(self, job: Pass, real: RealCell, system: MeasurementEntry, rng: np.random.Generator) -> None:
         """Remember what stays the same."""
         self._job, self._real, self._system, self._rng = job, real, system, rng
         self.all: list[_Attempt] = []

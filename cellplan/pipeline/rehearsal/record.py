@@ -13,7 +13,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.cell_errors import Draw
 from cellplan.model.rehearsal import Correction, IsoFigures, PathFigures, PoseFigures, Rehearsal, RunRehearsal, Trial
 from cellplan.model.report import CAUTION, TaskAccuracy
-from cellplan.report.record.common import AXES, Provenance, Record, check_record, number
+from cellplan.report.record.common import AXES, Provenance, Record, check_record, entry_record, number
 from cellplan.report.record.idle import missing_moves
 
 SCHEMA = "cellplan.rehearsal/1"
@@ -41,10 +41,7 @@ def rehearsal_record(rehearsal: Rehearsal, *, provenance: Provenance) -> Record:
         "feedback": rehearsal.has_feedback,
         "in_pass": rehearsal.has_in_pass,
         "tables_released": rehearsal.is_released,
-        "measurement": {
-            "position_noise_mm": number(1e3 * errors.position_noise),
-            "orientation_noise_deg": number(math.degrees(errors.orientation_noise)),
-        },
+        "measurement": entry_record(errors.measurement),
         "tasks": {name: record for run in rehearsal.runs for name, record in _tasks_record(cell, run).items()},
         "runs": [_run_record(cell, run) for run in rehearsal.runs],
         "checks": [check_record(check) for check in rehearsal.checks],

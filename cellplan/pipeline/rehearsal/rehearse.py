@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.real_cell.execution import Measurement, RealCell
+from cellplan.checks.real_cell.execution import RealCell
 from cellplan.checks.real_cell.iso9283 import path_figures, pose_figures
 from cellplan.checks.real_cell.true_errors import check_true_errors
 from cellplan.checks.verify import verify_motion, with_clearance
@@ -163,7 +163,7 @@ def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progr
     """One real cell."""
     draw = draw_errors(job.cell, errors, number)
     real = RealCell(perturbed_cell(job.cell, draw))
-    system = Measurement(position_noise=errors.position_noise, orientation_noise=errors.orientation_noise)
+    system = errors.measurement
     before = real.accuracy(job.schedule, job.q)
     correction, in_pass = None, None
     if options.feedback:

@@ -9,7 +9,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Robot
-from cellplan.model.layout import Misplacement
+from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.search.distances.moving_bodies import Beside
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
@@ -60,7 +60,7 @@ class BaseDisplacements:
             object.__setattr__(self, name, value)
 
     @classmethod
-    def of(cls, variables: Variables, x: Array, misplacement: Misplacement) -> "BaseDisplacements":
+    def of(cls, variables: Variables, x: Array, misplacement: MisplacementEntry) -> "BaseDisplacements":
         """Those of all bases of a layout, shape (n,)."""
         cell = variables.placed(x)
         places = [
@@ -69,7 +69,7 @@ class BaseDisplacements:
             for component in range(len(COMPONENTS))
             if component != HEIGHT or not _stands_on_plane(cell, robot)
         ]
-        lengths = np.array([misplacement.position] * 3 + [misplacement.orientation])
+        lengths = np.array([misplacement.position_mm.si] * 3 + [misplacement.orientation_deg.si])
         return cls(
             variables=variables,
             x=x,

@@ -58,7 +58,7 @@ class Variables:
             raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
         conversion, remarks = with_pedestals(cell, settings)
         base = cell.with_values(conversion)
-        spare = 0.0 if settings.misplacement is None else settings.misplacement.position
+        spare = 0.0 if settings.misplacement is None else settings.misplacement.position_mm.si
         settings = replace(settings, ranges=with_room_below(base, settings.ranges, spare=spare))
         tied = Tied.of(settings)
         joints = [joint for robot in base.robots for joint in robot.model.joints]

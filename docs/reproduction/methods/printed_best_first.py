@@ -24,7 +24,7 @@ def printed_best_first(problem: TrackingProblem) -> Callable[[int, Array], Advan
     When all joints are closed, all are opened again; the search ends when the root of the cost is within the tolerance.
     Its ``iterations`` are the moves.
     """
-    target = problem.cell.solver.search.tolerance**2
+    target = problem.cell.solver.search.tolerance_mm.si**2
     cost = SearchCost(problem)
     unbounded = np.full(problem.cell.joint_count, np.inf)
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell
-from cellplan.checks.real_cell.execution import Measurement, RealCell, measured_poses
+from cellplan.checks.real_cell.execution import RealCell, measured_poses
 from cellplan.geometry.transforms import inverse, pose_from, rotation_vector
 from cellplan.kinematics.pinocchio_model import CombinedModel
+from cellplan.model.settings.cell_errors import MeasurementEntry
 
 
 def test_tools_stand_on_the_part_where_the_planners_engine_has_them(cells):
@@ -23,7 +24,7 @@ def test_tools_stand_on_the_part_where_the_planners_engine_has_them(cells):
 def test_noise_is_as_large_as_stated_and_sits_on_the_part():
     n = 4000
     X = np.repeat(pose_from(np.eye(3), np.array([1.0, 2.0, 3.0]))[None], n, axis=0)
-    system = Measurement(position_noise=2e-5, orientation_noise=1e-4)
+    system = MeasurementEntry(position_noise_mm=0.02, orientation_noise_deg=np.degrees(1e-4))
 
     (seen,) = measured_poses([X], system, np.random.default_rng(1))
 
@@ -36,7 +37,7 @@ def test_a_perfect_system_sees_the_truth_and_draws_nothing():
     rng = np.random.default_rng(1)
     X = np.eye(4)[None]
 
-    (seen,) = measured_poses([X], Measurement(), rng)
+    (seen,) = measured_poses([X], MeasurementEntry(), rng)
 
     np.testing.assert_array_equal(seen, X)
     assert rng.random() == np.random.default_rng(1).random()

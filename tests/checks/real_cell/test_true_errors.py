@@ -10,6 +10,7 @@ from cellplan.checks.real_cell.true_errors import check_true_errors, worst_share
 from cellplan.model.cell_errors import Draw
 from cellplan.model.rehearsal import RunRehearsal, Trial
 from cellplan.model.report import TaskAccuracy
+from cellplan.model.settings.units import Mm
 
 N = 11
 
@@ -73,7 +74,7 @@ def test_errors_count_as_shares_of_their_tolerance(cell):
 
 def test_where_nothing_is_allowed_anything_is_infinitely_much(cell):
     task = cell.task("circle")
-    strict = replace(cell, tasks=(replace(task, tolerance=replace(task.tolerance, position=0.0)),))
+    strict = replace(cell, tasks=(replace(task, tolerance=task.tolerance.model_copy(update={"position_mm": Mm(0.0)})),))
 
     assert worst_share(strict, (accuracy(1e-9),), {"circle": 0}) == np.inf
     assert worst_share(strict, (accuracy(0.0),), {"circle": 0}) == 0.0

@@ -12,7 +12,7 @@ from cellplan.errors import InputError
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell_errors import CellErrors
 from cellplan.model.rehearsal import Outcome
-from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry
+from cellplan.model.settings.cell_errors import MeasurementEntry, PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
 from cellplan.pipeline.overrides import with_overrides
@@ -163,7 +163,9 @@ def test_fixed_errors_make_one_trial_however_many_are_asked_for(pair):
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(pair):
     spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(ShiftSpreadEntry(normal=0.5), 0.0, 0.0)))
-    stated = CellErrors(robots={"right": spread}, position_noise=1e-6, trials=2, seed=5)
+    stated = CellErrors(
+        robots={"right": spread}, measurement=MeasurementEntry(position_noise_mm=1e-3), trials=2, seed=5
+    )
 
     def errors(of):
         return np.stack(

@@ -275,4 +275,4 @@ def test_joints_that_move_no_tool_stay_where_they_are():
     schedule = points_schedule(cell, times, at + np.linspace(0.0, 0.01, 21)[:, None] * [1.0, 0.0, 0.0])
     motion = followed(cell, schedule, start)
     assert np.ptp(motion.q[:, 3:], axis=0).max() == 0.0
-    assert position_errors(cell, schedule, motion).max() <= cell.solver.search.tolerance
+    assert position_errors(cell, schedule, motion).max() <= cell.solver.search.tolerance_mm.si

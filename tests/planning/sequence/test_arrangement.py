@@ -101,7 +101,7 @@ def test_every_arrangement_keeps_every_constraint_and_a_deadlock_is_a_circle_of_
     assert all(place[before] < place[name] for name in tasks for before in above[name] if before.islower())
     assert all(len({cell.task(name).robot for name in block.tasks}) == len(block.tasks) for block in blocks)
     assert sum(block.dwell for block in blocks) == sum(
-        mark.dwell for mark in cell.program.marks if any(mark.name in robot.order for robot in cell.robots)
+        mark.dwell_s for mark in cell.program.all_marks if any(mark.name in robot.order for robot in cell.robots)
     )
     if cell.motion.mode is Mode.PAIRWISE:
         assert all(len(block.tasks) <= 1 for block in blocks)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell, solve
-from cellplan.model.layout import Misplacement
+from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.pipeline.layout.prepared import Prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
@@ -25,7 +25,7 @@ from cellplan.search.programs.objective import Demands, Effort, Objective
 
 CELLS = Path(__file__).resolve().parents[3] / "cells"
 SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
-AMOUNTS = Misplacement(position=0.002, orientation=np.radians(0.2))
+AMOUNTS = MisplacementEntry(position_mm=2.0, orientation_deg=0.2)
 
 
 def displaced_cell(cell: Path, settings: tuple[str, ...] = ()) -> SimpleNamespace:

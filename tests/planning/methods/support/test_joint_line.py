@@ -91,7 +91,7 @@ def test_error_of_the_cost_is_the_sum_of_squares_of_the_paper():
     problem, cost, q = cost_of(cell, 13)
     state = problem.state(q)
     X_PT = np.linalg.inv(state.X_WP) @ state.X_WT[problem.constraints.operators]
-    gamma = cell.solver.search.orientation_weight
+    gamma = cell.solver.search.orientation_weight_m2
     difference = problem.desired[1] - X_PT
     expected = np.sum(difference[:, :3, 3] ** 2) + gamma * np.sum(difference[:, :3, :3] ** 2)
     assert cost.expand(q).cost == pytest.approx(expected, rel=1e-12)
