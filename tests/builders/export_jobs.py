@@ -54,14 +54,16 @@ def positioner_model() -> RobotModel:
 
 def controlled(name: str, model: RobotModel, **control: object) -> Robot:
     """A robot with a controller of its own, named after it."""
-    settings = {"id": f"{name}_controller", **control}
-    return replace(placed(name, model), control=RobotControlEntry(**settings))  # type: ignore[arg-type]
+    connected = RobotControlEntry(**{"id": "controller", **control})  # type: ignore[arg-type]
+    if "id" not in control:  # a robot may have any name here, and its controller too
+        connected = connected.model_copy(update={"id": f"{name}_controller"})
+    return replace(placed(name, model), control=connected)
 
 
 def signals(names: Sequence[str]) -> dict[str, HandshakeEntry]:
     """Handshake signals between all robots, whole numbers that differ."""
     return {
-        name: HandshakeEntry(
+        name: HandshakeEntry.model_construct(
             output=10 + place,
             inputs={other: 100 + 10 * place + k for k, other in enumerate(names) if other != name},
         )
@@ -76,7 +78,7 @@ def cell_of(*robots: Robot, kind: KindName) -> Cell:
         robots = tuple(
             robot
             if robot.control is None or robot.control.handshake is not None
-            else replace(robot, control=robot.control.changed(handshake=own[robot.name]))
+            else replace(robot, control=robot.control.model_copy(update={"handshake": own[robot.name]}))
             for robot in robots
         )
     names = dict.fromkeys(robot.control.id for robot in robots if robot.control is not None)

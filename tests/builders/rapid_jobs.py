@@ -31,7 +31,7 @@ CONTROLLER = "irc5"
 def named_signals(names: Sequence[str]) -> dict[str, HandshakeEntry]:
     """Handshake signals between all robots, each with a name."""
     return {
-        name: HandshakeEntry(
+        name: HandshakeEntry.model_construct(
             output=f"do_{name}", inputs={other: f"di_{name}_{other}" for other in names if other != name}
         )
         for name in names

@@ -354,7 +354,7 @@ def test_rows_need_times_that_rise() -> None:
 def test_signals_must_be_names(signal: str) -> None:
     own = named_signals(NAMES[:2])[NAMES[0]]
 
-    text = refusal(changed_cell(sequence_job(), alpha={"handshake": replace(own, output=signal)}))
+    text = refusal(changed_cell(sequence_job(), alpha={"handshake": own.model_copy(update={"output": signal})}))
 
     assert text == (
         "robots.alpha.controller.handshake.output: expected the name of a signal of at most 32 letters, digits and _, "
@@ -365,7 +365,8 @@ def test_signals_must_be_names(signal: str) -> None:
 def test_an_input_that_is_no_name_is_refused_by_its_key() -> None:
     own = named_signals(NAMES[:2])[NAMES[0]]
 
-    text = refusal(changed_cell(sequence_job(), alpha={"handshake": replace(own, inputs={NAMES[1]: "3"})}))
+    other = own.model_copy(update={"inputs": {NAMES[1]: "3"}})
+    text = refusal(changed_cell(sequence_job(), alpha={"handshake": other}))
 
     assert text.startswith(f"robots.alpha.controller.handshake.inputs.{NAMES[1]}: expected the name of a signal ")
 

@@ -243,10 +243,10 @@ def test_a_whole_robot_is_left_out_by_its_own_name() -> None:
     ],
 )
 def test_exclusions_that_name_no_pair_are_refused(bodies: tuple[str, str], message: str) -> None:
-    exclusion = ExclusionEntry(bodies=bodies, reason="why not")
+    exclusion = ExclusionEntry.model_construct(bodies=bodies, reason="why not")
 
     with pytest.raises(InputError) as caught:
-        Scene.from_cell(two_arms(checks=ChecksEntry(clearance_mm=0.0, contact_zone_mm=0.0, exclude=(exclusion,))))
+        Scene.from_cell(two_arms(checks=ChecksEntry().model_copy(update={"exclude": (exclusion,)})))
 
     assert str(caught.value) == f"<cell>: checks.exclude[0].bodies: {message}"
 

@@ -163,9 +163,8 @@ def test_fixed_errors_make_one_trial_however_many_are_asked_for(pair):
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others(pair):
     spread = RobotErrorsEntry(base=PoseErrorEntry(xyz_mm=(ShiftSpreadEntry(normal=0.5), 0.0, 0.0)))
-    stated = CellErrors(
-        robots={"right": spread}, measurement=MeasurementEntry(position_noise_mm=1e-3), trials=2, seed=5
-    )
+    noise = MeasurementEntry(position_noise_mm=1e-3)
+    stated = CellErrors(robots={"right": spread}, measurement=noise, trials=2, seed=5)
 
     def errors(of):
         return np.stack(
