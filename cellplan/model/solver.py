@@ -96,22 +96,19 @@ class Integrator(StrEnum):
     EULER = "euler"
 
 
-def beside_smallest(method: MethodName, *, has_goals: bool, near_limits: float, load: float) -> tuple[str, ...]:
+def beside_smallest(method: MethodName, weighting: WeightingEntry, *, has_goals: bool) -> tuple[str, ...]:
     """Keys of the solver's settings by which the motion is another than that of the smallest weighted joint velocities.
 
     Searches and screenings of many cells know only that one, by the weighted pseudo-inverse with constant weights.
 
     Args:
-        method: The resolution method.
         has_goals: Whether anything is pursued besides the tasks.
-        near_limits: See ``WeightingEntry``.
-        load: See ``WeightingEntry``.
     """
     obstacles = {
         "method": not METHODS[method].is_accurate,
         "secondary": has_goals,
-        "weighting.near_limits": near_limits != 0.0,
-        "weighting.load": load != 0.0,
+        "weighting.near_limits": weighting.near_limits != 0.0,
+        "weighting.load": weighting.load != 0.0,
     }
     return tuple(key for key, stands in obstacles.items() if stands)
 
@@ -180,9 +177,7 @@ class SolverSettings:
     @property
     def beside_smallest(self) -> tuple[str, ...]:
         """Keys of these settings by which the motion is not that of the smallest weighted joint velocities."""
-        return beside_smallest(
-            self.method, has_goals=bool(self.goals), near_limits=self.weighting.near_limits, load=self.weighting.load
-        )
+        return beside_smallest(self.method, self.weighting, has_goals=bool(self.goals))
 
     @property
     def is_varied(self) -> bool:

@@ -128,7 +128,7 @@ def build_task(
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
     path = _path(name, entry.path, read_targets)
-    process, tolerance = entry.process, entry.tolerance
+    process = entry.process
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     corners = entry.corners or motion.corners
     return Task(
@@ -143,10 +143,7 @@ def build_task(
         turn=entry.tool_turn_deg.si,
         axes=_axis_numbers(entry.axes),
         is_spin_free="spin" in entry.free,
-        tolerance=tolerance.changed(
-            between_rows_mm=tolerance.between_rows_mm or tolerance.position_mm,
-            between_rows_deg=tolerance.between_rows_deg or tolerance.orientation_deg,
-        ),
+        tolerance=entry.tolerance.filled,
         start=entry.begins_s,
         duration=entry.duration_s,
         feed=si_or_none(entry.feed_mm_s) if process is None else process.feed_mm_s.si,

@@ -89,9 +89,7 @@ def _beside_smallest(solver: SolverEntry) -> tuple[str, ...]:
     """Keys of the solver that exclude a given path, which goes with the smallest weighted velocities alone."""
     if solver.integrator is not None and solver.integrator != "auto":  # an explicit accurate mode has its own rule
         return ("integrator",) if solver.integrator == "euler" else ()
-    weighting = solver.weighting
-    has_goals = any(goal is not None for _, goal in solver.secondary)
-    return beside_smallest(solver.method, has_goals=has_goals, near_limits=weighting.near_limits, load=weighting.load)
+    return beside_smallest(solver.method, solver.weighting, has_goals=any(goal for _, goal in solver.secondary))
 
 
 def _rows(place: KeyPath, path: JointPathEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:

@@ -1,6 +1,6 @@
 """Tolerance and process of a task, as a cell file states them, and bounds that tasks and programs share."""
 
-from typing import Annotated, Final
+from typing import Annotated, Final, Self
 
 from pydantic import Field
 
@@ -29,6 +29,14 @@ class ToleranceEntry(Entry):
     between_rows_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] | None = Field(
         default=None, description="Likewise for the orientation; orientation_deg when left out."
     )
+
+    @property
+    def filled(self) -> Self:
+        """The same with the errors between the rows written out."""
+        return self.changed(
+            between_rows_mm=self.between_rows_mm or self.position_mm,
+            between_rows_deg=self.between_rows_deg or self.orientation_deg,
+        )
 
     @property
     def between(self) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from cellplan.model.rehearsal import Correction, IsoFigures, PathFigures, PoseFi
 from cellplan.model.report import CAUTION, TaskAccuracy
 from cellplan.report.record.common import AXES, Provenance, Record, check_record, entry_record, number
 from cellplan.report.record.idle import missing_moves
+from cellplan.report.record.tasks import BETWEEN_ROWS
 
 SCHEMA = "cellplan.rehearsal/1"
 ABC = ("a", "b", "c")
@@ -62,10 +63,7 @@ def _tasks_record(cell: Cell, run: RunRehearsal) -> Record:
         record[task.name] = {
             "robot": task.robot,
             "run": run.name,
-            "tolerance": {
-                "position_mm": number(task.tolerance.position_mm),
-                "orientation_deg": number(task.tolerance.orientation_deg),
-            },
+            "tolerance": entry_record(task.tolerance, without=BETWEEN_ROWS),
             "axes": [AXES[index] for index in task.axes],
             "judged_from_s": number(float(run.times[run.judged_from[task.name]])),
             **{name: _execution_record(run, place, pick) for name, pick in EXECUTIONS.items()},

@@ -6,7 +6,7 @@ from typing import Annotated, Final, TypedDict
 from cellplan.model.payload import AxisUse, LoadUse
 from cellplan.model.report import Report
 from cellplan.model.units import MM
-from cellplan.report.record.common import Number, number
+from cellplan.report.record.common import Number, entry_record, number
 
 SHARED: Final = "equally by all that hold it"  # distribution of the part's weight over its holders
 
@@ -71,14 +71,7 @@ def _load_record(use: LoadUse) -> LoadRecord:
         "felt_mass_kg": number(use.felt),
         "felt_at_s": number(use.felt_at_s),
         "axes": {axis.joint: _axis_record(axis, use) for axis in use.axes},
-        "allowed": None
-        if limits is None
-        else {
-            "mass_kg": number(limits.mass_kg),
-            "along_mm": number(limits.along_mm),
-            "across_mm": number(limits.across_mm),
-            "source": limits.source,
-        },
+        "allowed": None if limits is None else entry_record(limits, without={"axes"}),
     }
 
 

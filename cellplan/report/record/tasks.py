@@ -11,8 +11,8 @@ from cellplan.model.cell import Cell
 from cellplan.model.path_direction import run_direction
 from cellplan.model.report import Report, Standoff, TaskAccuracy, ToolDepth
 from cellplan.model.task import Task
-from cellplan.model.units import DEG, MM
-from cellplan.report.record.common import AXES, Number, Record, number
+from cellplan.model.units import MM
+from cellplan.report.record.common import AXES, Number, Record, entry_record, number
 from cellplan.report.record.tool_errors import (
     BetweenRowsRecord,
     between_record,
@@ -30,6 +30,9 @@ MAX_INTERVALS: Final = 100  # intervals of lower speed that are listed; their nu
 class _ToleranceRecord(TypedDict):
     position_mm: Annotated[Number, "admissible distance at the rows of the table"]
     orientation_deg: Annotated[Number, "admissible angle at the rows of the table"]
+
+
+BETWEEN_ROWS: Final = ("between_rows_mm", "between_rows_deg")
 
 
 class ToleranceRecord(_ToleranceRecord, total=False):
@@ -156,7 +159,7 @@ def _task_record(
         "max_orientation_error_with_settling_deg": number(largest(orientation)[0]),
         "settle_s": number(task.settle),
         "judged_from_s": number(task.judged_from),
-        "tolerance": _tolerance_record(task, has_between=accuracy.between is not None),
+        "tolerance": entry_record(task.tolerance, without=() if accuracy.between else BETWEEN_ROWS),
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(MM * accuracy.path_length),
         "path_bulge_mm": None if accuracy.path_bulge is None else number(MM * accuracy.path_bulge),
@@ -175,17 +178,6 @@ def _task_record(
 def _phase_of(report: Report) -> PhaseOfTask:
     """The phase of a report; nothing of the only one."""
     return {} if report.phase is None else {"phase": report.phase}
-
-
-def _tolerance_record(task: Task, *, has_between: bool) -> ToleranceRecord:
-    tolerance: ToleranceRecord = {
-        "position_mm": number(task.tolerance.position_mm),
-        "orientation_deg": number(task.tolerance.orientation_deg),
-    }
-    if has_between:
-        position, orientation = task.tolerance.between
-        tolerance["between_rows_mm"], tolerance["between_rows_deg"] = number(MM * position), number(DEG * orientation)
-    return tolerance
 
 
 def direction_record(task: Task) -> DirectionRecord:
