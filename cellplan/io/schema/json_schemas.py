@@ -39,6 +39,7 @@ def entry_title(name: str) -> str:
 
 def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
     """The schema with its dialect and title in front."""
+    _shorten(schema)
     rest = {key: value for key, value in schema.items() if key != "title"}
     finished = _without_null(rest)
     for entry in (finished, *finished["$defs"].values()):
@@ -46,6 +47,16 @@ def _finished(schema: dict[str, Any], title: str) -> dict[str, Any]:
     for name, entry in finished["$defs"].items():
         entry["title"] = entry_title(name)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **finished}
+
+
+def _shorten(schema: dict[str, Any]) -> None:
+    """Leave out of docstrings the keys, which have descriptions of their own, and what a reference says as well."""
+    definitions = {f"#/$defs/{name}": entry for name, entry in schema["$defs"].items()}
+    for entry in (schema, *definitions.values()):
+        entry["description"] = entry["description"].partition("\n\n")[0]
+    for field in (field for entry in (schema, *definitions.values()) for field in entry.get("properties", {}).values()):
+        if "$ref" in field and field.get("description") == definitions[field["$ref"]]["description"]:
+            del field["description"]
 
 
 def _entitle(fields: dict[str, Any]) -> None:

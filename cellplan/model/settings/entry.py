@@ -123,6 +123,12 @@ class Entry(BaseModel):
 
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
+    @classmethod
+    def __pydantic_init_subclass__(cls, **settings: Any) -> None:
+        """Let ``help`` list the keys with what they mean."""
+        keys = [f"    {key}: {field.description or ''}" for key, field in cls.model_fields.items()]
+        cls.__doc__ = "\n".join([cls.__doc__ or "", "", "Attributes:", *keys])
+
     def changed(self, **values: Any) -> Self:
         """The entry with other values, which are validated like those of a file."""
         return type(self).model_validate({**dict(self), **values})
