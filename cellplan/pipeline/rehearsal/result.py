@@ -1,6 +1,5 @@
 """A rehearsal as text, plots, page, tables and files: what is shown, and in which order."""
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
