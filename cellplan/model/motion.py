@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from cellplan.geometry.frozen import derive
 from cellplan.geometry.transforms import Array
 from cellplan.model.clock import Clock
 from cellplan.model.clocked_path import ClockedPath, distinct
@@ -200,7 +201,7 @@ class Motion:
         if not np.all(np.isfinite(self.q)):
             raise ValueError("motion: a joint position is not finite")
         if not len(self.sigma):
-            object.__setattr__(self, "sigma", self.times)
+            derive(self, sigma=self.times)
         if self.sigma.shape != self.times.shape:
             raise ValueError(f"motion: {len(self.sigma)} nominal times for {len(self.times)} times")
 

@@ -44,7 +44,7 @@ class NearPairs:
 
 def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     """See ``Scene.near``."""
-    table = near_table(scene)
+    table = scene.near_table
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
     found = table.find(scene.engine, D, within)
     return NearPairs(
@@ -58,15 +58,8 @@ def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     )
 
 
-def near_table(scene: "Scene") -> NearTable:
-    """Links, bodies and watched pairs of a scene as arrays; built once."""
-    if not scene.tables:
-        scene.tables.append(_built(scene))
-    return scene.tables[0]
-
-
-def _built(scene: "Scene") -> NearTable:
-    """The arrays of a scene."""
+def near_table_of(scene: "Scene") -> NearTable:
+    """See ``Scene.near_table``, which keeps it."""
     cell, bodies, pairs, engine, cut_from = scene.cell, scene.bodies, scene.pairs, scene.engine, scene.cut_from
     forest = LinkForest(cell.robots)
     solids = bodies[: len(engine.bodies) - len(cut_from)]

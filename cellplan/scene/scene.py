@@ -1,8 +1,8 @@
 """Scene: a cell made computable, built once: its kinematic chains, its bodies and the pairs that must keep apart."""
 
 from collections.abc import Mapping
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from cellplan.collision.self_test import prove_engine
 from cellplan.collision.separation import heights
 from cellplan.collision.static_contact import first_touching
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.frozen import derive
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
@@ -22,12 +23,11 @@ from cellplan.scene.collision_pairs import CollisionPairs
 from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
-from cellplan.scene.near import NearPairs, near_pairs, near_table
-from cellplan.scene.near_table import NearTable
+from cellplan.scene.near import NearPairs, near_pairs, near_table_of
 from cellplan.scene.pairs import Excluded, ScenePair, StraightMove
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
     """A cell made computable; safe to send to another process.
 
@@ -47,16 +47,18 @@ class Scene:
     solid_rows: Indices = field(init=False)  # indices of the pairs that the engine watches, shape (S,), ascending
     solid_pairs: Indices = field(init=False)  # ``ScenePair.solids`` of each of them, shape (S, 2)
     ground_rows: Indices = field(init=False)  # indices of the pairs of a solid and a half-space, shape (G,)
-    tables: list[NearTable] = field(init=False)  # what ``near_table`` has built of it; empty before it is first asked
+
+    near_table = cached_property(near_table_of)  # links, bodies and watched pairs as arrays
 
     def __post_init__(self) -> None:
         """Collect the indices of solids and half-spaces once: whole batches of pairs are bounded by them."""
-        solids = [(row, pair.solids) for row, pair in enumerate(self.pairs) if pair.solids is not None]
-        ground = [row for row, pair in enumerate(self.pairs) if pair.is_ground]
-        object.__setattr__(self, "solid_rows", np.array([row for row, _ in solids], dtype=np.intp))
-        object.__setattr__(self, "solid_pairs", np.array([ends for _, ends in solids], dtype=np.intp).reshape(-1, 2))
-        object.__setattr__(self, "ground_rows", np.array(ground, dtype=np.intp))
-        object.__setattr__(self, "tables", [])
+        solids = [row for row, pair in enumerate(self.pairs) if pair.solids is not None]
+        derive(
+            self,
+            solid_rows=np.array(solids, dtype=np.intp),
+            solid_pairs=np.array([self.pairs[row].solids for row in solids], dtype=np.intp).reshape(-1, 2),
+            ground_rows=np.array([row for row, pair in enumerate(self.pairs) if pair.is_ground], dtype=np.intp),
+        )
 
     @classmethod
     def from_cell(cls, cell: Cell) -> "Scene":
@@ -112,19 +114,14 @@ class Scene:
         placed = None if any(stands_by_link(cell, name) for name in X_WB) else placed_columns(cell, self.bodies, X_WB)
         if placed is None:
             return Scene.from_cell(cell)
-        other = copy(self)
         chains = {name: ScrewChain(cell.robot(name)) for name in X_WB}
         bodies = tuple(placed.get(index, body) for index, body in enumerate(self.bodies)) if placed else self.bodies
         changed = {index: body for index, body in placed.items() if body.shape is not self.bodies[index].shape}
-        object.__setattr__(other, "cell", cell)
-        object.__setattr__(other, "chains", {**self.chains, **chains})
-        object.__setattr__(other, "bodies", bodies)
         made = {index: prepare(body.name, body.shape) for index, body in changed.items()}  # type: ignore[arg-type]
-        if made:
-            object.__setattr__(other, "engine", self.engine.with_bodies(made))
-        if placed:
-            poses = {index: body.X_BS for index, body in placed.items()}
-            object.__setattr__(other, "tables", [near_table(self).moved(poses, made)])
+        engine = self.engine.with_bodies(made) if made else self.engine
+        other = replace(self, cell=cell, chains={**self.chains, **chains}, bodies=bodies, engine=engine)
+        poses = {index: body.X_BS for index, body in placed.items()}
+        vars(other)["near_table"] = self.near_table.moved(poses, made)  # as the property keeps it, not made anew
         return other
 
     def near(self, q: Array, within: float) -> NearPairs:

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Flags, Indices
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
-from cellplan.scene.near import NearPairs, near_table
+from cellplan.scene.near import NearPairs
 from cellplan.scene.near_table import NearTable, WatchedPairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -47,7 +47,7 @@ class ClosestPairs:
         self._scene = scene
         self._X_WB = np.array([robot.X_WB for robot in scene.cell.robots])
         chosen = np.array([pair.rule is Rule.CLEARANCE and pair.clearance_class in classes for pair in scene.pairs])
-        self._table = _among(near_table(scene), chosen)
+        self._table = _among(scene.near_table, chosen)
 
     def near(self, q: Array, *, within: float) -> NearPairs:
         r"""Pairs nearer than a distance at many configurations, ordered by configuration and by ``Scene.pairs``.

@@ -8,7 +8,6 @@ import numpy as np
 from cellplan.certify.depths import mounted_depths
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.scene.moved import stands_by_link
-from cellplan.scene.near import near_table
 from cellplan.scene.scene import Scene
 
 KEYS: Final = (3, 9, 33)  # [-] nodes at which distances are asked, more and more while nothing is too near
@@ -60,7 +59,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
 
 def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact]:
     """The worst contact of motions of shape (K, nodes, nq), by motion and node, for those that have one."""
-    table, (count, nodes, joints) = near_table(scene), q.shape
+    table, (count, nodes, joints) = scene.near_table, q.shape
     bases = np.array([np.tile(robot.X_WB, (count * nodes, 1, 1)) for robot in scene.cell.robots])
     bases[scene.cell.index(robot)] = np.repeat(X_WB, nodes, axis=0)
     demands = np.zeros(len(scene.pairs))
@@ -86,7 +85,7 @@ def _first_of_each(short: Array, motions: Indices) -> Indices:
 
 def _standing(scene: Scene, q: Array) -> Contact | None:
     """The first pair of which one stands too deep in the other, at a configuration of shape (1, nq)."""
-    table = near_table(scene)
+    table = scene.near_table
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
     for mounted_depth in mounted_depths(scene, q, table.bodies.poses(D)):
         if mounted_depth.depth > mounted_depth.pair.limit:

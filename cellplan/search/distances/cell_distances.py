@@ -21,7 +21,6 @@ from cellplan.kinematics.link_forest import WORLD
 from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
 from cellplan.scene.body_table import BodyTable
-from cellplan.scene.near import near_table
 from cellplan.scene.near_table import Found, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
@@ -94,10 +93,10 @@ class CellDistances:
         self._engine = Engine([*scene.engine.bodies, *added]) if added else scene.engine
         changed = {index for index, _ in self._moving.of_tools(variables.placed(variables.given))}
         self._table = replace(
-            near_table(scene),
-            bodies=BodyTable.of(near_table(scene).forest, carriers, self._engine.bodies),
+            scene.near_table,
+            bodies=BodyTable.of(scene.near_table.forest, carriers, self._engine.bodies),
             pairs=among(watched, _concerned(self.pairs, changed)),
-            is_hull=np.append(near_table(scene).is_hull, [True] * len(added)).astype(bool),
+            is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
         self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
         self.most_demanded = float(self._demands.max(initial=0.0))
@@ -183,7 +182,7 @@ class CellDistances:
 
     def _add_by_bases(self, derivatives: Array, near: LayoutDistances, base: Array) -> None:
         """Add derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
-        X_WB = near.D[[near_table(self._scene).forest.place(robot.name) for robot in self._cell.robots], 0]
+        X_WB = near.D[[self._scene.near_table.forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
         turns = np.swapaxes(base[:, 3:], 1, 2)
         twists[:-1, :3] = base[:, :3] + np.swapaxes(np.cross(X_WB[:, None, :3, 3], turns), 1, 2)
@@ -226,7 +225,7 @@ class CellDistances:
 
     def _changes(self, near: LayoutDistances, x: Array, base: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
         """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
-        forest = near_table(self._scene).forest
+        forest = self._scene.near_table.forest
         for name, index in self._moving.columns.items():
             if index not in near.bodies:
                 continue

@@ -7,7 +7,6 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.scene.bodies import is_ground
-from cellplan.scene.near import near_table
 from cellplan.scene.near_table import WatchedPairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -26,7 +25,7 @@ class LayoutPair:
 
 def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
     """All pairs of a scene, then those of which the depth is judged; and the same as arrays."""
-    bodies, table = scene.bodies, near_table(scene)
+    bodies, table = scene.bodies, scene.near_table
     known, forest = table.pairs, table.forest
     carriers = [forest.carries[forest.place(body.robot, body.link)].tobytes() for body in bodies]  # what moves each
 

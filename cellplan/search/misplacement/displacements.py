@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.geometry.frozen import derive
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Robot
@@ -48,16 +49,15 @@ class BaseDisplacements:
         robots = self.variables.base.robots
         places = zip(self.robots, self.components, strict=True)
         amounts = self.amounts
-        derived: dict[str, object] = {
-            "names": tuple(f"robots.{robots[r].name}.base.{COMPONENTS[c]}" for r, c in places),
-            "given": np.zeros_like(amounts),
-            "lower": -amounts,
-            "upper": amounts,
-            "scale": amounts,
-            "cost": 1.0 / amounts,
-        }
-        for name, value in derived.items():
-            object.__setattr__(self, name, value)
+        derive(
+            self,
+            names=tuple(f"robots.{robots[r].name}.base.{COMPONENTS[c]}" for r, c in places),
+            given=np.zeros_like(amounts),
+            lower=-amounts,
+            upper=amounts,
+            scale=amounts,
+            cost=1.0 / amounts,
+        )
 
     @classmethod
     def of(cls, variables: Variables, x: Array, misplacement: MisplacementEntry) -> "BaseDisplacements":

@@ -12,6 +12,7 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.frozen import derive
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.singular_values import SingularValues, arms
 from cellplan.search.kernel.varied import KernelVariables
@@ -48,7 +49,7 @@ class GuardedProblem(LayoutProblem):
         constrained, robots = self.job.constraints.kept.sum(axis=1), self.job.cell.robots
         joints = [len(robots[int(robot)].model.joints) for robot in self.job.constraints.operators]
         redundant = [count for count, place in enumerate(arms(self.job)) if joints[place] >= constrained[place]]
-        object.__setattr__(self, "guards", np.array(redundant, dtype=np.intp))
+        derive(self, guards=np.array(redundant, dtype=np.intp))
 
     @classmethod
     def like(

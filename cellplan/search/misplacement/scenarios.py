@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.geometry.frozen import derive
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
@@ -30,7 +31,7 @@ class ScenarioProblem(GuardedProblem):
     def __post_init__(self) -> None:
         """Repeat the nodes."""
         GuardedProblem.__post_init__(self)
-        object.__setattr__(self, "times", np.tile(self.job.times, len(self.d)))
+        derive(self, times=np.tile(self.job.times, len(self.d)))
 
     @classmethod
     def of(cls, problem: LayoutProblem, displacements: BaseDisplacements, d: Array) -> Self:

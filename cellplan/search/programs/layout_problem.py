@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.frozen import derive
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
 from cellplan.model.motion import Schedule
@@ -41,11 +42,10 @@ class LayoutProblem:
 
     def __post_init__(self) -> None:
         """Note what the variables and the job know, and whether accelerations count."""
-        for name in ("names", "lower", "upper", "scale", "cost", "given"):
-            object.__setattr__(self, name, getattr(self.variables, name))
-        object.__setattr__(self, "times", self.job.times)
-        object.__setattr__(self, "limits", self.job.limits)
-        object.__setattr__(self, "is_accelerating", bool(np.isfinite(self.acceleration).any()))
+        names = ("names", "lower", "upper", "scale", "cost", "given")
+        derive(self, **{name: getattr(self.variables, name) for name in names})
+        is_accelerating = bool(np.isfinite(self.acceleration).any())
+        derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
 
     def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
         """The same problem on more nodes.

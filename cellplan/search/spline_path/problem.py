@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.geometry.frozen import derive
 from cellplan.model.cell import joint_at
 from cellplan.model.joint_limits import JointLimits
 from cellplan.search.distances.cell_distances import CellDistances
@@ -48,13 +49,12 @@ class PathProblem:
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""
-        object.__setattr__(self, "times", self.nodes.job.times)
-        object.__setattr__(self, "limits", self.nodes.job.limits)
+        derive(self, times=self.nodes.job.times, limits=self.nodes.job.limits)
         path, layout = self.path, self.layout
-        object.__setattr__(self, "names", (*path.names, *layout.names))
-        object.__setattr__(self, "given", np.concatenate([path.given.coefficients.ravel(), layout.given]))
+        given = np.concatenate([path.given.coefficients.ravel(), layout.given])
+        derive(self, names=(*path.names, *layout.names), given=given)
         for name in ("lower", "upper", "scale", "cost"):
-            object.__setattr__(self, name, np.concatenate([getattr(path, name), getattr(layout, name)]))
+            derive(self, **{name: np.concatenate([getattr(path, name), getattr(layout, name)])})
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""

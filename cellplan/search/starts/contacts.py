@@ -9,7 +9,6 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import MountedPair
-from cellplan.scene.near import near_table
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.layout_pairs import among, demands_of, layout_pairs
@@ -58,7 +57,7 @@ class Contacts:
         watched = replace(
             watched, once=np.zeros(len(watched.rows), dtype=bool)
         )  # every configuration is another layout
-        self._table, self._engine = replace(near_table(scene), pairs=watched), scene.engine
+        self._table, self._engine = replace(scene.near_table, pairs=watched), scene.engine
         self._demands = demands_of(self._pairs)
 
     def shortfalls(self, X_WB: Array, q: Array) -> Shortfalls:
