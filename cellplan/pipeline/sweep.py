@@ -94,8 +94,8 @@ def sweep(
         "versions": versions(),
     }
     study = Study.of_variants(folder, header, variants)
-    trials = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress).trials
-    record = study_record(header, trials)
+    finished = study.run(partial(evaluate_variant, job), workers=workers, resume=resume, progress=progress)
+    record = study_record(header, [trial.record for trial in finished.trials])
     write_results(folder, study_files(record, job.formats))
     return record
 

@@ -22,13 +22,9 @@ __all__ = ["Finished", "Stop", "StoppedBy", "Study"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finished:
-    """What a study has come to.
+    """What a study has come to."""
 
-    Attributes:
-        trials: All trials as plain data, in their order; their number repeats the study byte for byte.
-    """
-
-    trials: list[dict[str, Any]]
+    trials: tuple[Trial, ...]  # in their order; their number repeats the study byte for byte
     rounds: int  # number of whole rounds
     stopped_by: StoppedBy  # why it has ended
 
@@ -114,7 +110,7 @@ class Study:
                 raise KeyboardInterrupt(
                     f"interrupted: {done} {self.noun}s are recorded in {self.folder}; --resume goes on from there"
                 ) from None
-        trials = [trial.record for trial in journal.trials[: stop.trials]]
+        trials = tuple(journal.trials[: stop.trials])
         return Finished(trials=trials, rounds=len(trials) // self.size, stopped_by=stopped_by)
 
     def refuse(self, *, resume: bool) -> None:

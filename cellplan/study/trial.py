@@ -63,6 +63,21 @@ class Trial:
     outcome: Outcome
 
     @property
+    def number(self) -> int:
+        """Its number, from 0."""
+        return self.variant.number
+
+    @property
+    def passed(self) -> bool:
+        """Whether it passed."""
+        return self.outcome.status is TrialStatus.PASSED
+
+    @property
+    def figures(self) -> Mapping[str, Any]:
+        """Its key figures; none where there is no motion."""
+        return self.outcome.figures
+
+    @property
     def record(self) -> dict[str, Any]:
         """The trial as plain data."""
         return {"trial": self.variant.number, "values": dict(self.variant.values), **self.outcome.record}

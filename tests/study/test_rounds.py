@@ -35,8 +35,8 @@ def journal(folder: Path) -> bytes:
 
 def test_a_round_begins_with_the_best_of_the_rounds_before(tmp_path: Path) -> None:
     finished = run(tmp_path / "study", 7)
-    assert [trial["figures"]["length"] for trial in finished.trials] == pytest.approx(LENGTHS, rel=1e-15)
-    assert [trial["values"]["place"] for trial in finished.trials[:2]] == [[0, 1], [1, 1]]  # as they are read back
+    assert [trial.figures["length"] for trial in finished.trials] == pytest.approx(LENGTHS, rel=1e-15)
+    assert [trial.variant.values["place"] for trial in finished.trials[:2]] == [[0, 1], [1, 1]]  # as they are read back
     assert (finished.rounds, finished.stopped_by) == (1, StoppedBy.TRIALS)
     assert json.loads(journal(tmp_path / "study").splitlines()[0])["best"] == {"figure": "length", "of": "smallest"}
 
@@ -104,7 +104,8 @@ def test_accidents_are_failed_trials_with_their_reasons(tmp_path: Path) -> None:
     study = rounds(tmp_path / "study")
     with Workers(2, ("builders.study_trials",)) as workers:
         finished = study.run(accident, workers=workers, stop=Stop(trials=10), limits=SHORT)
-    assert {trial["trial"]: trial["reason"] for trial in finished.trials if trial["status"] == "crashed"} == {
+    crashed = [trial for trial in finished.trials if trial.outcome.status is TrialStatus.CRASHED]
+    assert {trial.number: trial.outcome.reason for trial in crashed} == {
         1: "ValueError: no good",
         2: "trial 2: its process crashed (exit status 5)",
         4: "trial 4: its process needed more than 16000 MB",

@@ -21,7 +21,8 @@ VARIANTS = combinations([Axis("x", tuple(range(7))), Axis("y", (0.5, 2.0))])
 def run(folder: Path, evaluate: Any = product, *, resume: bool = False, workers: Any = None) -> list[dict[str, Any]]:
     """All trials of the study in a folder."""
     study = Study.of_variants(folder, HEADER, VARIANTS)
-    return study.run(evaluate, workers=workers or InThisProcess(), resume=resume).trials
+    finished = study.run(evaluate, workers=workers or InThisProcess(), resume=resume)
+    return [trial.record for trial in finished.trials]
 
 
 def test_every_variant_has_its_line_with_values_and_figures(tmp_path: Path) -> None:

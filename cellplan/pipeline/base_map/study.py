@@ -89,7 +89,7 @@ def map_study(
         limits = Limits(seconds=TILE_LIMIT)
         whole = replace(study, size=max(1, count), propose=propose, total=count)
         finished = whole.run(partial(evaluate, sent), workers=pool, limits=limits, resume=resume, progress=progress)
-        trials = finished.trials
+        trials = [trial.record for trial in finished.trials]
         record = finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
     files = map_files(record, request.formats)
     listed = [{"name": name, "sha256": digest(content)} for name, content in files.items()]

@@ -109,7 +109,8 @@ def compare(
         "versions": versions(),
     }
     study = Study.of_variants(folder, header, variants)
-    trials = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress).trials
+    finished = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress)
+    trials = [trial.record for trial in finished.trials]
     curves = [trial["figures"].pop("curves", None) for trial in trials]
     record = comparison_record(header, trials, found)
     write_results(folder, comparison_files(record, curves, job.formats))

@@ -24,11 +24,13 @@ from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest,
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
 from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared, values_of
+from cellplan.pipeline.layout.proposals import choice_of
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective, Room
 from cellplan.search.variables.variables import Variables
+from cellplan.study.trial import Trial
 from cellplan.study.workers import Workers
 
 NODES: Final = 129  # [-] of the finish
@@ -143,17 +145,13 @@ class Finish:
     choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices that the cell was made ready with
     _problems: dict[tuple[Prepared, int, tuple[float, ...]], Any] = field(default_factory=dict)
 
-    def use(self, choice: Mapping[str, object]) -> None:
-        """Make the cell ready with other discrete choices."""
-        self.ready, self.choice = prepared(self.ready.request, choice), choice
-
-    def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
+    def ordered(self, trials: Sequence[Trial]) -> Sequence[Trial]:
         """Trials that conform by the search, best first, in the order in which they are finished."""
         return trials
 
-    def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
+    def certified(self, trial: Trial) -> Certified:
         """A layout of the search, certified or with the reason why not."""
-        x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
+        x, start = self._layout(trial)
         room, is_first, before = _Room(), True, self.solves
         while True:
             timed = self._refined(x, start, room, is_first=is_first)
@@ -165,7 +163,7 @@ class Finish:
                     self.ready, timed.standing, program
                 )
             found = Certified(
-                trial=trial,
+                trial=trial.number,
                 x=x,
                 start=start,
                 program=program,
@@ -176,6 +174,12 @@ class Finish:
             if found.passed or program is None or found.solves >= ROUNDS or not _enlarged(room, timed, program):
                 return found
             is_first = False
+
+    def _layout(self, trial: Trial) -> tuple[Array, Array]:
+        """Variables and start posture of a layout of the search; the cell is made ready with its discrete choices."""
+        self.choice = choice_of(trial)
+        self.ready = prepared(self.ready.request, self.choice)
+        return np.array(trial.figures["x"], dtype=float), np.array(trial.figures["start"], dtype=float)
 
     def _refined(self, x: Array, start: Array, room: _Room, *, is_first: bool) -> _Timed:
         """The layout and its motion, improved again with more nodes where it asks for more time than the others do."""

@@ -1,11 +1,11 @@
 """Finish of a layout whose bases may all be off their places: one cycle for all corners, each of them verified."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -44,7 +44,7 @@ from cellplan.search.misplacement.robust import WITHIN, Robust, RobustSearch, ro
 from cellplan.search.misplacement.tolerance import Tolerance, tolerances
 from cellplan.search.programs.objective import Effort, Objective
 from cellplan.study.study import Study
-from cellplan.study.trial import Trial, TrialStatus, Variant
+from cellplan.study.trial import Trial, Variant
 from cellplan.study.workers import Limits
 
 FINALISTS: Final = 3  # [-] layouts that differ, of which the one is finished that is the best with displaced bases
@@ -78,46 +78,46 @@ class MisplacedFinish(Finish):
     misplacement: MisplacementEntry  # by how much
     _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
 
-    def ordered(self, trials: Sequence[dict[str, Any]]) -> Sequence[dict[str, Any]]:
+    def ordered(self, trials: Sequence[Trial]) -> Sequence[Trial]:
         """See ``Finish``: of the best ones that differ, the one with the shortest cycle with displaced bases first."""
         if self.ready.request.objective is not Objective.CYCLE:
             return trials
-        listed = list[dict[str, Any]]()
+        listed = list[Trial]()
         for trial in trials:
-            cycle = trial["figures"][BESTS[Objective.CYCLE].figure]
-            if all(abs(cycle - each["figures"]["cycle_s"]) > SAME * cycle for each in listed):
+            cycle = trial.figures[BESTS[Objective.CYCLE].figure]
+            if all(abs(cycle - other.figures["cycle_s"]) > SAME * cycle for other in listed):
                 listed.append(trial)
         listed = listed[:FINALISTS]
         for trial in listed:
-            if trial["trial"] not in self._begun:
-                self.use(trial["values"].get("choice") or {})
-                self._begin(trial["trial"], trial["figures"])
+            if trial.number not in self._begun:
+                self._begin(trial)
 
-        def rank(trial: dict[str, Any]) -> tuple[int, float]:
-            robust = self._begun[trial["trial"]][1]
+        def rank(trial: Trial) -> tuple[int, float]:
+            robust = self._begun[trial.number][1]
             return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.kept, robust.cycle)
 
         first = sorted(listed, key=rank)
         return [*first, *(trial for trial in trials if all(trial is not each for each in first))]
 
-    def certified(self, trial: int, figures: Mapping[str, Any]) -> Certified:
+    def certified(self, trial: Trial) -> Certified:
         """A layout of the search with all its corners; see ``Finish``.
 
         Raises:
             NoSolutionError: A tool loses its path at the nodes of the search.
         """
-        if trial not in self._begun:
-            self._begin(trial, figures)
-        search, robust = self._begun[trial]
+        self._layout(trial)
+        if trial.number not in self._begun:
+            self._begin(trial)
+        search, robust = self._begun[trial.number]
         if robust is None:
             raise NoSolutionError(NOT_FOLLOWED)
-        self.progress(f"displacing the bases of trial {trial}", 1.0)
+        self.progress(f"displacing the bases of trial {trial.number}", 1.0)
         before, effort = self.solves, MANY
         search = search.finer(GuardedProblem.like(self._problem(NODES)), robust, effort)
         for _ in range(ATTEMPTS):
             x, start = robust.found.x, robust.found.start
             robust = robust_layout(search, (x, start), signs=self._signs(search)) or robust
-            found, missing = self._result(trial, robust, effort, before)
+            found, missing = self._result(trial.number, robust, effort, before)
             if found.passed or missing is None:
                 break
             room = effort.room
@@ -126,17 +126,18 @@ class MisplacedFinish(Finish):
             search.effort = effort
         return found
 
-    def _begin(self, trial: int, figures: Mapping[str, Any]) -> None:
+    def _begin(self, trial: Trial) -> None:
         """Improve a layout with displaced bases at few nodes."""
-        self.progress(f"displacing the bases of trial {trial}", 0.0)
-        x, start = np.array(figures["x"], dtype=float), np.array(figures["start"], dtype=float)
+        self.progress(f"displacing the bases of trial {trial.number}", 0.0)
+        x, start = self._layout(trial)
         search = RobustSearch(
             problem=GuardedProblem.like(self._problem(FEW_NODES)),
             displacements=BaseDisplacements.of(self.ready.variables, x, self.misplacement),
             demands=self.ready.demands(),
             effort=FEW,
         )
-        self._begun[trial] = search, robust_layout(search, (x, start), signs=self._signs(search), rounds=FEW_ROUNDS)
+        robust = robust_layout(search, (x, start), signs=self._signs(search), rounds=FEW_ROUNDS)
+        self._begun[trial.number] = search, robust
 
     def _signs(self, search: RobustSearch) -> Array:
         """The seeded corners."""
@@ -251,12 +252,12 @@ class MisplacedFinish(Finish):
         self.solves += len(trials)
         return [self._verdict(trial) for trial in trials]
 
-    def _verdict(self, trial: Mapping[str, Any]) -> _Verdict:
+    def _verdict(self, trial: Trial) -> _Verdict:
         """The verdict of one trial."""
-        figures, demanded = trial["figures"], DEG * float(self.ready.variables.margin.max(initial=0.0))
+        figures, demanded = trial.figures, DEG * float(self.ready.variables.margin.max(initial=0.0))
         margin = figures.get("margin_deg")
         is_mendable = bool(figures) and (not figures["is_apart"] or (margin is not None and margin < demanded))
-        reason = "" if trial["status"] == TrialStatus.PASSED else trial["reason"]
+        reason = "" if trial.passed else trial.outcome.reason
         return _Verdict(reason, figures.get("load") or 0.0, is_mendable)
 
     def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[Tolerance]:
@@ -315,8 +316,8 @@ class MisplacedFinish(Finish):
 
 def _is_lost(trial: Trial) -> bool:
     """Whether a layout with displaced bases fails in any cycle."""
-    load = trial.outcome.figures.get("load")
-    return trial.outcome.status is not TrialStatus.PASSED and not (isinstance(load, float) and load > 1.0)
+    load = trial.figures.get("load")
+    return not trial.passed and not (isinstance(load, float) and load > 1.0)
 
 
 def _chosen(robust: Robust) -> Iterator[tuple[str, Corner]]:

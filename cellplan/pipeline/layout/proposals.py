@@ -159,6 +159,17 @@ def _leads_nowhere(trial: Trial) -> bool:
     return trial.variant.values["kind"] == "given" and ("x" not in figures or "sampled" in figures)
 
 
+def choice_of(trial: Trial) -> Mapping[str, object]:
+    """The discrete choices of a trial; empty for those of the cell."""
+    choice: Any = trial.variant.values.get("choice")
+    return choice or {}
+
+
+def is_candidate(trial: Trial) -> bool:
+    """Whether a trial conforms to what is demanded; one that asks for more clearance only leads to others."""
+    return trial.passed and not trial.variant.values.get("clearance_m")
+
+
 def origin_text(values: Mapping[str, Any], *, is_sampled: bool = False) -> str:
     """Where a trial began, in words.
 

@@ -1,8 +1,7 @@
 """``study.json`` of a layout search: the best layout, what it was chosen from, and what decides."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Final, TypedDict
 
 import numpy as np
@@ -16,7 +15,7 @@ from cellplan.pipeline.layout.given_layout import Given, GivenRecord, standing_o
 from cellplan.pipeline.layout.limits import LimitRecord
 from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
 from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_text, origin_text
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_of, choice_text, is_candidate, origin_text
 from cellplan.pipeline.layout.trial import change_of
 from cellplan.pipeline.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
 from cellplan.pipeline.write_run import versions
@@ -25,7 +24,7 @@ from cellplan.report.record.schema import record_schema
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
-from cellplan.study.trial import TrialStatus
+from cellplan.study.trial import Trial
 
 SCHEMA: Final = "cellplan.layout/1"
 TOP: Final = 10  # [-] layouts that are listed
@@ -149,7 +148,7 @@ def layout_record(
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
     standing = best.standing if best else None if ready.unled else standing_of_given(ready)
-    of_best = ready if best is None else _prepared_of(ready, next(_of_number(finished, best.trial)))
+    of_best = ready if best is None else _prepared_of(ready, finished.trials[best.trial])
     is_free = request.objective == "cycle"
     has_accelerations = bool(np.isfinite(acceleration_limits(ready.scene)).any())
     return {
@@ -178,7 +177,7 @@ def layout_record(
         "path": path_record(of_best, best.x) if best and ready.unled else None,
         "convergence": _convergence(finished),
         "choices": _choices(ready, finished, tried),
-        "dropped": _dropped(finished),
+        "dropped": _dropped(finished.trials),
         "misplacement": None,
         "remarks": [*ready.variables.remarks, *_slowed(best)],
         "drawing": _drawing(ready, given, best) if best else {},
@@ -205,7 +204,7 @@ def _candidates(ready: Prepared, finished: Finished, tried: Mapping[int, Certifi
     """Layouts that trials ended at: certified ones first, then by the objective; equal ones once."""
     best = BESTS[ready.request.objective]
     sign = -1.0 if best.is_largest else 1.0
-    listed = [_candidate(ready, trial, tried.get(trial["trial"])) for trial in finished.trials if trial["figures"]]
+    listed = [_candidate(ready, trial, tried.get(trial.number)) for trial in finished.trials if trial.figures]
     figure = {"cycle_s": "cycle_s", "apart_mm": "clearance_mm", "change": "change"}.get(best.figure, "cycle_s")
     ranks = {"certified": 0, "conforming": 1, "rejected": 2, "violating": 3}
 
@@ -229,11 +228,11 @@ def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
     )
 
 
-def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified | None) -> CandidateRecord:
+def _candidate(ready: Prepared, trial: Trial, certified: Certified | None) -> CandidateRecord:
     """One layout."""
-    figures, ready = trial["figures"], _prepared_of(ready, trial)
+    figures, ready = trial.figures, _prepared_of(ready, trial)
     x, start = np.array(figures["x"]), np.array(figures["start"])
-    status, reason = "conforming" if trial["status"] == TrialStatus.PASSED else "violating", ""
+    status, reason = "conforming" if trial.passed else "violating", ""
     shown = {key: figures[key] for key in ("cycle_s", "margin_deg", "clearance_mm", "change")}
     if certified is not None:
         x, start = certified.x, certified.start
@@ -245,11 +244,11 @@ def _candidate(ready: Prepared, trial: Mapping[str, Any], certified: Certified |
                 "clearance_mm": certified.clearance,
                 "change": change_of(ready, x),
             }
-    settings = plain_values({**(trial["values"].get("choice") or {}), **values_of(ready, x, start)})
+    settings = plain_values({**choice_of(trial), **values_of(ready, x, start)})
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
-        "trial": trial["trial"],
-        "origin": origin_text(trial["values"], is_sampled="sampled" in trial["figures"]),
+        "trial": trial.number,
+        "origin": origin_text(trial.variant.values, is_sampled="sampled" in figures),
         "status": status,
         "reason": reason,
         "cycle_s": rounded["cycle_s"],
@@ -277,18 +276,17 @@ def _convergence(finished: Finished) -> list[ProgressRecord]:
     best: float | None = None
     found: list[ProgressRecord] = []
     for trial in finished.trials:
-        is_usable = trial["status"] == TrialStatus.PASSED and not trial["values"].get("clearance_m")
-        cycle = round(trial["figures"]["cycle_s"], FINE) if is_usable else None
+        cycle = round(trial.figures["cycle_s"], FINE) if is_candidate(trial) else None
         best = cycle if best is None else min(best, cycle) if cycle is not None else best
-        found.append({"trial": trial["trial"], "cycle_s": cycle, "best_s": best})
+        found.append({"trial": trial.number, "cycle_s": cycle, "best_s": best})
     return found
 
 
-def _dropped(finished: Finished) -> list[DroppedRecord]:
+def _dropped(trials: Iterable[Trial]) -> list[DroppedRecord]:
     """Trials without a conforming layout, by reason, the most frequent first."""
-    lost = [trial for trial in finished.trials if trial["status"] != TrialStatus.PASSED]
-    counts = Counter(trial["reason"] for trial in lost)
-    first = {reason: min(trial["trial"] for trial in lost if trial["reason"] == reason) for reason in counts}
+    lost = [trial for trial in trials if not trial.passed]
+    counts = Counter(trial.outcome.reason for trial in lost)
+    first = {reason: min(trial.number for trial in lost if trial.outcome.reason == reason) for reason in counts}
     ordered = sorted(counts.items(), key=lambda each: (-each[1], first[each[0]]))
     return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
 
@@ -300,19 +298,17 @@ def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]
         return []
     found: list[ChoiceRecord] = []
     for choice in combinations:
-        own = [trial for trial in finished.trials if (trial["values"].get("choice") or {}) == choice]
-        solved = [tried[trial["trial"]] for trial in own if trial["trial"] in tried]
-        passed = [trial["figures"]["cycle_s"] for trial in own if trial["status"] == TrialStatus.PASSED]
-        reasons = [each.reason for each in solved if each.reason] or [
-            each["reason"] for each in _dropped(replace(finished, trials=own))
-        ]
+        trials = [trial for trial in finished.trials if choice_of(trial) == choice]
+        solved = [tried[trial.number] for trial in trials if trial.number in tried]
+        passed = [trial.figures["cycle_s"] for trial in trials if trial.passed]
+        reasons = [each.reason for each in solved if each.reason] or [each["reason"] for each in _dropped(trials)]
         is_certified = any(each.passed for each in solved)
-        status = "certified" if is_certified else "conforming" if passed else "dropped" if own else "not_tried"
+        status = "certified" if is_certified else "conforming" if passed else "dropped" if trials else "not_tried"
         found.append(
             {
                 "choice": choice_text(choice) or "as given",
                 "status": status,
-                "trials": len(own),
+                "trials": len(trials),
                 "conforming": len(passed),
                 "cycle_s": number(round(min(passed), FINE)) if passed else None,
                 "reason": reasons[0] if reasons and not is_certified else "",
@@ -321,20 +317,15 @@ def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]
     return found
 
 
-def _prepared_of(ready: Prepared, trial: Mapping[str, Any]) -> Prepared:
+def _prepared_of(ready: Prepared, trial: Trial) -> Prepared:
     """The cell with the discrete choices of a trial."""
-    choice = trial["values"].get("choice")
+    choice = choice_of(trial)
     return prepared(ready.request, choice) if choice else ready
-
-
-def _of_number(finished: Finished, number: int) -> Iterator[Mapping[str, Any]]:
-    """The trial with a number."""
-    return (trial for trial in finished.trials if trial["trial"] == number)
 
 
 def _no_result(finished: Finished) -> str:
     """Why there is no best layout."""
-    is_started = any(trial["figures"] for trial in finished.trials)
+    is_started = any(trial.figures for trial in finished.trials)
     return "none_certified" if is_started else "no_start"
 
 

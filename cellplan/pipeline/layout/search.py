@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from cellplan.model.cell import Cell
 from cellplan.model.presented import Presented
@@ -14,7 +14,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
 from cellplan.pipeline.layout.given_layout import Given, given_layout
 from cellplan.pipeline.layout.prepared import Prepared, prepared
-from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, proposals_of
+from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, is_candidate, proposals_of
 from cellplan.pipeline.layout.record import LayoutRecord, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.result import head_of, layout_files, verdict_line
@@ -26,7 +26,7 @@ from cellplan.pipeline.write_run import versions
 from cellplan.search.programs.objective import Objective
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
-from cellplan.study.trial import Trial, TrialStatus
+from cellplan.study.trial import Trial
 from cellplan.study.workers import Limits, Workers
 
 BUDGET: Final = 60.0  # [s] of a search that does not say where to end
@@ -97,25 +97,19 @@ class _Search:
     def _best(self, finished: Finished) -> Certified | None:
         """The first candidate that passes, best first."""
         for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
-            number = trial["trial"]
-            if number not in self.tried:
-                self.progress(f"certifying trial {number}", 1.0)
-                self.finish.use(trial["values"].get("choice") or {})
-                self.tried[number] = self.finish.certified(number, trial["figures"])
-            if self.tried[number].passed:
-                return self.tried[number]
+            if trial.number not in self.tried:
+                self.progress(f"certifying trial {trial.number}", 1.0)
+                self.tried[trial.number] = self.finish.certified(trial)
+            if self.tried[trial.number].passed:
+                return self.tried[trial.number]
         return None
 
-    def candidates(self, finished: Finished) -> list[dict[str, Any]]:
+    def candidates(self, finished: Finished) -> list[Trial]:
         """Trials that conform by the search, best first."""
         best = BESTS[self.request.objective]
         sign = -1.0 if best.is_largest else 1.0
-        listed = [
-            trial
-            for trial in finished.trials
-            if trial["status"] == TrialStatus.PASSED and not trial["values"].get("clearance_m")
-        ]
-        return sorted(listed, key=lambda trial: (sign * _value(trial, best.figure, sign), trial["trial"]))
+        listed = [trial for trial in finished.trials if is_candidate(trial)]
+        return sorted(listed, key=lambda trial: (sign * _value(trial, best.figure, sign), trial.number))
 
     def _goes_on(self, finished: Finished) -> bool:
         """Whether there is anything more to try."""
@@ -237,10 +231,10 @@ def _written(search: _Search, finished: Finished, best: Certified | None) -> Lay
 
 def _is_enough(rejected: frozenset[int], trial: Trial) -> bool:
     """Whether a trial ends the search for any conforming layout."""
-    return trial.outcome.status is TrialStatus.PASSED and trial.variant.number not in rejected
+    return trial.passed and trial.number not in rejected
 
 
-def _value(trial: dict[str, Any], figure: str, sign: float) -> float:
+def _value(trial: Trial, figure: str, sign: float) -> float:
     """The figure of a trial that is compared; without one it comes last."""
-    value = trial["figures"].get(figure)
+    value = trial.figures.get(figure)
     return float(value) if isinstance(value, int | float) else sign * float("inf")
