@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from cellplan.pipeline.present.frames import tables, to_frame
     from cellplan.pipeline.present.notebook import to_html
     from cellplan.pipeline.recover.recover import Recovery, recover
-    from cellplan.pipeline.recover.write import write_recovery
+    from cellplan.pipeline.recover.result import write_recovery
     from cellplan.pipeline.rehearsal.rehearse import rehearse
     from cellplan.pipeline.rehearsal.result import write_rehearsal
     from cellplan.pipeline.repair.repair import Repair, repair
@@ -138,7 +138,7 @@ _HOME: Final = {
     "write_fastest": "pipeline.fastest.result",
     "write_floor_plan": "pipeline.floor_plan_file",
     "write_repair": "pipeline.repair.result",
-    "write_recovery": "pipeline.recover.write",
+    "write_recovery": "pipeline.recover.result",
     "write_rehearsal": "pipeline.rehearsal.result",
     "write_run": "pipeline.write_run",
     "write_view": "pipeline.view.write",

@@ -10,8 +10,7 @@ from builders.random_cells import make_task, random_cell
 from cellplan.errors import InputError
 from cellplan.model.cell import Mode
 from cellplan.pipeline.explain import explain
-from cellplan.report.record.structure import structure_record
-from cellplan.report.text.structure import structure_lines
+from cellplan.pipeline.explain_result import structure_lines, structure_record
 
 
 def with_starts(cell, q):

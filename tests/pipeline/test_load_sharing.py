@@ -10,14 +10,13 @@ from cellplan import load_cell, solve, verify, write_run
 from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.pipeline.explain import explain
+from cellplan.pipeline.explain_result import structure_lines, structure_record
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.solve import render_program
 from cellplan.report.page.render import report_page
 from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
-from cellplan.report.record.structure import structure_record
 from cellplan.report.text.run import summary_lines
-from cellplan.report.text.structure import structure_lines
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 

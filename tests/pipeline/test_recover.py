@@ -19,8 +19,8 @@ from cellplan.pipeline.gate.open_gate import open_gate
 from cellplan.pipeline.recover.judge import judged
 from cellplan.pipeline.recover.planner import RecoveryPlanner
 from cellplan.pipeline.recover.recover import Recovery, recover
+from cellplan.pipeline.recover.result import write_recovery
 from cellplan.pipeline.recover.state import RunPlaces, stopped_state
-from cellplan.pipeline.recover.write import write_recovery
 
 ROOT = Path(__file__).resolve().parents[2]
 PEN = """\

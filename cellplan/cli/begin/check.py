@@ -50,8 +50,8 @@ def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: 
     from cellplan.cli.next_steps import after_check
     from cellplan.io.cell.load import load_cell
     from cellplan.pipeline.check import check as check_cell
+    from cellplan.pipeline.check import check_lines
     from cellplan.pipeline.overrides import with_overrides
-    from cellplan.report.text.check import check_lines
 
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)

@@ -27,9 +27,8 @@ def explain(options: ExplainOptions) -> Result:
     """
     from cellplan.io.cell.load import load_cell
     from cellplan.pipeline.explain import explain as explain_cell
+    from cellplan.pipeline.explain_result import structure_lines, structure_record
     from cellplan.pipeline.overrides import with_overrides
-    from cellplan.report.record.structure import structure_record
-    from cellplan.report.text.structure import structure_lines
 
     cell = with_overrides(load_cell(options.cell, allow_dirs=options.allow_dirs), options.settings)
     record = structure_record(explain_cell(cell))

@@ -62,7 +62,7 @@ def robots(options: RobotsOptions) -> None:
                 say("")
             show(_lines(record))
     else:
-        from cellplan.report.text.robot_description import description_lines
+        from cellplan.pipeline.robot_description import description_lines
 
         show(description_lines(records[0]))
 
@@ -91,7 +91,7 @@ def _described(model: str, options: RobotsOptions, xacro_args: dict[str, str]) -
     """What one robot's file says."""
     from cellplan.io.cell.robot_file import describe_robot
     from cellplan.kinematics.reach import arm_reach
-    from cellplan.report.record.robot_description import description_record
+    from cellplan.pipeline.robot_description import description_record
 
     described = describe_robot(model, flange=options.flange, package_dirs=options.package_dirs, xacro_args=xacro_args)
     return description_record(described, None if described.model is None else arm_reach(described.model))
@@ -100,9 +100,9 @@ def _described(model: str, options: RobotsOptions, xacro_args: dict[str, str]) -
 def _record(name: str, model: "RobotModel") -> dict[str, Any]:
     """One robot in printed units."""
     from cellplan.kinematics.reach import arm_reach
+    from cellplan.pipeline.robot_description import published_reach
     from cellplan.report.record.controller import zero_record
     from cellplan.report.record.joint_limits import joint_record
-    from cellplan.report.record.robot_description import published_reach
 
     return {
         "name": name,

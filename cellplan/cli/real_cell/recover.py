@@ -47,9 +47,13 @@ def recover(options: RecoverOptions) -> Result:
     """
     from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.pipeline.recover.recover import recover as recovered
+    from cellplan.pipeline.recover.result import (
+        default_folder,
+        recovery_lines,
+        refuse_unless_recoverable,
+        write_recovery,
+    )
     from cellplan.pipeline.recover.state import refuse_state
-    from cellplan.pipeline.recover.write import default_folder, refuse_unless_recoverable, write_recovery
-    from cellplan.report.text.recovery import recovery_lines
 
     at, frozen, keep = options.at, frozen_times(options.frozen), options.keep
     require_choice(options.cell, without_cell=options.without_cell)

@@ -21,10 +21,10 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows, touching_pairs
+from cellplan.pipeline.view.result import FailureRecord, SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.transfer.best_try import STEP as TRY_STEP
 from cellplan.planning.transfer.best_try import BlockedTry
-from cellplan.report.record.view import FailureRecord, SceneViewRecord
 from cellplan.scene.scene import Scene
 
 

@@ -13,10 +13,7 @@ from cellplan.model.mounting import Hanger, Mount, Pedestal, Wedge
 from cellplan.model.task import Frame, Task
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.planning.path.build import build_toolpath
-from cellplan.report.plots.palette import robot_colours
-from cellplan.report.record.common import number
-from cellplan.report.record.view import (
+from cellplan.pipeline.view.result import (
     AxisRecord,
     BaseRecord,
     BodyViewRecord,
@@ -29,6 +26,9 @@ from cellplan.report.record.view import (
     point_numbers,
     pose_numbers,
 )
+from cellplan.planning.path.build import build_toolpath
+from cellplan.report.plots.palette import robot_colours
+from cellplan.report.record.common import number
 from cellplan.scene.bodies import Kind, SceneBody, part_body
 from cellplan.scene.scene import Scene
 

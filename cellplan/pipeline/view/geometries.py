@@ -12,7 +12,7 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Sh
 from cellplan.io.cell.visuals import robot_visuals
 from cellplan.io.robots.urdf.visuals import Visual
 from cellplan.model.cell import Cell
-from cellplan.report.record.view import GeometryRecord, Numbers, packed, point_numbers
+from cellplan.pipeline.view.result import GeometryRecord, Numbers, packed, point_numbers
 
 MESH_TRIANGLES: Final = 160_000  # [-] of all meshes of a page: 2 MB, and smooth where a browser draws without hardware
 FEWEST: Final = 400  # [-] triangles that every mesh may keep

@@ -10,7 +10,7 @@ from cellplan.collision.bodies import BodyPoses
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.transforms import inverse
 from cellplan.model.units import MM
-from cellplan.report.record.view import NearestRecord, point_numbers
+from cellplan.pipeline.view.result import NearestRecord, point_numbers
 from cellplan.scene.bodies import SceneBody, is_ground
 from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair

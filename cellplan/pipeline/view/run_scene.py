@@ -23,11 +23,7 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
-from cellplan.report.record.common import Record
-from cellplan.report.record.common import number as plain
-from cellplan.report.record.numbers import floored, seconds
-from cellplan.report.record.phases import instant_text
-from cellplan.report.record.view import (
+from cellplan.pipeline.view.result import (
     ClearanceCurveRecord,
     ContactViewRecord,
     FailureRecord,
@@ -36,6 +32,10 @@ from cellplan.report.record.view import (
     SceneViewRecord,
     packed,
 )
+from cellplan.report.record.common import Record
+from cellplan.report.record.common import number as plain
+from cellplan.report.record.numbers import floored, seconds
+from cellplan.report.record.phases import instant_text
 from cellplan.scene.scene import Scene
 
 MOST_NUMBERS: Final = 800_000  # [-] joint positions of a page: 4.3 MB in base64

@@ -21,12 +21,12 @@ from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.view.cell_scene import standing_scene
 from cellplan.pipeline.view.geometries import Geometries, shape_key
 from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
+from cellplan.pipeline.view.result import SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.report.record.common import Record
-from cellplan.report.record.view import SceneViewRecord
 from cellplan.scene.bodies import is_ground, scene_bodies
 from cellplan.scene.scene import Scene
 from cellplan.study.folder import RESULT

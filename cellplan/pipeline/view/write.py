@@ -19,12 +19,12 @@ from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.view.cell_scene import blocked_scene, unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
+from cellplan.pipeline.view.result import SCHEMA, SceneViewRecord, ViewRecord, view_page
 from cellplan.pipeline.view.run_scene import run_scene
 from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
 from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.report.page.links import VIEW_PAGE
-from cellplan.report.page.view import is_view_page, view_page
-from cellplan.report.record.view import SCHEMA, SceneViewRecord, ViewRecord
+from cellplan.report.page.view import is_view_page
 from cellplan.study.folder import JOURNAL, RESULT
 
 PAGE: Final = "3-D page"  # in messages

@@ -18,10 +18,9 @@ from cellplan.io.run.stored import StoredRun, read_stored_run
 from cellplan.pipeline.gate.open_gate import open_gate
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.view import geometries
+from cellplan.pipeline.view.result import ViewRecord, view_page
 from cellplan.pipeline.view.run_scene import MOST_NUMBERS, motion_record, run_scene
 from cellplan.pipeline.view.write import ViewRequest, view, write_view
-from cellplan.report.page.view import view_page
-from cellplan.report.record.view import ViewRecord
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")

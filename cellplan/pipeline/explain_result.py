@@ -1,15 +1,110 @@
-"""The structure of a cell as text, in lines of at most a hundred columns."""
+"""The structure of a cell as record and as text, in lines of at most a hundred columns."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final
+from typing import Any, Final
 
-from cellplan.report.record.common import Record
-from cellplan.report.record.joint_limits import limits_text
+from cellplan.model.cell import Cell, Grasp, Robot
+from cellplan.model.task import Task
+from cellplan.pipeline.explain import MatrixShape, Structure
+from cellplan.report.record.common import Record, number
+from cellplan.report.record.joint_limits import joint_record, limits_text
 
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+TOOL_AXIS = ("across_tool_1", "across_tool_2")  # what free spin leaves of the three turns
 WIDTH: Final = 100  # columns of a terminal
 GAP: Final = 2  # spaces between two columns of a table
 BLOCKS: Final = {-1: "- J", 1: "+ J", 0: "."}
+
+
+# Record
+
+
+def structure_record(structure: Structure) -> dict[str, Any]:
+    """The structure in printed units."""
+    cell, graph = structure.cell, structure.graph
+    return {
+        "cell": cell.name,
+        "mode": str(cell.motion.mode),
+        "part": {"held_by": list(cell.positioners), "closures": [_closure_record(grasp) for grasp in cell.closures]},
+        "robots": [_robot_record(cell, robot) for robot in cell.robots],
+        "tasks": [_task_record(task) for task in cell.tasks],
+        "graph": {
+            "chains": "PPPS" if structure.plane is None else "PPR",
+            "plane": None if structure.plane is None else str(structure.plane),
+            "vertices": len(graph.links),
+            "edges": len(graph.joints),
+            "independent_circuits": len(structure.circuits),
+            "links": list(graph.links),
+            "joints": [
+                {"name": joint.name, "owner": joint.owner, "type": str(joint.kind), "virtual": joint.is_virtual}
+                | {"from": joint.tail, "to": joint.head, "driven_by": joint.drive, "ratio": joint.ratio}
+                for joint in graph.joints
+            ],
+        },
+        "circuits": [
+            {
+                "chord": graph.joints[circuit.chord].name,
+                "passed": [{"joint": graph.joints[index].name, "sign": sign} for index, sign in circuit.passed],
+            }
+            for circuit in structure.circuits
+        ],
+        "matrices": [_matrix_record(cell, matrix) for matrix in structure.matrices],
+    }
+
+
+def _robot_record(cell: Cell, robot: Robot) -> dict[str, Any]:
+    model = robot.model
+    return {
+        "name": robot.name,
+        "model": model.name,
+        "holds_part": robot.name in cell.positioners,
+        "works_on": [task.name for task in cell.tasks if task.robot == robot.name],
+        "joints": [joint_record(joint) for joint in model.joints],
+        "followers": [
+            {"name": each.name, "type": str(each.kind), "leader": model.joints[each.leader].name, "ratio": each.ratio}
+            for each in model.followers
+        ],
+    }
+
+
+def _task_record(task: Task) -> dict[str, Any]:
+    desired = [COMPONENTS[axis] for axis in task.axes if axis < 3 or not task.is_spin_free]
+    return {
+        "name": task.name,
+        "robot": task.robot,
+        "relative_to": str(task.relative_to),
+        "constrained": [*desired, *(TOOL_AXIS if task.is_spin_free else ())],
+    }
+
+
+def _closure_record(grasp: Grasp) -> dict[str, Any]:
+    """What the grasp of a further holder keeps."""
+    return {"name": grasp.name, "robot": grasp.robot, "kept": [COMPONENTS[axis] for axis in grasp.axes]}
+
+
+def _matrix_record(cell: Cell, matrix: MatrixShape) -> dict[str, Any]:
+    """Blocks, rank and redundancy of one run."""
+    values = matrix.singular_values
+    robots = [robot.name for robot in cell.robots]
+    return {
+        "run": matrix.phase.label,
+        "rows": sum(matrix.rows),
+        "columns": sum(matrix.columns),
+        "row_blocks": dict(zip(matrix.blocks, matrix.rows, strict=True)),
+        "column_blocks": dict(zip(robots, matrix.columns, strict=True)),
+        "signs": {
+            task: {robot: int(sign) for robot, sign in zip(robots, row, strict=True)}
+            for task, row in zip(matrix.blocks, matrix.signs.tolist(), strict=True)
+        },
+        "starts_to_find": list(matrix.missing),
+        "rank": matrix.rank,
+        "smallest_singular_value": None if values is None else number(values.min(initial=float("inf"))),
+        "redundancy": matrix.redundancy,
+    }
+
+
+# Text
 
 
 def structure_lines(record: Record) -> list[str]:
@@ -98,13 +193,13 @@ def _circuit_lines(record: Record) -> Iterator[str]:
     width = _width(joint["owner"] for joint in joints.values())
     yield ""
     yield "circuits: + joint traversed from its base side, - joint traversed in the opposite direction"
-    for number, circuit in enumerate(record["circuits"], start=1):
+    for count, circuit in enumerate(record["circuits"], start=1):
         by_owner: dict[str, list[str]] = {}
         for step in _from_first_virtual(circuit["passed"], joints):
             joint, sign = joints[step["joint"]], "+" if step["sign"] > 0 else "-"
             by_owner.setdefault(joint["owner"], []).append(f"{sign}{_short(joint)}")
         for place, (name, steps) in enumerate(by_owner.items()):
-            yield from _wrapped(f"  {number if place == 0 else '':<2} {name:<{width}}  ", " ".join(steps))
+            yield from _wrapped(f"  {count if place == 0 else '':<2} {name:<{width}}  ", " ".join(steps))
 
 
 def _from_first_virtual(passed: list[Record], joints: dict[str, Record]) -> list[Record]:

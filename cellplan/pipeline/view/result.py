@@ -1,20 +1,42 @@
-"""The record behind a 3-D page: bodies, joints, paths, motion and what the checks found, as plain values.
+"""A 3-D page: its record of bodies, joints, paths, motion and what the checks found, and the one file that shows it.
 
-Lengths are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of a matrix, row
-by row. Arrays are little-endian and in base64.
+Lengths in the record are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of
+a matrix, row by row. Arrays are little-endian and in base64.
 """
 
+import json
 from base64 import b64encode
+from collections.abc import Iterator
 from typing import Annotated, Any, Final, TypedDict
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
+from cellplan.model.units import MM
+from cellplan.report.page.render import template
+from cellplan.report.page.view import MARK
 
 SCHEMA: Final = "cellplan.view/1"
 POSE_DECIMALS: Final = 9  # [m]: far below what a picture shows
 POINT_DECIMALS: Final = 6  # [m] of paths and nearest points
 
+SCRIPTS: Final = (
+    "algebra",
+    "kinematics",
+    "shapes",
+    "camera",
+    "webgl",
+    "painter",
+    "sight",
+    "stage",
+    "traces",
+    "dom",
+    "player",
+    "controls",
+    "panels",
+    "bases",
+    "main",
+)  # each after those that it needs
 Numbers = list[float]
 
 
@@ -222,3 +244,59 @@ def point_numbers(points: Array) -> Numbers:
 def packed(values: np.ndarray[Any, Any], kind: str) -> str:
     """An array in base64, each number as ``kind`` says (``<f4``, ``<u2`` …)."""
     return b64encode(np.ascontiguousarray(values, dtype=kind).tobytes()).decode("ascii")
+
+
+# Page
+
+
+def view_page(record: ViewRecord) -> str:
+    """The page as text; it loads nothing and works without a network."""
+    return template("view/view.html").render(
+        r=record,
+        mark=MARK,
+        scripts=[f"view/{name}.js" for name in SCRIPTS],
+        data=script_json(record),
+        about=list(_about(record)),
+    )
+
+
+def _about(record: ViewRecord) -> Iterator[str]:
+    """How exact the page is."""
+    if record["scenes"][0]["visuals"]:
+        yield (
+            "Robots are drawn by the visual meshes of their files where these have any; distances and collisions are "
+            "those of the bodies of the proof, which are drawn where they are marked, or with the visual meshes off."
+        )
+    else:
+        yield "Bodies are those of the proof."
+    deviation = max((each.get("deviation", 0.0) for each in record["geometries"]), default=0.0)
+    if deviation > 0.0:
+        yield f"Meshes are drawn nowhere farther than {MM * deviation:.2g} mm from their files."
+    scene = record["scenes"][0]
+    motion, nearest = scene["motion"], scene["nearest"]
+    if motion["count"] < motion["total"]:
+        yield f"Of {motion['total']} rows {motion['count']} are in the page."
+    if motion["count"] > 1:
+        step = f"{MM * nearest['step']:.3g} ms"
+        yield (
+            f"Joints move linearly between rows. The closest pair is computed every {step} or more often; in between "
+            "its line joins the same two points."
+        )
+    if scene["certified"]["times"]:
+        yield (
+            "The curve over the time line is the distance that the report certifies: each value is kept all through "
+            "its block of the motion, between the rows as well."
+        )
+    elif motion["count"] > 1:
+        yield "Nothing is certified here; the curve over the time line is that of the computed distances."
+    yield "The closest pair is one of those that are to keep a clearance and move against each other."
+    if any(each for one in record["scenes"] for each in one["nearest"]["lower_bound"]):
+        yield "A distance after ≥ is that of convex hulls, never above the true one."
+
+
+def script_json(record: ViewRecord) -> str:
+    """A record as JSON that no browser takes for markup, wherever it stands in a page."""
+    text = json.dumps(record, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return text
