@@ -1,4 +1,4 @@
-"""The recipes of ``docs/developing.md``: their places exist and suffice, and three of them are carried out."""
+"""The recipes of ``docs/developing.md``: their places exist and suffice, and five of them are carried out."""
 
 import json
 import os
@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ RECIPES = dict(re.findall(r"^### A new ([^\n]+)\n(.*?)(?=^##)", PAGE, re.MULTILI
 TRACES = {
     "resolution method": r"\bjacobian_transpose\b",
     "check": r"\bcheck_locked\b",
+    "figure": r"\benergy_proxy_s\b",
+    "kind of result": r"\bsweep_result\b",
     "program format": r"\brender_csv\b|\bimport CSV\b",
     "command": r"\bcellplan\.cli\.verify\b",
     "bundled robot": r"\bplanar_3r\b",
@@ -81,6 +84,74 @@ def read_semicolons(frame, files):
 
 SEMICOLONS = replace(CSV, name="semicolons", title="with semicolons", render=render_semicolons, read=read_semicolons)
 '''
+FIGURE = {
+    "_LISTED: Final = (\n": 'Quantity("travel_s", max, max, 1.0, "", None, "longest travel at top speed"),',
+    "MappingProxyType({\n": '"travel_s": Shown("travel<br>s", small, "travel s", 1.0, "t"),',
+    "KEY: Final = (\n": '"travel_s",',
+    "velocity_ratio(use)\n": '        yield "travel_s", use.joint, use.travel / use.velocity_limit\n',
+    "if ratio is None else ratio\n": '            yield "travel_s", joint, use["travel"] / use["velocity_limit"]\n',
+}  # what is written into the table of figures, by what it stands behind
+KIND = '''"""How far each joint of a cell travels: the work, and its record, text, page and tables."""
+
+from cellplan.model.report import CAUTION
+from cellplan.pipeline.solve import solve
+from cellplan.pipeline.write_run import versions
+from cellplan.report.page.kind import Kind
+from cellplan.report.page.render import template
+from cellplan.report.record.common import as_json, number
+from cellplan.report.record.rows import listed_table
+
+
+def travels(cell):
+    """The record of the travel of all joints."""
+    uses = [use for run in solve(cell).runs for use in run.report.joints]
+    joints = [{"joint": f"{use.robot}/{use.joint}", "travel": number(use.travel)} for use in uses]
+    return {"schema": "cellplan.travels/1", "cell": cell.name, "status": "passed", "joints": joints} | {
+        "inputs": dict(cell.inputs), "versions": versions()
+    }
+
+
+def write_travels(record, folder):
+    """Write record and page."""
+    folder.mkdir()
+    (folder / "travels.json").write_text(as_json(record))
+    (folder / "travels.html").write_text(template("travels.html").render(r=record, caution=CAUTION))
+
+
+TRAVELS = Kind(
+    name="travels",
+    title="Travels",
+    file="travels.json",
+    tables=lambda record: {"joints": listed_table(record, "joints")},
+    shown={"joints": ("joint", "travel")},
+)
+'''
+KIND_PAGE = """{% extends "frame.html" %}
+{% block content %}
+{% for each in r.joints %}<p>{{ each.joint }}: {{ each.travel }}</p>{% endfor %}
+{% endblock %}
+"""
+KIND_COMMAND = '''"""``cellplan travels``: how far each joint travels."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def travels(cell: Path, output: Annotated[Path, typer.Option("-o")]) -> None:
+    """How far each joint travels."""
+    from cellplan.io.cell.load import load_cell
+    from cellplan.pipeline.travels import travels as made
+    from cellplan.pipeline.travels import write_travels
+
+    write_travels(made(load_cell(cell)), output)
+'''
+SHOW = """import pathlib, cellplan
+place = pathlib.Path("travels")
+assert cellplan.tables(place) == ("joints",)
+assert ">Travels<" in cellplan.to_html(place)
+"""
 
 
 def rows(recipe: str) -> dict[str, list[str]]:
@@ -149,12 +220,7 @@ def insert(path: Path, after: str, text: str) -> None:
     path.write_text(content.replace(after, after + text), encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder with a copy of the package to which the recipes added a method, a check and a format, and with a run."""
-    folder = tmp_path_factory.mktemp("extended")
-    copy = folder / "cellplan"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+def add_method(copy: Path) -> None:
     (copy / "planning" / "methods" / "least_norm.py").write_text(METHOD, encoding="utf-8")
     insert(copy / "model" / "solver.py", "MethodName = Literal[", '"least_norm",')
     insert(
@@ -162,22 +228,71 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "METHODS: Final[Mapping[MethodName, MethodTraits]] = MappingProxyType(\n    {",
         TRAITS,
     )
+
+
+def add_check(copy: Path) -> None:
     (copy / "checks" / "joints" / "travel.py").write_text(CHECK, encoding="utf-8")
-    insert(
-        copy / "checks" / "verify.py",
-        "import numpy as np\n",
-        "from cellplan.checks.joints.travel import check_travel\n",
-    )
-    insert(copy / "checks" / "verify.py", "        checks=tuple(checks", ") + tuple(check_travel(q, limit=10.0)")
+    verify = copy / "checks" / "verify.py"
+    insert(verify, "import numpy as np\n", "from cellplan.checks.joints.travel import check_travel\n")
+    insert(verify, "        checks=tuple(checks", ") + tuple(check_travel(q, limit=10.0)")
     insert(
         copy / "model" / "check_kinds.py",
         "# the gravest first\n",
         '    CheckKind("travel", "travel small", "Too far"),\n',
     )
+
+
+def add_format(copy: Path) -> None:
     (copy / "export" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
     dialects = copy / "pipeline" / "export" / "dialects.py"
     insert(dialects, "from typing import Final\n", "\nfrom cellplan.export.semicolons import SEMICOLONS\n")
     insert(dialects, "dialect.name: dialect for dialect in (", "SEMICOLONS, ")
+
+
+def add_figure(copy: Path) -> None:
+    for after, text in FIGURE.items():
+        insert(copy / "report" / "record" / "figures.py", after, text)
+    insert(copy / "pipeline" / "sweep_result.py", "COLUMNS: Final = (", '"travel_s", ')
+
+
+def add_kind(copy: Path) -> None:
+    (copy / "pipeline" / "travels.py").write_text(KIND, encoding="utf-8")
+    (copy / "report" / "page" / "templates" / "travels.html").write_text(KIND_PAGE, encoding="utf-8")
+    (copy / "cli" / "travels.py").write_text(KIND_COMMAND, encoding="utf-8")
+    insert(copy / "cli" / "main.py", "import sweep\n", "from cellplan.cli.travels import travels\n")
+    insert(copy / "cli" / "main.py", '"sweep": sweep, ', '"travels": travels, ')
+    kinds = copy / "pipeline" / "present" / "kinds.py"
+    insert(kinds, "import STUDY\n", "from cellplan.pipeline.travels import TRAVELS\n")
+    insert(kinds, "OF_JOBS: Final = (", "TRAVELS, ")
+
+
+def copied(folder: Path) -> Path:
+    """A copy of the package."""
+    copy = folder / "cellplan"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    return copy
+
+
+@pytest.mark.parametrize(("add", "most"), [(add_check, 3), (add_figure, 2), (add_kind, 5)])
+def test_an_addition_touches_few_files(add: Callable[[Path], None], most: int, tmp_path: Path) -> None:
+    """Those of the package; a check and a figure have a row in the docs besides, a kind one in the import contracts."""
+    copy = copied(tmp_path)
+
+    add(copy)
+
+    files = {path.relative_to(copy): path.read_bytes() for path in copy.rglob("*") if path.is_file()}
+    was = {path.relative_to(PACKAGE): path for path in PACKAGE.rglob("*") if path.is_file()}
+    touched = [name for name, content in files.items() if name not in was or was[name].read_bytes() != content]
+    assert len(touched) == most, touched
+
+
+@pytest.fixture(scope="module")
+def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with a copy of the package to which the recipes added all that they carry out, and with a run."""
+    folder = tmp_path_factory.mktemp("extended")
+    copy = copied(folder)
+    for add in (add_method, add_check, add_format, add_figure, add_kind):
+        add(copy)
     cell = (ROOT / "examples" / "plate.yaml").read_text(encoding="utf-8")
     loose = re.sub(r"tolerance: \{.*\}", "tolerance: {position_mm: 1, orientation_deg: 1}", cell)
     (folder / "plate.yaml").write_text(loose, encoding="utf-8")
@@ -188,7 +303,12 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(folder: Path, *arguments: str) -> None:
     """Run a command of the copy of the package that lies in a folder."""
-    command = [sys.executable, "-m", "cellplan", *arguments]
+    python(folder, "-m", "cellplan", *arguments)
+
+
+def python(folder: Path, *arguments: str) -> None:
+    """Run Python with the copy of the package that lies in a folder."""
+    command = [sys.executable, *arguments]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
     environment |= {"PYTHONPATH": str(folder)}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
@@ -211,3 +331,20 @@ def test_a_format_that_follows_its_recipe_is_written_after_all_checks(extended: 
     lines = (extended / "programs" / "left.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "time_s;A_deg;B_deg;C_deg"
     assert len(lines) == 1 + 151
+
+
+@pytest.mark.slow
+def test_a_figure_that_follows_its_recipe_is_in_the_table_of_a_sweep(extended: Path) -> None:
+    run(extended, "sweep", "plate.yaml", "--vary", "motion.duration_s=3,4", "--workers", "1", "-o", "study")
+
+    header, *lines = (extended / "study" / "study.csv").read_text(encoding="utf-8").splitlines()
+    values = [float(line.split(",")[header.split(",").index("travel_s")]) for line in lines]
+    assert values[0] == pytest.approx(values[1], rel=1e-2)  # the same path at two speeds
+    assert 0.0 < values[0] < 3.0
+
+
+def test_a_kind_of_result_that_follows_its_recipe_is_written_and_shown(extended: Path) -> None:
+    run(extended, "travels", "plate.yaml", "-o", "travels")
+
+    assert "<p>left/A: " in (extended / "travels" / "travels.html").read_text(encoding="utf-8")
+    python(extended, "-c", SHOW)
