@@ -166,11 +166,7 @@ def _reason(asked: MapJob, found: PlaceVerdict) -> str:
 
 
 def map_lines(record: Record, folder: Path) -> list[str]:
-    """All lines about a map.
-
-    Args:
-        record: As ``base_map`` returns it.
-    """
+    """All lines about a map."""
     counts = record["counts"]
     others = ", ".join(
         f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items() if verdict != "passes"
@@ -200,11 +196,7 @@ def map_lines(record: Record, folder: Path) -> list[str]:
 
 
 def map_figure(record: Record) -> Figure:
-    """The figure of a map.
-
-    Args:
-        record: As ``base_map`` returns it.
-    """
+    """The figure of a map."""
     half = 0.5 * _step(record)
     x, y = record["x_mm"], record["y_mm"]
     panel = Panel(
@@ -301,7 +293,6 @@ def map_page(record: Record, plot: bytes) -> str:
     """The page of a map.
 
     Args:
-        record: As ``base_map`` returns it.
         plot: Its picture as SVG.
     """
     colours = colours_of(record)
@@ -329,7 +320,6 @@ def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]
     """Content of the files of a map by name.
 
     Args:
-        record: As ``base_map`` returns it.
         formats: Formats of the picture beside SVG.
     """
     plots = pictures({"map": map_figure(record)}, formats)

@@ -93,11 +93,7 @@ def robot_names(record: Record) -> list[str]:
 
 
 def comparison_lines(record: Record, folder: Path) -> list[str]:
-    """All lines about a comparison.
-
-    Args:
-        record: As ``comparison_record`` returns it.
-    """
+    """All lines about a comparison."""
     variants = record["variants"]
     subject = "modes" if record["of"] == "modes" else "cells and runs"
     rows = [["", *(each["name"] for each in variants)], ["verdict", *map(_verdict, variants)]]
@@ -205,7 +201,6 @@ def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[
     """The figures of a comparison by name; none where nothing was solved.
 
     Args:
-        record: As ``comparison_record`` returns it.
         curves: Curves of each variant; None for one without a motion.
     """
     found = [
@@ -325,7 +320,6 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
     """The page of a comparison.
 
     Args:
-        record: As ``comparison_record`` returns it.
         plots: Its plots as SVG, by name.
     """
     solved = [each["name"] for each in record["variants"] if each["figures"]]
@@ -356,7 +350,6 @@ def comparison_files(
     """Content of the files of a comparison by name.
 
     Args:
-        record: As ``comparison_record`` returns it.
         curves: Curves of each variant; None for one without a motion.
         formats: Formats of the plots beside SVG.
     """

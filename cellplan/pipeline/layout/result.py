@@ -47,11 +47,7 @@ CYCLE: Final = "shortest cycle in s"
 
 
 def layout_lines(record: Record, folder: Path) -> list[str]:
-    """All lines about a layout search.
-
-    Args:
-        record: As ``layout_record`` returns it.
-    """
+    """All lines about a layout search."""
     lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
     lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]
     if record["best"] is not None:
@@ -88,12 +84,17 @@ def verdict_line(record: Record) -> str:
         return "NO START: no layout was found in which all tools reach the starts of their paths"
     if best is None:
         return "NO LAYOUT CERTIFIED"
-    figures = [f"cycle {seconds(best['cycle_s'])} s"]
-    if best["margin_deg"] is not None:
-        figures.append(f"smallest margin {plain(floored(best['margin_deg']))} deg")
-    if best["clearance_mm"] is not None:
-        figures.append(f"smallest clearance {floored(best['clearance_mm'])} mm")
-    return f"CERTIFIED: {', '.join(figures)}"
+    return f"CERTIFIED: {figures_text(best['cycle_s'], best['margin_deg'], best['clearance_mm'])}"
+
+
+def figures_text(cycle: float, margin: float | None, clearance: float | None) -> str:
+    """Cycle in [s], smallest margin in [deg] and smallest clearance in [mm], in words; None where there is none."""
+    figures = [f"cycle {seconds(cycle)} s"]
+    if margin is not None:
+        figures.append(f"smallest margin {plain(floored(margin))} deg")
+    if clearance is not None:
+        figures.append(f"smallest clearance {floored(clearance)} mm")
+    return ", ".join(figures)
 
 
 def changed_variables(record: Record) -> Entries:
@@ -179,11 +180,7 @@ def _trials(count: int) -> str:
 
 
 def floor_plan(record: Record) -> Figure | None:
-    """The given and the best layout from above, to scale; None where nothing is drawn.
-
-    Args:
-        record: As ``layout_record`` returns it.
-    """
+    """The given and the best layout from above, to scale; None where nothing is drawn."""
     drawn = record["drawing"]
     if not drawn:
         return None
@@ -341,11 +338,7 @@ def _colour(index: int) -> str:
 
 
 def layout_page(record: Record) -> str:
-    """The page of a layout search.
-
-    Args:
-        record: As ``layout_record`` returns it.
-    """
+    """The page of a layout search."""
     drawn = {"plan": floor_plan(record), "front": front_figure(record), "convergence": convergence_figure(record)}
     plots = {name: inline_svg(svg_text(figure)) for name, figure in drawn.items() if figure is not None}
     return template("layout.html").render(
@@ -362,11 +355,7 @@ def layout_page(record: Record) -> str:
 
 
 def layout_files(record: Record) -> dict[str, bytes]:
-    """Content of the files of a layout search by name.
-
-    Args:
-        record: As ``layout_record`` returns it.
-    """
+    """Content of the files of a layout search by name."""
     return {"study.json": as_json(record).encode(), "study.html": layout_page(record).encode()}
 
 

@@ -133,8 +133,9 @@ def recovery_lines(record: Mapping[str, Any]) -> list[str]:
         lines.append(f"  {number}. {phase['begin_s']:.3f} to {phase['end_s']:.3f} s  {phase['kind']}: {phase['what']}")
     nearest = record["clearance"]
     if nearest is not None:
+        shown = np.floor(10.0 * nearest["distance_mm"]) / 10.0  # never more than there is
         lines.append(
-            f"  smallest clearance {_down(nearest['distance_mm'])} mm ({' to '.join(nearest['pair'])} at "
+            f"  smallest clearance {shown:.1f} mm ({' to '.join(nearest['pair'])} at "
             f"{nearest['at_s']:.3f} s), required {nearest['demand_mm']:.1f} mm"
         )
     lines += [f"  not taken: {words}" for words in record["not_taken"][:LONGEST]]
@@ -154,11 +155,6 @@ def _state_lines(record: Mapping[str, Any]) -> Iterator[str]:
         held = f"{pair['depth_mm']:.2f} mm deep in" if pair["depth_mm"] > 0.0 else f"{pair['distance_mm']:.2f} mm from"
         kept = f"from {pair['kept_from_s']:.3f} s on {pair['demand_mm']:g} mm apart"
         yield f"  begins with {first} {held} {second}; {kept}"
-
-
-def _down(distance: float) -> str:
-    """A distance rounded down: never more than there is."""
-    return f"{np.floor(10.0 * distance) / 10.0:.1f}"
 
 
 # Files

@@ -10,7 +10,7 @@ from cellplan.io.run.folder import MANIFEST, RunFolder
 from cellplan.io.run.manifest import render_manifest
 from cellplan.model.report import CAUTION
 from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.result import solve_best_line
+from cellplan.pipeline.layout.result import figures_text, solve_best_line
 from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.repair.record import AdviceRecord
 from cellplan.pipeline.repair.repair import Repair
@@ -18,7 +18,7 @@ from cellplan.pipeline.write_run import versions
 from cellplan.report.page.kind import Kind
 from cellplan.report.page.render import template
 from cellplan.report.record.common import CheckRecord, Record, as_json
-from cellplan.report.record.numbers import floored, plain, seconds
+from cellplan.report.record.numbers import seconds
 from cellplan.report.record.rows import Tables, columns_of, flat, listed_table
 
 MOST_FAILED: Final = 4  # [-] failed checks that are shown
@@ -34,7 +34,6 @@ def advice_lines(record: Record, folder: Path, cell: Path) -> list[str]:
     """All lines about a repair.
 
     Args:
-        record: As ``advice_record`` returns it.
         cell: The cell file, as the user named it.
     """
     lines = [f"{record['cell']}: {verdict_line(record)}", *_given(record)]
@@ -72,14 +71,9 @@ def demands_text(record: Record) -> str:
     return f"{demanded}, margins {margin:g} deg" if margin else demanded
 
 
-def figures_text(remedy: Record) -> str:
+def remedy_figures(remedy: Record) -> str:
     """Figures of a verified remedy, in words."""
-    figures = [f"cycle {seconds(remedy['cycle_s'])} s"]
-    if remedy["smallest_margin_deg"] is not None:
-        figures.append(f"smallest margin {plain(floored(remedy['smallest_margin_deg']))} deg")
-    if remedy["smallest_clearance_mm"] is not None:
-        figures.append(f"smallest clearance {floored(remedy['smallest_clearance_mm'])} mm")
-    return ", ".join(figures)
+    return figures_text(remedy["cycle_s"], remedy["smallest_margin_deg"], remedy["smallest_clearance_mm"])
 
 
 def effects_text(remedy: Record) -> str:
@@ -125,7 +119,7 @@ def _remedy(number: int, remedy: Record, cell: Path) -> Iterator[str]:
     yield f"    {number}. {remedy['text']} (cost {remedy['cost']:.2f})"
     if remedy["effects"]:
         yield f"       {effects_text(remedy)}"
-    yield f"       {figures_text(remedy)}"
+    yield f"       {remedy_figures(remedy)}"
     yield f"       {command_line(remedy, cell)}"
 
 
@@ -133,11 +127,7 @@ def _remedy(number: int, remedy: Record, cell: Path) -> Iterator[str]:
 
 
 def advice_page(record: Record) -> str:
-    """The page of a repair.
-
-    Args:
-        record: As ``advice_record`` returns it.
-    """
+    """The page of a repair."""
     return template("advice.html").render(
         r=record,
         verdict=verdict_line(record),
@@ -211,7 +201,7 @@ def _head(record: AdviceRecord) -> str:
     remedy = record["remedies"][0]
     return (
         f"{record['file']} repaired by cellplan layout --repair ({demands_text(record)}): {remedy['text']}.\n"
-        f"Verified: {figures_text(remedy)}. Changed values say what they were."
+        f"Verified: {remedy_figures(remedy)}. Changed values say what they were."
     )
 
 
