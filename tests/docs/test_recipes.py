@@ -133,19 +133,36 @@ KIND_PAGE = """{% extends "frame.html" %}
 """
 KIND_COMMAND = '''"""``cellplan travels``: how far each joint travels."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.shared import AsJson, CellFile
+from cellplan.cli.terminal.output import Result, result_of_folder
+from cellplan.errors import ExitStatus
 
 
-def travels(cell: Path, output: Annotated[Path, typer.Option("-o")]) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TravelsOptions(Options):
+    """What is solved."""
+
+    SCHEMA = "cellplan.travels/1"
+
+    cell: CellFile
+    output: Annotated[Path, option("-o, --output DIR", "Folder.")]
+    as_json: AsJson = False
+
+
+def travels(options: TravelsOptions) -> Result:
     """How far each joint travels."""
     from cellplan.io.cell.load import load_cell
     from cellplan.pipeline.travels import travels as made
     from cellplan.pipeline.travels import write_travels
 
-    write_travels(made(load_cell(cell)), output)
+    record = made(load_cell(options.cell))
+    write_travels(record, options.output)
+    return result_of_folder(options.schema, ExitStatus.PASSED, [], options.output / "travels.html", travels=record)
 '''
 SHOW = """import pathlib, cellplan
 place = pathlib.Path("travels")
@@ -258,8 +275,8 @@ def add_figure(copy: Path) -> None:
 def add_kind(copy: Path) -> None:
     (copy / "pipeline" / "travels.py").write_text(KIND, encoding="utf-8")
     (copy / "report" / "page" / "templates" / "travels.html").write_text(KIND_PAGE, encoding="utf-8")
-    (copy / "cli" / "travels.py").write_text(KIND_COMMAND, encoding="utf-8")
-    insert(copy / "cli" / "main.py", "import sweep\n", "from cellplan.cli.travels import travels\n")
+    (copy / "cli" / "improve" / "travels.py").write_text(KIND_COMMAND, encoding="utf-8")
+    insert(copy / "cli" / "main.py", "import sweep\n", "from cellplan.cli.improve.travels import travels\n")
     insert(copy / "cli" / "main.py", '"sweep": sweep, ', '"travels": travels, ')
     kinds = copy / "pipeline" / "present" / "kinds.py"
     insert(kinds, "import STUDY\n", "from cellplan.pipeline.travels import TRAVELS\n")
