@@ -2,8 +2,8 @@
 
 Python and JavaScript of ``cellplan/`` are counted apart. Code lines are lines of Python with a token that is neither a
 comment, a docstring nor part of an import. Neighbours are the modules and packages that stand in one folder.
-With ``--words`` the words of the README and of ``docs/`` are counted instead, those of code blocks included. Pages that a
-script writes, or whose figures a test compares with measurements or with the program, are counted apart from the others.
+With ``--words`` the words of the README and of ``docs/`` are counted instead, with those of code blocks. Pages that a
+script writes, or whose figures a test compares with measurements or with the program, are counted apart.
 """
 
 import argparse
