@@ -156,7 +156,7 @@ def _value(cell: Searched, x: Array, start: Array) -> tuple[float, Array]:
     if point is None:
         return FARTHEST, start
     measures = Measures.of(cell.problem, point, cell.demands, Effort(within=0.003))
-    missed = measures.missed(cell.problem, cell.demands, Effort().room).violation
+    missed = measures.missed(cell.problem, cell.demands, Effort().reserve).violation
     return (measures.cycle if missed == 0.0 else MISSED + missed), point.start
 
 

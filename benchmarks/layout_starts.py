@@ -106,8 +106,8 @@ class Bench:
         """Whether one number of starts gives a certified layout."""
         starts = generator.at(index)
         self._counts["starts"] += 1
-        self._counts["found"] += len(starts.found)
-        return any(self._passes(start) for start in starts.found[:SOLVED])
+        self._counts["found"] += len(starts.starts)
+        return any(self._passes(start) for start in starts.starts[:SOLVED])
 
     def _passes(self, start: Start) -> bool:
         """Whether a start, improved where it has to be, passes the product's solve."""

@@ -109,7 +109,7 @@ def judged(recovery: Recovery, places: RunPlaces, rng: np.random.Generator, *, m
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
     kept_from = {pair.names: at for pair, at in found.apart}
     stopped = BruteForce(places.scene_while_stopped(recovery.state.lying))
-    room = max((pair.room for pair, _ in found.apart), default=0.0) + TOLERANCE
+    room = max((pair.slack for pair, _ in found.apart), default=0.0) + TOLERANCE
     largest = {pair.names: pair.begin for pair, _ in found.apart}
     back = [BruteForce(places.scene_of_phase(phase.place)) for phase in found.phases if phase.place is not None]
     for phase in found.phases:
@@ -172,7 +172,7 @@ def measured(cell_file: Path, folder: Path, *, stops: int, seed: int, most: floa
             reasons[f"{type(error).__name__}: {str(error)[:160]} (at {at:.4f} {frozen})"] += 1
             continue
         seconds.append(time.process_time() - begin)
-        if not found.found:
+        if not found.succeeded:
             reasons[f"{found.reason[:400]} (at {at:.4f} {frozen})"] += 1
             continue
         kinds = {phase.kind for phase in found.judgement.phases} if found.judgement else set()

@@ -16,7 +16,7 @@ MAX_ROWS: Final = 61  # [-] configurations of a motion at which two solids that 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FoundDepth:
+class PairDepth:
     """Depth of one pair."""
 
     pair: MountedPair
@@ -24,7 +24,7 @@ class FoundDepth:
     row: int  # the configuration of the motion at which it is greatest
 
 
-def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tuple[FoundDepth, ...]:
+def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tuple[PairDepth, ...]:
     """Depths of all pairs that are judged by it.
 
     Pairs that do not move against each other are measured once. For a further holder that grips in all components this
@@ -40,12 +40,12 @@ def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tu
     return tuple(_moving(scene, pair, q) if pair.moves else _at_rest(scene, pair, first) for pair in scene.mounted)
 
 
-def _at_rest(scene: Scene, pair: MountedPair, poses: BodyPoses) -> FoundDepth:
+def _at_rest(scene: Scene, pair: MountedPair, poses: BodyPoses) -> PairDepth:
     """Depth of a pair whose bodies do not move against each other."""
-    return FoundDepth(pair=pair, depth=float(_depths(scene, pair, poses)[0]), row=0)
+    return PairDepth(pair=pair, depth=float(_depths(scene, pair, poses)[0]), row=0)
 
 
-def _moving(scene: Scene, pair: MountedPair, q: Array) -> FoundDepth:
+def _moving(scene: Scene, pair: MountedPair, q: Array) -> PairDepth:
     """Greatest depth of a pair over a motion."""
     has_ground = is_ground(scene.bodies[pair.second])
     count = len(q) if has_ground else min(MAX_ROWS, len(q))
@@ -53,7 +53,7 @@ def _moving(scene: Scene, pair: MountedPair, q: Array) -> FoundDepth:
     ends = (pair.first, pair.first if has_ground else pair.second)
     depths = _depths(scene, pair, scene.pair_poses(ends, q[rows]))
     deepest = int(np.argmax(depths))
-    return FoundDepth(pair=pair, depth=float(depths[deepest]), row=int(rows[deepest]))
+    return PairDepth(pair=pair, depth=float(depths[deepest]), row=int(rows[deepest]))
 
 
 def _depths(scene: Scene, pair: MountedPair, poses: BodyPoses) -> Array:

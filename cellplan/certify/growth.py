@@ -50,7 +50,7 @@ class ComingApart:
     """A pair that begins nearer than is demanded.
 
     Attributes:
-        room: How far in [m] the distance may fall below the largest one before it: what the measurement leaves open.
+        slack: How far in [m] the distance may fall below the largest one before it: what the measurement leaves open.
     """
 
     names: tuple[str, str]  # its bodies
@@ -58,7 +58,7 @@ class ComingApart:
     end: float  # likewise at the end
     demand: float  # distance in [m] that is demanded of it
     row: int | None  # the first row from which on the demand is kept; None where it never is
-    room: float
+    slack: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +69,7 @@ class Growth:
         faults: What is not as it must be, in one line each: names of the bodies, and what is wrong.
     """
 
-    kept: Bound  # what is proved of the pairs that begin with the distance demanded of them
+    bound: Bound  # what is proved of the pairs that begin with the distance demanded of them
     apart: tuple[ComingApart, ...]  # the pairs that do not
     faults: tuple[tuple[tuple[str, str], str], ...]
 
@@ -78,12 +78,12 @@ class Growth:
         """What is found of the pairs that begin too near, beside what is proved of the others."""
         judged = [separation.judged() for separation in separations]
         faults = tuple((pair.names, fault) for pair, fault in judged if fault)
-        return cls(kept=bound, apart=tuple(pair for pair, _ in judged), faults=faults)
+        return cls(bound=bound, apart=tuple(pair for pair, _ in judged), faults=faults)
 
     @property
     def is_proved(self) -> bool:
         """Whether every pair keeps its demand, or only comes apart."""
-        return not self.faults and self.kept.is_kept
+        return not self.faults and self.bound.is_kept
 
     @property
     def is_clear(self) -> bool:
@@ -216,7 +216,7 @@ class _Separation:
             end=end,
             demand=self._demand,
             row=reached,
-            room=self._tolerance + 0.5 * self._travel,
+            slack=self._tolerance + 0.5 * self._travel,
         )
         return coming_apart, fault
 

@@ -72,7 +72,7 @@ class _Table:
     def __init__(self, robot: str, run: RunSamples) -> None:
         """Sort the pairs of the robot into those that no other robot changes and the others."""
         self._scene, self._robot = run.scene, robot
-        self._own = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
+        self._robot_bodies = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
         self._pairs, rows = self._scene.solid_pairs, self._scene.solid_rows.tolist()
         is_alone = np.array([not _moving_robots(self._scene, row, but=robot) for row in rows], dtype=bool)
         self._alone, self._others = np.flatnonzero(is_alone), np.flatnonzero(~is_alone)
@@ -105,7 +105,10 @@ class _Table:
     def too_near_others(self, robot_poses: BodyPoses, extra: float) -> tuple[str, str] | None:
         """The same of the other pairs, at all samples."""
         self._limits = self._demanded + extra * self._has_extra
-        self._poses.R[self._own], self._poses.p[self._own] = robot_poses.R[self._own], robot_poses.p[self._own]
+        self._poses.R[self._robot_bodies], self._poses.p[self._robot_bodies] = (
+            robot_poses.R[self._robot_bodies],
+            robot_poses.p[self._robot_bodies],
+        )
         for place, sample in enumerate(self._order):
             row = self._among(self._others, self._poses, sample=sample)
             if row is not None:

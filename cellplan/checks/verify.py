@@ -143,8 +143,8 @@ def with_clearance(
         progress: Called with the stage and the fraction done.
     """
     q = stacked(scene.cell, report.q)
-    found = completed(report, run_clearance(scene, schedule, q, progress=progress))
-    return with_clocks(found, scene, schedule, is_reported=is_reported, progress=progress)
+    completed_report = completed(report, run_clearance(scene, schedule, q, progress=progress))
+    return with_clocks(completed_report, scene, schedule, is_reported=is_reported, progress=progress)
 
 
 def with_clocks(
@@ -183,9 +183,9 @@ def run_clearance(
     return clearance, (*check_mounting(scene, q, schedule.times), *checks)
 
 
-def completed(report: Report, found: Clearance) -> Report:
+def completed(report: Report, certified: Clearance) -> Report:
     """The report of ``verify_motion`` with the clearance of the same run."""
-    clearance, checks = found
+    clearance, checks = certified
     return replace(report, checks=(*report.checks, *checks), clearance=clearance)
 
 
@@ -211,8 +211,8 @@ def _accuracy_checks(cell: Cell, schedule: Schedule, accuracy: Sequence[TaskAccu
     for scheduled, errors in zip(schedule.tasks, accuracy, strict=True):
         tolerance = scheduled.task.tolerance
         at_rows = check_accuracy(schedule, errors, scheduled.task)
-        own = with_between(at_rows, check_task_between(errors, tolerance))
-        checks += with_locked_joints(own, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+        merged = with_between(at_rows, check_task_between(errors, tolerance))
+        checks += with_locked_joints(merged, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     return checks
 
 
@@ -221,9 +221,9 @@ def _joints(cell: Cell, times: Array, q: Mapping[str, Array]) -> tuple[list[Join
     uses: list[JointUse] = []
     checks: list[Check] = []
     for robot in cell.robots:
-        own = joint_uses(robot, times, q[robot.name])
-        uses += own
-        checks += [*check_joints(own, times, q[robot.name]), *check_shown(robot, times, q[robot.name])]
+        robot_uses = joint_uses(robot, times, q[robot.name])
+        uses += robot_uses
+        checks += [*check_joints(robot_uses, times, q[robot.name]), *check_shown(robot, times, q[robot.name])]
     return uses, checks
 
 

@@ -55,8 +55,8 @@ def export_line(run: Path, cell: Path | None, allow_dirs: Sequence[Path]) -> str
 
 def view_line(run: Path, cell: Path, solved: Cell, allow_dirs: Sequence[Path]) -> str:
     """The line to type for the 3-D page of a run; with its cell file where that names files of its own."""
-    own = own_inputs(solved.inputs, PurePath(solved.origin.file).name)
-    named = ["--cell", str(cell), *_folders(allow_dirs)] if own else []
+    inputs = own_inputs(solved.inputs, PurePath(solved.origin.file).name)
+    named = ["--cell", str(cell), *_folders(allow_dirs)] if inputs else []
     return _line("view", str(run), *named)
 
 

@@ -20,7 +20,7 @@ def hull_of(mesh: Mesh) -> Mesh:
         InputError: The mesh is flat.
         OverrunError: The search crashed, or took too long or too much memory.
     """
-    cached = _kept(mesh)
+    cached = _recalled(mesh)
     if cached is not None:
         return cached
     guard = Guard(file=mesh.source, worker="the search for the hull")
@@ -44,7 +44,7 @@ def without_hull(meshes: Iterable[Mesh]) -> list[Mesh]:
     return [mesh for mesh in meshes if recall_mesh(_key(mesh), source=mesh.source) is None]
 
 
-def _kept(mesh: Mesh) -> Mesh | None:
+def _recalled(mesh: Mesh) -> Mesh | None:
     """The hull that was kept of a mesh, proved anew; None where there is none."""
     cached = recall_mesh(_key(mesh), source=mesh.source)
     return cached if cached is not None and is_hull(cached, mesh.vertices) else None

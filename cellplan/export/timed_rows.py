@@ -97,10 +97,10 @@ def line_error(file: str, line: int, expected: str, got: str) -> InputError:
         expected: What should stand there.
         got: What stands there, of which the first characters are shown.
     """
-    return found_error(file, line, expected, repr(got[:60]))
+    return mismatch_error(file, line, expected, repr(got[:60]))
 
 
-def found_error(file: str, line: int, expected: str, actual: str) -> InputError:
+def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputError:
     """The error that something else was found at a line of a file.
 
     Args:
@@ -114,7 +114,7 @@ def found_error(file: str, line: int, expected: str, actual: str) -> InputError:
 
 def truncated_error(file: str, line: int, expected: str) -> InputError:
     """The error that a file ends too early."""
-    return found_error(file, line, expected, "the end of the file; it is truncated")
+    return mismatch_error(file, line, expected, "the end of the file; it is truncated")
 
 
 def lines_of(text: str, file: str) -> list[str]:

@@ -68,7 +68,7 @@ def _draw_robot(robot: Robot, errors: RobotErrorsEntry, rng: np.random.Generator
 
 def _draw_pose(amounts: PoseErrorEntry, rng: np.random.Generator) -> Array:
     """A small pose."""
-    return pose([drawn(each, rng) for each in amounts.xyz_mm], [drawn(each, rng) for each in amounts.rpy_deg])
+    return pose([drawn(amount, rng) for amount in amounts.xyz_mm], [drawn(amount, rng) for amount in amounts.rpy_deg])
 
 
 def _perturbed_robot(robot: Robot, draw: RobotDraw) -> Robot:

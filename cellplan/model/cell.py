@@ -101,8 +101,8 @@ class Robot:
     def bodies_at_work(self) -> tuple[Body, ...]:
         """What may touch the part near the tool tip: the tool's bodies and the gripper's, with their poses in F."""
         X_FB = inverse(self.model.X_BF)
-        own = (body for body in self.model.bodies if body.name in self.gripper)
-        return (*self.tool.bodies, *(replace(body, X_BS=X_FB @ body.X_BS) for body in own))
+        gripper_bodies = (body for body in self.model.bodies if body.name in self.gripper)
+        return (*self.tool.bodies, *(replace(body, X_BS=X_FB @ body.X_BS) for body in gripper_bodies))
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -354,7 +354,7 @@ class Cell(Presented):
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        robots, tasks = (", ".join(each.name for each in named) for named in (self.robots, self.tasks))
+        robots, tasks = (", ".join(entry.name for entry in named) for named in (self.robots, self.tasks))
         return f"<Cell '{self.name}': robots {robots}; tasks {tasks}; {self.motion.mode}>"
 
 

@@ -40,11 +40,11 @@ class CellErrors:
     def amounts(self) -> tuple[Amount, ...]:
         """All stated amounts, in no promised order."""
         poses = [*self.grasps.values()]
-        found: list[Amount] = []
+        amounts: list[Amount] = []
         for errors in self.robots.values():
-            found += [*errors.joint_offsets.values(), *errors.link_lengths_mm.values()]
+            amounts += [*errors.joint_offsets.values(), *errors.link_lengths_mm.values()]
             poses += [errors.base, errors.tool]
-        return (*found, *(amount for placed in poses for amount in (*placed.xyz_mm, *placed.rpy_deg)))
+        return (*amounts, *(amount for placed in poses for amount in (*placed.xyz_mm, *placed.rpy_deg)))
 
     @property
     def is_random(self) -> bool:
@@ -89,7 +89,7 @@ def drawn(amount: Amount, rng: np.random.Generator) -> float:
 def link_vector(model: RobotModel, joint: int) -> Array:
     """From the axis point of the joint before (the base frame's origin before the first) to a joint's own, in [m]."""
     axes: list[Joint | FollowerJoint] = [*model.joints, *model.followers]
-    own = model.joints[joint]
-    before = np.zeros(3) if own.parent == BASE else axes[own.parent].point_B
-    vector: Array = own.point_B - before
+    axis = model.joints[joint]
+    before = np.zeros(3) if axis.parent == BASE else axes[axis.parent].point_B
+    vector: Array = axis.point_B - before
     return vector

@@ -77,13 +77,13 @@ class ClockedPath:
     @property
     def jumps(self) -> Array:
         """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
-        found = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
+        instants = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
         if self.task.approach is not None:
-            found.append(np.array([self.task.start - self.task.approach.duration]))
+            instants.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
             ramp = ramp_shares(self.task, self.corners) * np.diff(self.corners)
-            found += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
-        return distinct(np.concatenate(found))
+            instants += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
+        return distinct(np.concatenate(instants))
 
     def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
         """Reference poses and twists at times of a smooth stretch of time, its ends seen from inside.
@@ -177,8 +177,10 @@ class ClockedPath:
         pieces = len(self.behind) - 1
         s = path.arc.lengths(knots)
         piece = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, pieces - 1)
-        room = SAME_PLACE * self.behind[-1]
-        is_inside = (s > self.behind[piece] + room) & (s < self.behind[piece + 1] - room)  # the stops are corners
+        tolerance = SAME_PLACE * self.behind[-1]
+        is_inside = (s > self.behind[piece] + tolerance) & (
+            s < self.behind[piece + 1] - tolerance
+        )  # the stops are corners
         s, piece = s[is_inside], piece[is_inside]
         if path.runs_on:
             share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat

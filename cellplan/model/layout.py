@@ -151,18 +151,18 @@ class LayoutSettings:
         """The same without some numbers, which stay as they are, and what has one value with them."""
         return replace(
             self,
-            ranges=tuple(each for each in self.ranges if each.address not in addresses),
-            equal=tuple(each for each in self.equal if not any(address in addresses for address in each)),
+            ranges=tuple(variable for variable in self.ranges if variable.address not in addresses),
+            equal=tuple(group for group in self.equal if not any(address in addresses for address in group)),
         )
 
     def among(self, addresses: Container[str]) -> "LayoutSettings":
         """The same with only some of the numbers, and what ties these."""
-        ranges = tuple(each for each in self.ranges if each.address in addresses)
-        names = {each.name for each in ranges}
+        ranges = tuple(variable for variable in self.ranges if variable.address in addresses)
+        names = {variable.name for variable in ranges}
         return replace(
             self,
             ranges=ranges,
-            equal=tuple(each for each in self.equal if all(address in addresses for address in each)),
+            equal=tuple(group for group in self.equal if all(address in addresses for address in group)),
             mirrored=tuple(pair for pair in self.mirrored if names.issuperset(pair.robots)),
         )
 

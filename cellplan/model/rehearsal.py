@@ -200,9 +200,9 @@ class Rehearsal(Presented):
     def __repr__(self) -> str:
         """One line without arrays."""
         failed = [check.message for check in self.checks if not check.passed]
-        found = f"failed: {failed[0]}" if failed else f"passed: {len(self.checks)} checks"
+        outcome = f"failed: {failed[0]}" if failed else f"passed: {len(self.checks)} checks"
         trials = len(self.runs[0].trials)
-        return f"<Rehearsal of '{self.cell.name}' on {trials} real {'cell' if trials == 1 else 'cells'}, {found}>"
+        return f"<Rehearsal of '{self.cell.name}' on {trials} real {'cell' if trials == 1 else 'cells'}, {outcome}>"
 
     @property
     def is_released(self) -> bool:

@@ -22,8 +22,8 @@ def order_faults(
         operators: Name of the robot of every task of the cell, by task.
         marks: Names of all marks.
     """
-    own = [task for task, operator in operators.items() if operator == robot]
-    known = ", ".join([*own, *marks]) or "none"
+    robot_tasks = [task for task, operator in operators.items() if operator == robot]
+    known = ", ".join([*robot_tasks, *marks]) or "none"
     for index, name in enumerate(order):
         if name in order[:index]:
             yield index, f"expected each name once, got '{name}' twice"
@@ -34,6 +34,6 @@ def order_faults(
             )
         elif name not in operators and name not in marks:
             yield index, f"expected a task of '{robot}' or a mark ({known}), got '{name}'"
-    for name in own:
+    for name in robot_tasks:
         if name not in order:
             yield None, f"expected every task of '{robot}', got none of the name '{name}': add it"

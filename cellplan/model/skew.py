@@ -52,7 +52,7 @@ class PairSkew:
     @property
     def least(self) -> AllowedSkew | None:
         """The demand that allows least, the first of these; None without any."""
-        return min(self.limits, key=lambda each: each.skew, default=None)
+        return min(self.limits, key=lambda allowed: allowed.skew, default=None)
 
     @property
     def allowed(self) -> float:
@@ -125,7 +125,7 @@ class SkewReport:
         return MOST_SKEW if self.least is None else self.least.allowed
 
     @property
-    def each(self) -> float:
+    def alone(self) -> float:
         """Shift in [s] of each clock by itself, forward or back, that keeps every demand.
 
         Two clocks are then apart by twice as much; half of ``MOST_SKEW`` where it is that or more.

@@ -96,12 +96,12 @@ class StopReport:
     @property
     def deepest(self) -> StopDepth | None:
         """The deepest tool; None in a cell without tasks on the part."""
-        return max(self.depths, key=lambda each: each.depth, default=None)
+        return max(self.depths, key=lambda stop: stop.depth, default=None)
 
     @property
     def nearest(self) -> StopDistance | None:
         """The nearest pair of robots; None in a cell of one robot."""
-        return min(self.distances, key=lambda each: (each.proved, each.distance), default=None)
+        return min(self.distances, key=lambda stop: (stop.proved, stop.distance), default=None)
 
 
 def runs_on(controller: ControllerEntry) -> float | None:
@@ -116,9 +116,9 @@ def runs_on(controller: ControllerEntry) -> float | None:
 
 def running_on(cell: Cell) -> dict[str, float]:
     """``runs_on`` of all robots of a cell whose controllers state it, by robot."""
-    found = {}
+    durations = {}
     for robot in cell.robots:
-        own = None if robot.control is None else runs_on(cell.controllers[robot.control.id])
-        if own is not None and own > 0.0:
-            found[robot.name] = own
-    return found
+        duration = None if robot.control is None else runs_on(cell.controllers[robot.control.id])
+        if duration is not None and duration > 0.0:
+            durations[robot.name] = duration
+    return durations

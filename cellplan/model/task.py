@@ -265,8 +265,8 @@ class Task:
             key: The key below the task; empty for the task itself.
             shared: Key of the cell that gives the value where the task has none of its own; empty for none.
         """
-        own = f"tasks.{self.name}.{key}" if key else f"tasks.{self.name}"
-        return self.origin.at(shared if shared in self.origin.lines and own not in self.origin.lines else own)
+        address = f"tasks.{self.name}.{key}" if key else f"tasks.{self.name}"
+        return self.origin.at(shared if shared in self.origin.lines and address not in self.origin.lines else address)
 
     @property
     def feed_key(self) -> str:

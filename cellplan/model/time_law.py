@@ -63,13 +63,13 @@ def reached_at(law: TimeLaw, share: Array, ramp: Array | float | None = None) ->
     """Shares of the time, 0..1, at which a law has come to shares of the stretch, shape (N,): by halving."""
     tau: Array = np.where(share >= 1.0, 1.0, 0.0)
     is_inside = (share > 0.0) & (share < 1.0)
-    inside, own = share[is_inside], ramp[is_inside] if isinstance(ramp, np.ndarray) else ramp
+    inside, inside_ramp = share[is_inside], ramp[is_inside] if isinstance(ramp, np.ndarray) else ramp
     if not len(inside):
         return tau
     low, high = np.zeros_like(inside), np.ones_like(inside)
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        is_short = advance(law, middle, own).share < inside
+        is_short = advance(law, middle, inside_ramp).share < inside
         low, high = np.where(is_short, middle, low), np.where(is_short, high, middle)
     tau[is_inside] = 0.5 * (low + high)
     return tau

@@ -15,8 +15,12 @@ def verdict(reports: Sequence["Report"]) -> str:
     failed = [check.message for check in checks if not check.passed]
     if failed:
         return f"failed: {len(failed)} of {len(checks)} checks; {failed[0]}"
-    distances = (each for report in reports for each in report.clearance.minima.values())
-    known = [(each.minimum, each.pair) for each in distances if each.minimum is not None and each.pair is not None]
+    distances = (minimum for report in reports for minimum in report.clearance.minima.values())
+    known = [
+        (distance.minimum, distance.pair)
+        for distance in distances
+        if distance.minimum is not None and distance.pair is not None
+    ]
     if not known:
         return f"passed: {len(checks)} checks"
     least, pair = min(known)

@@ -101,8 +101,8 @@ class VerifiedRun(Presented):
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        found = verdict([motion.report for motion in self.motions])
-        return f"<Verified run of '{self.cell.name}', {float(self.motion.times[-1]):g} s, {found}>"
+        judgement = verdict([motion.report for motion in self.motions])
+        return f"<Verified run of '{self.cell.name}', {float(self.motion.times[-1]):g} s, {judgement}>"
 
     def by_phase(self, programs: Sequence[Mapping[str, JointTable]]) -> tuple[dict[str, JointTable], ...]:
         """Tables of every motion, each on its own time.

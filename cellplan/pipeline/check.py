@@ -40,7 +40,7 @@ class CellCheck:
     """What can be said of a cell before it is solved."""
 
     cell: Cell  # the cell with every start posture filled in
-    found: tuple[str, ...]  # names of the robots whose start posture was searched for
+    searched: tuple[str, ...]  # names of the robots whose start posture was searched for
     bulges: Mapping[str, float]  # largest distance in [m] of a smooth path from the lines between its points, by task
     choice: str | None  # how the start was chosen, in words; None when all of it was given
     path_lengths: Mapping[str, float]  # length of each task's path on the surface in [m]
@@ -79,23 +79,25 @@ def _check_program(cell: Cell, progress: Progress) -> CellCheck:
     made = {
         stage.phase.name: _check_together(scenes.of_stage(stage), progress) for stage in blocks if stage.move is None
     }
-    checks = [replace(each, message=f"{name}: {each.message}") for name, one in made.items() for each in one.checks]
+    checks = [replace(check, message=f"{name}: {check.message}") for name, one in made.items() for check in one.checks]
     words = [f"{name}: {one.choice}" for name, one in made.items() if one.choice is not None]
     first = first_blocks(cell)
     robots = []
     for robot in cell.robots:
-        own = next((one.cell for one in made.values() if first.get(robot.name) in one.path_lengths), None)
+        in_phase = next((one.cell for one in made.values() if first.get(robot.name) in one.path_lengths), None)
         robots.append(
-            robot if own is None or robot.start is not None else replace(robot, start=own.robot(robot.name).start)
+            robot
+            if in_phase is None or robot.start is not None
+            else replace(robot, start=in_phase.robot(robot.name).start)
         )
     return CellCheck(
         cell=replace(cell, robots=tuple(robots)),
-        found=tuple(dict.fromkeys(name for one in made.values() for name in one.found)),
+        searched=tuple(dict.fromkeys(name for one in made.values() for name in one.searched)),
         choice="; ".join(words) or None,
         path_lengths={name: length for one in made.values() for name, length in one.path_lengths.items()},
         bulges={name: bulge for one in made.values() for name, bulge in one.bulges.items()},
         checks=tuple(checks),
-        moved=tuple(dict.fromkeys(each for one in made.values() for each in one.moved)),
+        moved=tuple(dict.fromkeys(moved for one in made.values() for moved in one.moved)),
         left_out=scenes.held.left_out,
     )
 
@@ -111,7 +113,7 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     started, more = with_chosen_start(cell, choice.start, toolpaths)
     start = choice.start
     pair = _touching_at_start(scene, start)
-    found = tuple(robot.name for robot in cell.robots if robot.start is None)
+    searched = tuple(robot.name for robot in cell.robots if robot.start is None)
     words = "no collision at the start" if pair is None else f"'{pair[0]}' touches '{pair[1]}' at the start"
     at_start = Check(
         name="start_collision",
@@ -126,7 +128,7 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
     loads = check_payload_at_rest(cell, scene.chains, start)
     return CellCheck(
         cell=started,
-        found=found,
+        searched=searched,
         choice=choice.words,
         path_lengths={name: toolpath.length for name, toolpath in toolpaths.items()},
         bulges={name: toolpath.bulge for name, toolpath in toolpaths.items() if toolpath.bulge is not None},
@@ -135,7 +137,7 @@ def _check_together(scene: Scene, progress: Progress) -> CellCheck:
             *_on_trial(choice),
             *check_mounting(scene, start[None]),
             *depths_on_paths(cell, toolpaths),
-            *(each for each in loads if each.name == "payload" or not each.passed),
+            *(load for load in loads if load.name == "payload" or not load.passed),
         ),
         moved=(*moved, *more),
         left_out=scene.left_out,
@@ -198,7 +200,7 @@ def check_lines(record: Record) -> list[str]:
         *aligned([*starts, *paths, *bulges, *controllers]),
         *(f"  {line}" for line in moved_start_lines(record["moved_starts"])),
         *(f"  note: {remark}" for remark in record["remarks"]),
-        *(f"  {each['message']}" for each in record["checks"] if each["passed"] and not reaches_nowhere(each)),
+        *(f"  {check['message']}" for check in record["checks"] if check["passed"] and not reaches_nowhere(check)),
         *left_out_lines(record, MORE),
     ]
 

@@ -40,11 +40,11 @@ def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
     ]
     paths = []
     X_WP = part_pose(cell, None if cell.carrier is None else start[cell.columns(cell.robots[cell.carrier].name)])
-    for each in schedule.tasks:
-        rows = np.unique(np.linspace(0, len(each.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
-        X_WR = np.eye(4) if each.task.relative_to is not Frame.PART or X_WP is None else X_WP
-        points = each.X_PT[rows, :3, 3] @ X_WR[:3, :3].T + X_WR[:3, 3]
-        paths.append({"task": each.task.name, "robot": each.task.robot, "points_mm": _rounded(points[:, :2])})
+    for task in schedule.tasks:
+        rows = np.unique(np.linspace(0, len(task.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
+        X_WR = np.eye(4) if task.task.relative_to is not Frame.PART or X_WP is None else X_WP
+        points = task.X_PT[rows, :3, 3] @ X_WR[:3, :3].T + X_WR[:3, 3]
+        paths.append({"task": task.task.name, "robot": task.task.robot, "points_mm": _rounded(points[:, :2])})
     robots = [
         {"name": robot.name, "x_mm": _rounded(robot.X_WB[0, 3]), "y_mm": _rounded(robot.X_WB[1, 3])}
         for robot in cell.robots
@@ -61,8 +61,8 @@ def footprint(shape: Box | Cylinder, X_WS: Array) -> list[list[float]]:
     """
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     points = 0.5 * corners * np.array(shape.size[:2]) if isinstance(shape, Box) else shape.radius * AROUND[:, :2]
-    found: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
-    return found
+    outline: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])
+    return outline
 
 
 def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
@@ -77,15 +77,15 @@ def swept_area(scene: Scene, q: Array) -> dict[str, Any]:
         [mm].
     """
     poses = scene.body_poses(q)
-    found: dict[str, Any] = {}
+    areas: dict[str, Any] = {}
     for robot in scene.cell.robots:
         squares = [np.empty((0, 3), dtype=np.intp)]
         for index in _solids(scene):
             if scene.bodies[index].robot == robot.name and not scene.bodies[index].is_at_rest:
                 lines = swept_outlines(scene.engine.bodies[index].hull, poses.R[index], poses.p[index])
                 squares.append(covered(MM / SQUARE * lines))
-        found[robot.name] = (SQUARE * stretches(np.concatenate(squares))).tolist()
-    return {"square_mm": SQUARE, "robots": found}
+        areas[robot.name] = (SQUARE * stretches(np.concatenate(squares))).tolist()
+    return {"square_mm": SQUARE, "robots": areas}
 
 
 def _solids(scene: Scene) -> list[int]:

@@ -79,7 +79,7 @@ def explain(cell: Cell) -> Structure:
         plane=plane,
         graph=graph,
         circuits=circuits(graph, spanning_tree(graph)),
-        matrices=tuple(_matrix(own, model, phase) for own, phase in _worked_on(cell)),
+        matrices=tuple(_matrix(arranged, model, phase) for arranged, phase in _worked_on(cell)),
     )
 
 
@@ -116,7 +116,7 @@ def _matrix(cell: Cell, model: CombinedModel, phase: Phase) -> MatrixShape:
     return MatrixShape(
         phase=phase,
         blocks=tuple(task.name for task in tasks),
-        rows=tuple(int(count) for count in constraints.kept.sum(axis=1)),
+        rows=tuple(int(count) for count in constraints.constrained.sum(axis=1)),
         columns=tuple(int(moves[place].sum()) for place in places),
         signs=np.stack(blocks, axis=1),
         missing=missing,

@@ -62,8 +62,13 @@ def _robot_record(cell: Cell, robot: Robot) -> dict[str, Any]:
         "works_on": [task.name for task in cell.tasks if task.robot == robot.name],
         "joints": [joint_record(joint) for joint in model.joints],
         "followers": [
-            {"name": each.name, "type": str(each.kind), "leader": model.joints[each.leader].name, "ratio": each.ratio}
-            for each in model.followers
+            {
+                "name": follower.name,
+                "type": str(follower.kind),
+                "leader": model.joints[follower.leader].name,
+                "ratio": follower.ratio,
+            }
+            for follower in model.followers
         ],
     }
 
@@ -113,7 +118,7 @@ def structure_lines(record: Record) -> list[str]:
     counts = [(len(record["robots"]), "robot"), (joints, "joint"), (len(record["tasks"]), "task")]
     holders = ", ".join(record["part"]["held_by"])
     return [
-        f"{record['cell']}: {', '.join(_count(*each) for each in counts)}, mode {record['mode']}",
+        f"{record['cell']}: {', '.join(_count(*count) for count in counts)}, mode {record['mode']}",
         f"the part is held by {holders}" if holders else "the part is fixed in the world",
         *_robot_lines(record["robots"]),
         *_task_lines(record["tasks"]),

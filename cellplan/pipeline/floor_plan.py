@@ -75,11 +75,11 @@ def swept_state(duration: float) -> str:
 
 def schedule_paths(schedule: Schedule) -> dict[str, Array]:
     """Points along the path of every task of a run in [m], shape (N, 3) each."""
-    found = {}
-    for each in schedule.tasks:
-        rows = np.unique(np.linspace(0, len(each.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
-        found[each.task.name] = each.X_PT[rows, :3, 3]
-    return found
+    paths = {}
+    for task in schedule.tasks:
+        rows = np.unique(np.linspace(0, len(task.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
+        paths[task.task.name] = task.X_PT[rows, :3, 3]
+    return paths
 
 
 def _solid(body: SceneBody) -> Solid:
@@ -151,15 +151,15 @@ def _swept(
     cell: Cell, bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], motions: Sequence[Mapping[str, Array]]
 ) -> dict[str, Indices]:
     """Squares that moving links, tools and the part cover, by the robot that moves them."""
-    found: dict[str, list[Indices]] = {robot.name: [] for robot in cell.robots}
+    columns: dict[str, list[Indices]] = {robot.name: [] for robot in cell.robots}
     moving = [body for body in bodies if not body.is_at_rest]
     for q in motions:
         rows = _rows(q)
         poses = body_poses(moving, chains, {name: values[rows] for name, values in q.items()})
         for index, body in enumerate(moving):
             lines = swept_outlines(_solid(body), poses.R[index], poses.p[index])
-            found[str(body.robot)].append(covered(MM / SQUARE * lines))
-    return {name: stretches(np.concatenate(own)) for name, own in found.items() if own}
+            columns[str(body.robot)].append(covered(MM / SQUARE * lines))
+    return {name: stretches(np.concatenate(indices)) for name, indices in columns.items() if indices}
 
 
 def _rows(q: Mapping[str, Array]) -> Indices:

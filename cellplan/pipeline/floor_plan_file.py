@@ -149,12 +149,12 @@ def _by_robot(cell: Cell, q: Array) -> Mapping[str, Array]:
 
 def _task_points(cell: Cell) -> dict[str, Array]:
     """Points along the paths of all tasks; a path that cannot be built has none."""
-    found = {}
+    of_tasks = {}
     for task in cell.tasks:
         try:
             points = path_points(cell, task)
         except InputError:
             continue
         if np.all(np.isfinite(points)):
-            found[task.name] = points
-    return found
+            of_tasks[task.name] = points
+    return of_tasks

@@ -41,11 +41,11 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
         "locked": described.locked,
         "links": [
             {
-                "link": each.link,
-                "shapes": list(each.shapes),
-                "size_mm": [round(MM * float(edge), 1) for edge in each.size],
+                "link": link.link,
+                "shapes": list(link.shapes),
+                "size_mm": [round(MM * float(edge), 1) for edge in link.size],
             }
-            for each in described.links
+            for link in described.links
         ],
         "cell_lines": described.cell_lines,
         "remarks": list(described.remarks),
@@ -133,12 +133,12 @@ def _flange_lines(record: dict[str, Any]) -> Iterator[str]:
     yield f"  base {record['base']}, flange {record['flange']} at {at}" if record["flange"] else f"  flange at {at}"
     rows = [
         (
-            each["link"],
-            _joint_count(each["joints"]),
-            each["note"],
-            "*" if each["link"] == record["flange"] else "",
+            flange["link"],
+            _joint_count(flange["joints"]),
+            flange["note"],
+            "*" if flange["link"] == record["flange"] else "",
         )
-        for each in record["flanges"]
+        for flange in record["flanges"]
     ]
     head = "possible flanges:" if record["flange_is_usual"] else "possible flanges (none is usual: --flange chooses):"
     yield from _block(head, rows)

@@ -104,6 +104,6 @@ class Solution(Presented):
     def __repr__(self) -> str:
         """One line without arrays."""
         runs = ", ".join(run.name for run in self.runs if run.name is not None)
-        cycle, found = float(self.motion.times[-1]), verdict([run.report for run in self.runs])
+        cycle, outcome = float(self.motion.times[-1]), verdict([run.report for run in self.runs])
         mode = f"{self.cell.motion.mode}{f': {runs}' if runs else ''}"
-        return f"<Solution of '{self.cell.name}', {mode}, {cycle:g} s, {found}>"
+        return f"<Solution of '{self.cell.name}', {mode}, {cycle:g} s, {outcome}>"

@@ -104,7 +104,7 @@ def solve_motion(
 
 def _of_phase(moved: Sequence[MovedStart], phase: Phase) -> tuple[MovedStart, ...]:
     """Starts that were moved to a task of a phase, or to a grasp."""
-    return tuple(each for each in moved if each.task in phase.tasks or "@" in each.task)
+    return tuple(start for start in moved if start.task in phase.tasks or "@" in start.task)
 
 
 def _solve_program(
@@ -116,13 +116,13 @@ def _solve_program(
 
     planned = plan_program(cell if task is None else with_only_task(cell, task), near=near, progress=progress)
     stages, cycles = planned.stages, planned.cycles
-    plan = Plan(phases=tuple(each.stage.phase for each in stages) * cycles)
-    clock = ProgramClock.of(planned.cell, plan, [each.schedule for each in stages] * cycles)
-    motions, scenes = [each.motion for each in stages] * cycles, [each.scene for each in stages] * cycles
+    plan = Plan(phases=tuple(stage.stage.phase for stage in stages) * cycles)
+    clock = ProgramClock.of(planned.cell, plan, [stage.schedule for stage in stages] * cycles)
+    motions, scenes = [stage.motion for stage in stages] * cycles, [stage.scene for stage in stages] * cycles
     motion, runs = _runs(planned.cell, clock, motions, scenes, early=early, progress=progress)
     runs = tuple(
-        replace(run, rungs=each.rungs, scene=each.scene, moved=planned.moved.get(run.phase.name, ()))
-        for run, each in zip(runs, stages, strict=True)
+        replace(run, rungs=stage.rungs, scene=stage.scene, moved=planned.moved.get(run.phase.name, ()))
+        for run, stage in zip(runs, stages, strict=True)
     )
     remark = "; ".join(planned.remarks) or None
     return replace(planned.scenes.held, cell=planned.cell), Solution(
@@ -148,17 +148,17 @@ def certified(
     """
     phases = []
     for run in solution.runs:
-        own = run.scene or scene
-        q = stacked(own.cell, run.report.q)
-        found = (
-            run_clearance(own, run.schedule, q, progress=progress)
+        run_scene = run.scene or scene
+        q = stacked(run_scene.cell, run.report.q)
+        clearance = (
+            run_clearance(run_scene, run.schedule, q, progress=progress)
             if early is None
-            else (early.of(own, run.schedule, q, progress))
+            else (early.of(run_scene, run.schedule, q, progress))
         )
         with_figures = is_reported and (early is None or early.with_curves)
-        report = completed(run.report, found)
-        report = with_clocks(report, own, run.schedule, is_reported=with_figures, progress=progress)
-        phases.append(JudgedPhase(scene=own, schedule=run.schedule, report=report))
+        report = completed(run.report, clearance)
+        report = with_clocks(report, run_scene, run.schedule, is_reported=with_figures, progress=progress)
+        phases.append(JudgedPhase(scene=run_scene, schedule=run.schedule, report=report))
     reports = with_joins(solution.cell, with_phase_ends(solution.cell, phases))
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
@@ -179,7 +179,7 @@ def _runs(
     Of several cycles, which have the same rows, the phases of the first are verified.
     """
     clock, motions = retimed(scenes, clock, nominal, progress=progress)
-    motion = clock.motion([each.q for each in motions])
+    motion = clock.motion([motion.q for motion in motions])
     program = render_program(cell, motion)
     tasks = [task.name for task in cell.tasks if task.name in clock.plan.process]
     text = render_clock(clock.table(tasks), cell=cell.name, program=program_digest(program.tables))
@@ -187,13 +187,13 @@ def _runs(
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
     for place in range(len(motions) // (1 if cell.program is None else cell.program.cycles)):
-        schedule, own = clock.schedules[place], motions[place]
+        schedule, phase_motion = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         if early is not None:
             early.begin(scenes[place], schedule, stacked(cell, {table.robot: table.q for table in rows}))
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
-        runs.append(Run(phase=phase, schedule=schedule, motion=own, program=program, report=report))
+        runs.append(Run(phase=phase, schedule=schedule, motion=phase_motion, program=program, report=report))
     return motion, tuple(runs)
 
 

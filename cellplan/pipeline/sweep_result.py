@@ -64,7 +64,7 @@ def study_lines(record: Record, folder: Path) -> list[str]:
     others = [f"{count} {status.replace('_', ' ')}" for status, count in counts.items() if status != "passed" and count]
     rows = [[*record["vary"], "verdict", *(SHOWN[key].column for key in COLUMNS)], *map(_cells, trials)]
     reasons = ["", *(trial["reason"] for trial in trials)]
-    shown = (each if len(each) <= MAX_REASON else f"{each[:MAX_REASON]}…" for each in reasons)
+    shown = (reason if len(reason) <= MAX_REASON else f"{reason[:MAX_REASON]}…" for reason in reasons)
     more = len(record["trials"]) - MAX_ROWS
     return [
         f"{record['cell']}: {counts['passed']} of {len(record['trials'])} variants passed",
@@ -104,15 +104,19 @@ def _panel(key: str, curves: Mapping[str, Entries], address: str) -> Panel:
     """One figure: a curve for each combination of the other values, a dot for each variant, red if it failed."""
     shown = SHOWN[key]
     known = {others: [it for it in trials if it["figures"][key] is not None] for others, trials in curves.items()}
-    found = [shown.percent * trial["figures"][key] for trials in known.values() for trial in trials]
-    items: list[Item] = [Limit(shown.limit)] if shown.limit is not None and min(found) < shown.limit else []
+    shown_values = [shown.percent * trial["figures"][key] for trials in known.values() for trial in trials]
+    items: list[Item] = [Limit(shown.limit)] if shown.limit is not None and min(shown_values) < shown.limit else []
     for colour, (others, trials) in zip(ROBOTS, known.items(), strict=False):
         at = [float(trial["values"][address]) for trial in trials]
         values = [shown.percent * trial["figures"][key] for trial in trials]
         items.append(Curve(others, np.array(at), np.array(values), colour))
         pens = [colour if trial["status"] == "passed" else LIMIT for trial in trials]
         items += [Mark(*point) for point in zip(at, values, pens, strict=True)]
-    return Panel(title=shown.plot, y=value_axis(min(found), max(*found, shown.limit or max(found))), items=items)
+    return Panel(
+        title=shown.plot,
+        y=value_axis(min(shown_values), max(*shown_values, shown.limit or max(shown_values))),
+        items=items,
+    )
 
 
 def _varied_number(record: Record) -> str | None:

@@ -45,18 +45,18 @@ def verify(
     program = _on_clock(cell, demanded, clock)
     _refuse_other_rows(program, parsed)
     phase, schedule = program.plan.program[place], program.schedules[place]
-    own = program.cut(parsed, place)
-    for table in own:
+    columns = program.cut(parsed, place)
+    for table in columns:
         if table.robot in phase.roles and moved_while_holding(phase, table.robot, table.q) is not None:
             raise InputError(
                 f"table of '{table.robot}': expected no motion in the phase '{phase.name}': it holds still"
             )
-    for robot, joints in ((cell.robot(table.robot), table.q) for table in own if table.robot in phase.roles):
+    for robot, joints in ((cell.robot(table.robot), table.q) for table in columns if table.robot in phase.roles):
         if off_given_path(phase, robot, program.sigma, joints) is not None:
             raise InputError(f"table of '{robot.name}': expected the joints of robots.{robot.name}.path, got others")
     with nothing_kept():  # a proof rests on the cell itself
         report = verify_tables(
-            demanded.scenes(cell)[place], schedule, own, moving=phase.moving, idle=phase.idle, progress=progress
+            demanded.scenes(cell)[place], schedule, columns, moving=phase.moving, idle=phase.idle, progress=progress
         )
     return replace(report, phases=program.timed_phases)
 

@@ -57,8 +57,8 @@ def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, ProgramRows]]:
         rows = run.motion.rows(phase)
         times, sigma = motion.schedule.times, run.motion.sigma[rows]
         process = run.motion.plan.process
-        own = _phase_rows(phase.name, slice(0, len(times)), _checked(motion))
-        yield motion.name, ProgramRows(cell=run.cell, times=times, sigma=sigma, phases=[own], process=process)
+        phase_rows = _phase_rows(phase.name, slice(0, len(times)), _checked(motion))
+        yield motion.name, ProgramRows(cell=run.cell, times=times, sigma=sigma, phases=[phase_rows], process=process)
 
 
 def _program_rows(cell: Cell, motion: Motion, checked: Sequence[Checked]) -> ProgramRows:

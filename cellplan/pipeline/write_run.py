@@ -17,7 +17,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.links import VIEW_PAGE
-from cellplan.report.page.render import Beside, overview_page, report_page
+from cellplan.report.page.render import PageFiles, overview_page, report_page
 from cellplan.report.page.view import unmade_view_page
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
@@ -74,16 +74,16 @@ def write_run(
     with RunFolder(folder) as target:
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            record = _write_report(target, run.cell_of(cell), run, provenance, formats, Beside(files=tables))
+            record = _write_report(target, run.cell_of(cell), run, provenance, formats, PageFiles(files=tables))
         reports = {run.name: run.report for run in solution.runs if run.name is not None}
         if reports:
             transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
-            moved = dict.fromkeys(each for run in solution.runs for each in run.moved)
+            moved = dict.fromkeys(start for run in solution.runs for start in run.moved)
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers, moved=moved)
             target.write_text("report.json", as_json(record))
             phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
-            beside = Beside(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
-            target.write_text("report.html", overview_page(record, cell=cell, **beside))
+            extra = PageFiles(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
+            target.write_text("report.html", overview_page(record, cell=cell, **extra))
         target.write_text("cell.yaml", render_cell(cell))
         if has_tables:
             _write_tables(target, program, released)
@@ -98,17 +98,17 @@ def write_run(
 
 def versions() -> dict[str, str]:
     """Version of cellplan and of every engine, by package name."""
-    found = {"cellplan": cellplan.__version__}
+    packages = {"cellplan": cellplan.__version__}
     for package in ENGINES:
         try:
-            found[package] = version(package)
+            packages[package] = version(package)
         except PackageNotFoundError:
-            found[package] = "unknown"
-    return found
+            packages[package] = "unknown"
+    return packages
 
 
 def _write_report(
-    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], beside: Beside
+    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], extra: PageFiles
 ) -> Record:
     """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
     place = "" if run.name is None else f"{run.name}/"
@@ -120,13 +120,13 @@ def _write_report(
     plots = pictures(run_figures(run.report, cell=cell), formats)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    beside |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
-    page = report_page(record, run.report.checks, cell=cell, plots=plots, **beside)
+    extra |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
+    page = report_page(record, run.report.checks, cell=cell, plots=plots, **extra)
     target.write_text(f"{place}report.html", page)
     return record
 
 
-def _write_drawings(target: RunFolder, place: str, drawings: Mapping[str, str]) -> Beside:
+def _write_drawings(target: RunFolder, place: str, drawings: Mapping[str, str]) -> PageFiles:
     """Write the drawings of the cell; returns them by what a page calls them."""
     for name, text in drawings.items():
         target.write_text(f"{place}{name}", text)

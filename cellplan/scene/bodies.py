@@ -86,7 +86,7 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
 def link_displacements(cell: Cell, chains: Mapping[str, ScrewChain], q: Array) -> dict[str, Array]:
     """Displacements of all links by robot, see ``ScrewChain``, at stacked joint positions of shape (N, nq)."""
     columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
-    return {name: chains[name].link_displacements(q[:, own]) for name, own in columns.items()}
+    return {name: chains[name].link_displacements(q[:, indices]) for name, indices in columns.items()}
 
 
 def solid_poses(bodies: Sequence[SceneBody], cut_from: Sequence[int], D: Mapping[str, Array]) -> BodyPoses:

@@ -33,8 +33,8 @@ class BodyTable:
             carriers: The body of the scene that each body is, or is cut from.
         """
         return cls(
-            links=np.array([forest.place(each.robot, each.link) for each in carriers], dtype=np.intp),
-            X_LS=np.array([each.X_BS for each in carriers]).reshape(-1, 4, 4),
+            links=np.array([forest.place(carrier.robot, carrier.link) for carrier in carriers], dtype=np.intp),
+            X_LS=np.array([carrier.X_BS for carrier in carriers]).reshape(-1, 4, 4),
             centres=np.array([body.centre for body in bodies]).reshape(-1, 3),
             radii=np.array([body.radius for body in bodies]),
             ends=np.array([body.ends for body in bodies]).reshape(-1, 2, 3),

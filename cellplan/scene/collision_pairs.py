@@ -50,11 +50,11 @@ class CollisionPairs:
         Raises:
             InputError: An exclusion names something that is no body; the mounting of a body cannot be meant.
         """
-        kept, excluded = sort_pairs(cell, bodies)
-        design = apply_design(cell, bodies, kept, engine=engine, chains=chains)
+        remaining, excluded = sort_pairs(cell, bodies)
+        design = apply_design(cell, bodies, remaining, engine=engine, chains=chains)
         excluded += design.excluded
         zones = _ContactZones(cell, bodies, first_index=len(engine.bodies))
-        watched = tuple(zones.watched(pair) for pair in design.kept)
+        watched = tuple(zones.watched(pair) for pair in design.watched)
         return cls(
             watched=watched,
             excluded=tuple(sorted(excluded, key=lambda pair: (pair.first, pair.second))),
@@ -148,5 +148,5 @@ def _mounted(
     kinds = (LeftOutKind.GRIP, LeftOutKind.STANDING)
     ends = [(pair.first, pair.second) for pair in excluded if pair.kind in kinds]
     ends += [(pair.first, pair.second) for pair in watched if pair.rule in {Rule.GRIP, Rule.CONTACT}]
-    found = (mounted_pair(bodies[first], bodies[second], (first, second), cell) for first, second in sorted(ends))
-    return [pair for pair in found if pair is not None]
+    pairs = (mounted_pair(bodies[first], bodies[second], (first, second), cell) for first, second in sorted(ends))
+    return [pair for pair in pairs if pair is not None]

@@ -48,9 +48,9 @@ def left_out(
         engine: The solids first, in the order of the bodies.
     """
     standing = _Standing(cell, bodies, engine)
-    entries = [*_relaxed(bodies, pairs), *(each for each in _excluded(excluded) if not standing.is_clear(*each[:3]))]
-    found = sorted(entries, key=lambda each: each[:2])
-    named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in found]
+    entries = [*_relaxed(bodies, pairs), *(entry for entry in _excluded(excluded) if not standing.is_clear(*entry[:3]))]
+    ordered = sorted(entries, key=lambda entry: entry[:2])
+    named = [LeftOut(kind, (bodies[i].name, bodies[j].name), reason) for i, j, kind, reason in ordered]
     things = tuple(body.name for body in bodies if body.kind is Kind.OBSTACLE)
     among = [LeftOut(LeftOutKind.ENVIRONMENT, things, FIXED_REASON)] if len(things) > 1 else []
     with_links = {body.robot for body in bodies if body.kind is Kind.LINK}

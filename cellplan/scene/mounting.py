@@ -72,14 +72,14 @@ def works_like_a_tool(body: SceneBody, cell: Cell) -> bool:
 
 def grasp_of(a: SceneBody, b: SceneBody, cell: Cell) -> Grasp | None:
     """The grasp that two bodies belong to: the part, and a body that a holder grips with."""
-    found = _held_beside(a, b, cell)
-    return None if found is None or _keeps_away(*found) else found[1]
+    held = _held_beside(a, b, cell)
+    return None if held is None or _keeps_away(*held) else held[1]
 
 
 def keeps_out_of_grip(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
     """Whether two bodies are the part, and one that is rigid with the flange of a holder but is not to grip."""
-    found = _held_beside(a, b, cell)
-    return found is not None and _keeps_away(*found)
+    held = _held_beside(a, b, cell)
+    return held is not None and _keeps_away(*held)
 
 
 def _held_beside(a: SceneBody, b: SceneBody, cell: Cell) -> tuple[SceneBody, Grasp] | None:

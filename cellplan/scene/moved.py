@@ -47,20 +47,20 @@ def placed_columns(cell: Cell, bodies: Sequence[SceneBody], X_WB: Mapping[str, A
 
     A column whose height stays keeps its solid.
     """
-    found = dict[int, SceneBody]()
+    placed = dict[int, SceneBody]()
     for name in X_WB:
         robot = cell.robot(name)
         if robot.pedestal is None or isinstance(robot.pedestal, Bracket):
             continue
         solid = robot.pedestal.solid(robot.X_WB)
-        index = next((i for i, each in enumerate(bodies) if each.kind is Kind.PEDESTAL and each.robot == name), None)
+        index = next((i for i, body in enumerate(bodies) if body.kind is Kind.PEDESTAL and body.robot == name), None)
         if (solid is None) is not (index is None):
             return None
         if solid is not None and index is not None:
             shape = bodies[index].shape
             same = isinstance(shape, Box | Cylinder) and _is_same(shape, solid[0])
-            found[index] = replace(bodies[index], shape=shape if same else solid[0], X_BS=solid[1])
-    return found
+            placed[index] = replace(bodies[index], shape=shape if same else solid[0], X_BS=solid[1])
+    return placed
 
 
 def _is_same(shape: Box | Cylinder, other: Solid) -> bool:

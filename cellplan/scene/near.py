@@ -46,15 +46,15 @@ def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     """See ``Scene.near``."""
     table = scene.near_table
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
-    found = table.find(scene.engine, D, within)
+    nearby = table.find(scene.engine, D, within)
     return NearPairs(
-        rows=found.rows,
-        samples=found.samples,
-        distances=found.distances,
-        normals=found.normals,
-        first=found.first,
-        second=found.second,
-        by_joints=table.by_joints(D, found),
+        rows=nearby.rows,
+        samples=nearby.samples,
+        distances=nearby.distances,
+        normals=nearby.normals,
+        first=nearby.first,
+        second=nearby.second,
+        by_joints=table.by_joints(D, nearby),
     )
 
 
@@ -84,11 +84,11 @@ def near_table_of(scene: "Scene") -> NearTable:
 
 def _are_hulls(cell: Cell, carriers: Sequence[SceneBody], engine: Engine, solids: int) -> Flags:
     """Whether the hull of each body of the engine may stand for it; bodies from ``solids`` on are cut tools."""
-    found = []
+    flags = []
     for index, (carrier, body) in enumerate(zip(carriers, engine.bodies, strict=True)):
         tip = None
         if index >= solids and carrier.robot is not None:
             robot = cell.robot(carrier.robot)
             tip = (inverse(carrier.X_BS) @ robot.model.X_BF @ robot.tool.X_FT)[:3, 3]
-        found.append(counts_by_hull(body, tip))
-    return np.array(found, dtype=bool)
+        flags.append(counts_by_hull(body, tip))
+    return np.array(flags, dtype=bool)

@@ -31,7 +31,7 @@ class WatchedPairs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
+class NearbyPairs:
     """Near pairs; M of them, ordered by sample and row."""
 
     rows: Indices  # what each pair is called, shape (M,)
@@ -56,7 +56,7 @@ class NearTable:
         """The same with some bodies elsewhere on their links, and others in place of some; see ``BodyTable``."""
         return replace(self, bodies=self.bodies.replaced(poses, bodies))
 
-    def find(self, engine: Engine, D: Array, within: float) -> Found:
+    def find(self, engine: Engine, D: Array, within: float) -> NearbyPairs:
         """All pairs nearer than a distance in [m].
 
         Args:
@@ -72,7 +72,7 @@ class NearTable:
         )
         order = np.lexsort((rows, samples))
         order = order[distances[order] < within]
-        return Found(
+        return NearbyPairs(
             rows=rows[order],
             samples=samples[order],
             distances=distances[order],
@@ -82,11 +82,11 @@ class NearTable:
             bodies=bodies[order],
         )
 
-    def by_joints(self, D: Array, found: Found) -> Array:
+    def by_joints(self, D: Array, nearby: NearbyPairs) -> Array:
         """Derivatives of the distances by the stacked joints in [m/rad] or [m/m], shape (M, nq)."""
-        return self.by_axes(found, self.forest.screws(D)) @ self.forest.shares
+        return self.by_axes(nearby, self.forest.screws(D)) @ self.forest.shares
 
-    def by_axes(self, found: Found, screws: Array) -> Array:
+    def by_axes(self, nearby: NearbyPairs, screws: Array) -> Array:
         """The work of a unit force along each normal on every axis, shape (M, axes).
 
         It is the same at both points, as the normal goes through both.
@@ -95,16 +95,16 @@ class NearTable:
             found: The pairs.
             screws: Of all axes, shape (axes, K, 6).
         """
-        links, forces, count = self.links_of(found), wrenches(found), screws.shape[1]
+        links, forces, count = self.links_of(nearby), wrenches(nearby), screws.shape[1]
         moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
-        bounds = np.searchsorted(found.samples, np.arange(count + 1)).tolist()
+        bounds = np.searchsorted(nearby.samples, np.arange(count + 1)).tolist()
         for sample, (first, last) in enumerate(pairwise(bounds)):
             moved[first:last] *= forces[first:last] @ screws[:, sample].T
         return moved
 
-    def links_of(self, found: Found) -> Indices:
+    def links_of(self, nearby: NearbyPairs) -> Indices:
         """Links that carry the bodies of pairs, shape (M, 2)."""
-        return np.where(found.bodies < 0, WORLD, self.bodies.links[found.bodies])
+        return np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])
 
     def _solids(self, engine: Engine, poses: BodyPoses, bounds: tuple[Array, Array], within: float) -> "Parts":
         """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""
@@ -134,11 +134,11 @@ class NearTable:
 
     def _proved(self, poses: BodyPoses, ends: tuple[Indices, Indices], samples: Indices, n: Array) -> Array:
         """Distances in [m] that directions, shape (M, 3), prove between hulls, shape (M,); see ``separation``."""
-        found = np.einsum("mi,mi->m", n, poses.p[ends[1], samples] - poses.p[ends[0], samples])
+        bounds = np.einsum("mi,mi->m", n, poses.p[ends[1], samples] - poses.p[ends[0], samples])
         for bodies, away in zip(ends, (n, -n), strict=True):
             local = (away[:, None] @ poses.R[bodies, samples])[:, 0]
-            found -= self.bodies.supports.reach(bodies, local)
-        return found
+            bounds -= self.bodies.supports.reach(bodies, local)
+        return bounds
 
     def _near_spheres(self, centres: Array, within: float) -> tuple[Indices, Indices]:
         """Pairs of solids whose bounding spheres, centres of shape (B, K, 3), are near enough, and at which samples."""
@@ -173,12 +173,12 @@ class NearTable:
         return rows, samples, heights, -up, first, first - heights[:, None] * up, ends
 
 
-Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attributes of ``Found``
+Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attributes of ``NearbyPairs``
 
 
-def wrenches(found: Found) -> Array:
+def wrenches(nearby: NearbyPairs) -> Array:
     """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
-    (x, y, z), (a, b, c) = found.second.T, found.normals.T
+    (x, y, z), (a, b, c) = nearby.second.T, nearby.normals.T
     return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=1)
 
 

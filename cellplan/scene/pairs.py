@@ -175,10 +175,10 @@ def _named_bodies(cell: Cell, bodies: Sequence[SceneBody]) -> dict[str, tuple[in
     """Indices by name: of one body, of all bodies of a link by the name of the link, of all of a robot by its own."""
     index: dict[str, tuple[int, ...]] = {robot.name: () for robot in cell.robots}
     for robot in cell.robots:
-        own = [(i, body) for i, body in enumerate(bodies) if body.robot == robot.name]
-        index[robot.name] = tuple(i for i, _ in own)
+        robot_bodies = [(i, body) for i, body in enumerate(bodies) if body.robot == robot.name]
+        index[robot.name] = tuple(i for i, _ in robot_bodies)
         for link in robot.model.links:
-            pieces = tuple(i for i, body in own if body.kind is Kind.LINK and body.link == link.index)
+            pieces = tuple(i for i, body in robot_bodies if body.kind is Kind.LINK and body.link == link.index)
             index |= {f"{robot.name}/{link.name}": pieces} if pieces else {}
     return {body.name: (i,) for i, body in enumerate(bodies)} | index
 

@@ -47,7 +47,7 @@ UNLIMITED_RANGE: Final = np.pi  # [rad] or [m] range sampled to either side of z
 class Design:
     """What becomes of pairs that are near each other by design or by their mounting."""
 
-    kept: list[ScenePair] = field(default_factory=list)  # pairs that are watched, some of them for contact only
+    watched: list[ScenePair] = field(default_factory=list)  # pairs that are watched, some of them for contact only
     excluded: list[Excluded] = field(default_factory=list)  # pairs that are not
     mounted: list[MountedPair] = field(default_factory=list)  # those of them of which the depth is judged
 
@@ -97,9 +97,9 @@ def apply_design(
             is_near = near_in_chain(pair, sampled.views[holder], cell=cell)
             is_decided = is_near and not keeps_out_of_grip(a, b, cell)
             if is_decided:
-                design.kept.append(_relaxed(pair, sampled, holder))
+                design.watched.append(_relaxed(pair, sampled, holder))
         if not is_decided:
-            design.kept.append(pair)
+            design.watched.append(pair)
     refuse_wrong_mounting(cell, bodies, [(body, links) for (body, _), links in faults.items()])
     return design
 
@@ -201,7 +201,7 @@ def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
         design.excluded.append(Excluded(pair.first, pair.second, reason))
     else:
         reason = "checked for contact only: two joints apart, their distance is set by the robot's design"
-        design.kept.append(replace(pair, rule=Rule.CONTACT, reason=reason))
+        design.watched.append(replace(pair, rule=Rule.CONTACT, reason=reason))
     return True
 
 

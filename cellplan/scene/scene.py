@@ -72,23 +72,23 @@ class Scene:
         chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
         bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
         solids = [prepare(body.name, body.shape) for body in bodies if not isinstance(body.shape, HalfSpace)]
-        found = CollisionPairs.of(cell, bodies, engine=Engine(solids), chains=chains)
+        collision_pairs = CollisionPairs.of(cell, bodies, engine=Engine(solids), chains=chains)
         return cls(
             cell=cell,
             chains=chains,
             bodies=bodies,
-            pairs=found.watched,
-            excluded=found.excluded,
-            mounted=found.mounted,
-            engine=Engine([*solids, *found.outside]),
-            cut_from=found.cut_from,
+            pairs=collision_pairs.watched,
+            excluded=collision_pairs.excluded,
+            mounted=collision_pairs.mounted,
+            engine=Engine([*solids, *collision_pairs.outside]),
+            cut_from=collision_pairs.cut_from,
         )
 
     @property
     def exclusions(self) -> tuple[tuple[str, str, str], ...]:
         """Pairs that are not watched, as (first, second, reason)."""
         return tuple(
-            (self.bodies[each.first].name, self.bodies[each.second].name, each.reason) for each in self.excluded
+            (self.bodies[pair.first].name, self.bodies[pair.second].name, pair.reason) for pair in self.excluded
         )
 
     @property
@@ -144,10 +144,10 @@ class Scene:
         """Poses of two of the engine's bodies only; those of the others are not numbers, so that nothing uses them."""
         carriers = [self.carrier(index) for index in pair]
         names = {body.robot or self.cell.robots[0].name for body in carriers}  # one robot at least: it counts the rows
-        own = {name: q[:, self.cell.columns(name)] for name in sorted(names)}
-        found = body_poses(carriers, self.chains, own)
-        R, p = (np.full((len(self.engine.bodies), *part.shape[1:]), np.nan) for part in (found.R, found.p))
-        R[list(pair)], p[list(pair)] = found.R, found.p
+        positions = {name: q[:, self.cell.columns(name)] for name in sorted(names)}
+        poses = body_poses(carriers, self.chains, positions)
+        R, p = (np.full((len(self.engine.bodies), *part.shape[1:]), np.nan) for part in (poses.R, poses.p))
+        R[list(pair)], p[list(pair)] = poses.R, poses.p
         return BodyPoses(R, p)
 
     def carrier(self, index: int) -> SceneBody:

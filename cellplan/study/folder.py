@@ -18,7 +18,7 @@ JOURNAL: Final = "study.jsonl"
 RESULT: Final = "study.json"
 AHEAD: Final = "study-ahead.jsonl"  # trials that wait for one before them
 RUNS: Final = "runs"
-OWN: Final = re.compile(r"\.?study(-[a-z]+)?\.(jsonl|json|csv|html|svg|png|pdf)(\.draft)?")
+RESULT_FILE: Final = re.compile(r"\.?study(-[a-z]+)?\.(jsonl|json|csv|html|svg|png|pdf)(\.draft)?")
 RUN_NAME: Final = re.compile(r"\d{4,6}")
 MARK_WITHIN: Final = 200  # [bytes]
 BEFORE_JOURNAL: Final = {STATE, f".{JOURNAL}.draft"}  # all that a study which was killed at its start leaves
@@ -60,9 +60,9 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
     refuse_unless_study(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        kept = {STATE, JOURNAL, AHEAD, RUNS} if resume else {STATE}
+        expected = {STATE, JOURNAL, AHEAD, RUNS} if resume else {STATE}
         for entry in folder.iterdir():
-            if entry.name not in kept:
+            if entry.name not in expected:
                 shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
     except OSError as error:
         raise _cannot_write(folder, error) from error
@@ -92,7 +92,7 @@ def _foreign(folder: Path) -> str | None:
         if (
             entry.name == LEFT_ALONE
             or _is_listed(entry, folder, listed)
-            or (OWN.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink())
+            or (RESULT_FILE.fullmatch(entry.name) and entry.is_file() and not entry.is_symlink())
         ):
             continue
         if entry.name != RUNS or not entry.is_dir() or entry.is_symlink():
@@ -107,7 +107,7 @@ def _listed(folder: Path) -> Mapping[str, str]:
     """Digests of further results by name, as ``study.json`` lists them; none where it lists none."""
     try:
         record = json.loads((folder / RESULT).read_bytes())
-        return {each["name"]: each["sha256"] for each in record["files"]}
+        return {file["name"]: file["sha256"] for file in record["files"]}
     except (OSError, ValueError, TypeError, KeyError):
         return {}
 
@@ -118,7 +118,7 @@ def _is_listed(entry: Path, folder: Path, listed: Mapping[str, str]) -> bool:
         return False
     if entry.is_dir():
         within = sorted(entry.iterdir())
-        return bool(within) and all(_is_listed(each, folder, listed) for each in within)
+        return bool(within) and all(_is_listed(entry, folder, listed) for entry in within)
     return listed.get(entry.relative_to(folder).as_posix()) == digest(entry.read_bytes())
 
 

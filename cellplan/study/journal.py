@@ -40,7 +40,7 @@ class Journal:
         self._path, self._ahead = folder / JOURNAL, folder / AHEAD
         self._header = json.dumps({"schema": SCHEMA, **header}, ensure_ascii=False, allow_nan=False)
         self._files: dict[Path, IO[bytes]] = {}
-        self._kept = f"{self._header}\n".encode()
+        self._written = f"{self._header}\n".encode()
         self.trials: list[Trial] = []
         self.ahead: dict[int, Trial] = {}
         if resume:
@@ -50,7 +50,7 @@ class Journal:
         """Write the header and the trials that are kept; a line that was cut off is dropped."""
         waiting = "".join(f"{self.ahead[number].line}\n" for number in sorted(self.ahead)).encode()
         try:
-            write_whole(self._path, self._kept)
+            write_whole(self._path, self._written)
             if waiting:
                 write_whole(self._ahead, waiting)
             else:
@@ -120,7 +120,7 @@ class Journal:
                     f"{self._path}:1: expected the study that is to be continued, got {self._difference(lines[0])}"
                 )
             self.trials = [self._trial(line, number) for number, line in enumerate(lines[1:])]
-            self._kept = complete
+            self._written = complete
         self.ahead = {number: trial for number, trial in read_ahead(self._ahead).items() if number >= len(lines) - 1}
 
     def _trial(self, line: str, number: int) -> Trial:
@@ -138,8 +138,8 @@ class Journal:
         """What in the header of another study is not as in this one."""
         anew = "begin anew without --resume or in another folder"
         try:
-            other, own = json.loads(line), json.loads(self._header)
-            keys = [key for key in {**own, **other} if own.get(key) != other.get(key)]
+            other, header = json.loads(line), json.loads(self._header)
+            keys = [key for key in {**header, **other} if header.get(key) != other.get(key)]
         except (ValueError, AttributeError, TypeError, RecursionError):
             return f"no header of a study; {anew}"
         return f"one with another value of '{keys[0]}'; {anew}" if keys else f"its values in another order; {anew}"
@@ -160,11 +160,11 @@ def whole_lines(path: Path) -> tuple[bytes, list[str]]:
 
 def read_ahead(path: Path) -> dict[int, Trial]:
     """Trials that wait for others, by number; a line that cannot be read is none."""
-    found: dict[int, Trial] = {}
+    trials: dict[int, Trial] = {}
     for line in whole_lines(path)[1]:
         try:
             trial = Trial.from_record(json.loads(line))
         except (ValueError, KeyError, TypeError, RecursionError):
             continue
-        found[trial.variant.number] = trial
-    return found
+        trials[trial.variant.number] = trial
+    return trials

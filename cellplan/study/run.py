@@ -58,7 +58,7 @@ class Flight:
     def ended(self) -> Iterator[tuple[Variant, Outcome]]:
         """Those whose outcomes have come, without waiting for others."""
         done = [future for future in self._flying if future.done()]
-        for future in sorted(done, key=lambda each: self._flying[each].number):
+        for future in sorted(done, key=lambda future: self._flying[future].number):
             outcome = self._outcome(self._flying[future], future.result(timeout=0))
             if outcome is not None:
                 yield self._flying[future], outcome
@@ -67,7 +67,9 @@ class Flight:
     def arrived(self) -> list[tuple[Variant, Outcome]]:
         """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
         done = [future for future in self._flying if future.done() and not future.cancelled()]
-        answers = [(self._flying[each], each.result(timeout=0)) for each in done if each.exception(timeout=0) is None]
+        answers = [
+            (self._flying[future], future.result(timeout=0)) for future in done if future.exception(timeout=0) is None
+        ]
         return [(variant, self._read(answer)) for variant, answer in answers if isinstance(answer, str)]
 
     def cancel(self) -> None:
@@ -122,11 +124,11 @@ def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> I
             yield _in_order(Flight(evaluate, executor, Limits()).outcomes(variants))
 
 
-def _in_order(found: Iterator[tuple[Variant, Outcome]]) -> Iterator[Outcome]:
+def _in_order(outcomes: Iterator[tuple[Variant, Outcome]]) -> Iterator[Outcome]:
     """Outcomes by the numbers of their variants, which begin with 0."""
     early: dict[int, Outcome] = {}
     following = 0
-    for variant, outcome in found:
+    for variant, outcome in outcomes:
         early[variant.number] = outcome
         while following in early:
             yield early.pop(following)

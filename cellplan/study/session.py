@@ -117,8 +117,13 @@ def run_rounds(propose: Propose, size: int, stop: Stop, record: Recorder, crew: 
             return StoppedBy.BUDGET
         began = time.monotonic()
         values = propose(record.journal.trials[:begin])[:size]
-        variants = [Variant(begin + k, json.loads(json.dumps(dict(each)))) for k, each in enumerate(values)]
-        _run_round([each for each in variants if stop.trials is None or each.number < stop.trials], record, crew)
+        variants = [
+            Variant(begin + k, json.loads(json.dumps(dict(values_of_variant))))
+            for k, values_of_variant in enumerate(values)
+        ]
+        _run_round(
+            [variant for variant in variants if stop.trials is None or variant.number < stop.trials], record, crew
+        )
         if record.is_enough():
             record.journal.ahead.clear()
             return StoppedBy.ENOUGH
@@ -133,7 +138,7 @@ def _run_round(variants: Sequence[Variant], record: Recorder, crew: Crew) -> Non
     record.journal.require(variants)
     record.follow(crew.again)
     known, ahead = len(record.journal.trials), record.journal.ahead
-    left = [each for each in variants if each.number >= known and each.number not in ahead]
+    left = [variant for variant in variants if variant.number >= known and variant.number not in ahead]
     if left and not record.is_enough():
         for variant, outcome in crew.flight.outcomes(left):
             record.add(variant, outcome, crew.again)

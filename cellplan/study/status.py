@@ -44,12 +44,12 @@ class Best:
 
     def of(self, trials: Iterable[Trial]) -> Trial | None:
         """The best trial, the first of equals; None where none passed."""
-        found: tuple[float, Trial] | None = None
+        latest: tuple[float, Trial] | None = None
         for trial in trials:
             value = self.value(trial)
-            if value is not None and (found is None or self.is_better(value, found[0])):
-                found = value, trial
-        return found[1] if found else None
+            if value is not None and (latest is None or self.is_better(value, latest[0])):
+                latest = value, trial
+        return latest[1] if latest else None
 
     def better(self, trial: Trial, other: Trial | None) -> Trial | None:
         """The better one of a trial and another that passed, which stays where they are equal; None where none did."""
@@ -92,7 +92,7 @@ class StudyStatus:
             rate = since / seconds if seconds > 0.0 and since > 0 else None
             by_trials = (state.trials - done) / rate if state.trials is not None and rate else None
             by_budget = max(0.0, state.budget - seconds) if state.budget is not None else None
-            left = min((each for each in (by_trials, by_budget) if each is not None), default=None)
+            left = min((estimate for estimate in (by_trials, by_budget) if estimate is not None), default=None)
         return cls(
             done=done,
             trials=state.trials if state else None,

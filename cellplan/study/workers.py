@@ -87,8 +87,8 @@ class Workers(ThreadPoolExecutor):
 
         def value() -> Value:
             with suppress(CellplanError, TypeError, AttributeError, pickle.PicklingError, TimeoutError):
-                found: Value = begun.result(timeout=LONGEST_S)
-                return found
+                value: Value = begun.result(timeout=LONGEST_S)
+                return value
             return function(*arguments)
 
         return value
@@ -133,12 +133,12 @@ def packed(evaluate: Evaluate) -> bytes:
         TypeError: It cannot be sent to another process.
     """
     try:
-        found = pickle.dumps(evaluate)
+        payload = pickle.dumps(evaluate)
     except (AttributeError, TypeError, pickle.PicklingError) as error:
         raise TypeError(f"evaluate: expected a function of a module, bound to plain data, got {error}") from None
-    if b"__main__" in found:
+    if b"__main__" in payload:
         raise TypeError("evaluate: expected a function of a module, got one of the program that was started")
-    return found
+    return payload
 
 
 def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:
@@ -193,8 +193,8 @@ def crashed(reason: str) -> Outcome:
 @lru_cache(maxsize=1)
 def _unpacked(evaluate: bytes) -> Evaluate:
     """The evaluator, which keeps what it has read from one trial to the next."""
-    found: Evaluate = pickle.loads(evaluate)  # noqa: S301 - packed by the process that asks
-    return found
+    unpacked: Evaluate = pickle.loads(evaluate)  # noqa: S301 - packed by the process that asks
+    return unpacked
 
 
 def _text(outcome: Outcome) -> str:

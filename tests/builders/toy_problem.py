@@ -64,7 +64,7 @@ class Toy:
             values=np.full(count, value),
             demands=np.full(count, DEMAND),
             is_own=np.zeros(count, dtype=bool),
-            found=None,
+            detail=None,
         )
 
     def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:

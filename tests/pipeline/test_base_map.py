@@ -146,14 +146,14 @@ def test_starts_judged_together_are_judged_as_each_by_itself(clearance: float, v
     near = load_cell(CELL).with_values({**STARTS, "checks.clearance_mm": clearance})  # the arms are 30 mm apart
     ready = prepared(near, "right", BaseGrid(x=(1900, 2300), y=(100, 100), step=400))
     q, at = ready.starts()
-    known, inside = verdicts_at_start(ready.asked, q, at)
+    known, inside = verdicts_at_start(ready.job, q, at)
     q, at = q[inside], at[inside]
 
-    together = judge(ready.asked, q, at)
+    together = judge(ready.job, q, at)
 
     alone: dict[int, PlaceVerdict] = {}
     for start, place in zip(q, at.tolist(), strict=True):
-        (found,) = judge(ready.asked, start[None], np.array([place])).values()
+        (found,) = judge(ready.job, start[None], np.array([place])).values()
         alone[place] = found.or_better(alone.get(place))
     assert len(known) == 2
     assert len(set(at.tolist())) < len(at)

@@ -182,7 +182,7 @@ def test_where_nothing_is_found_the_reason_is_written_and_no_table(pair: Verifie
     found = recover(pair, at=0.5, frozen={"right": 0.45})
     record = write_recovery(found, tmp_path / "out")
 
-    assert not found.found
+    assert not found.succeeded
     assert "right: its tool comes no millimetre off" in found.reason
     assert "robots stand at different times" in found.reason
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["recovery.json"]
@@ -195,7 +195,7 @@ def test_where_nothing_is_found_the_reason_is_written_and_no_table(pair: Verifie
 def test_a_robot_that_is_kept_on_the_part_cannot_be_recovered(pen: VerifiedRun) -> None:
     found = recover(pen, at=0.5, keep=["pen"])
 
-    assert not found.found
+    assert not found.succeeded
     assert "no robot that may move takes them apart" in found.reason
     assert "'pen', which is to stand still" in found.reason
 
@@ -226,7 +226,7 @@ def test_recoveries_of_shipped_cells_are_free_by_brute_force(name: str, tmp_path
     places = RunPlaces.of(run)
     for at, frozen in random_stops(run, 9, rng):
         found = recover(run, at=at, frozen=frozen)
-        if not found.found:
+        if not found.succeeded:
             assert found.reason
             continue
         assert brute_force(found, places, rng).faults == []

@@ -148,7 +148,7 @@ def _curves(
     """
     ends = times[bound.edges]
     plotted = [0.5 * (ends[1:] + ends[:-1]), ends[[0, -1]]]
-    plotted.append(np.array([found.at_s for found in minima.values() if found.at_s is not None]))
+    plotted.append(np.array([minimum.at_s for minimum in minima.values() if minimum.at_s is not None]))
     curve_times = np.unique(np.concatenate(plotted))
     block = np.clip(np.searchsorted(ends, curve_times, side="right") - 1, 0, len(ends) - 2)
     curves = {}

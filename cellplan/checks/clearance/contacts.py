@@ -43,11 +43,11 @@ def time_of(times: Array, at: float) -> float:
 
 def collision_checks(bound: Bound, contacts: Sequence[Contact], times: Array, *, kind: ClearanceClass) -> list[Check]:
     """One failed check for each pair of a class that touches or is not certified; a passed one when none may touch."""
-    own: dict[tuple[str, str], list[Contact]] = {}
+    by_pair: dict[tuple[str, str], list[Contact]] = {}
     for contact in contacts:
         if contact.clearance_class is kind and not contact.is_allowed:
-            own.setdefault(contact.pair, []).append(contact)
-    checks = [_pair_collision(pair, found) for pair, found in own.items()]
+            by_pair.setdefault(contact.pair, []).append(contact)
+    checks = [_pair_collision(pair, contacts) for pair, contacts in by_pair.items()]
     open_pairs = [pair for pair in bound.of_class(kind) if pair.is_open]
     if not checks and all(pair.lowest > 0.0 for pair in open_pairs):
         message = f"collision: none in class {kind}, certified between the samples"
@@ -55,7 +55,7 @@ def collision_checks(bound: Bound, contacts: Sequence[Contact], times: Array, *,
     return checks + [_not_certified(bound, times, pair) for pair in open_pairs]
 
 
-def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: ClearanceMinimum) -> Check:
+def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, minimum: ClearanceMinimum) -> Check:
     """Whether every pair of a class keeps the demanded clearance; the check names the pair with the smallest margin.
 
     Where the accuracy of bodies is added to the demand, that is not always the pair that comes nearest.
@@ -65,11 +65,11 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, found: Cle
         times: Times of the samples in [s], shape (N,).
         found: Its smallest distance; zero where a pair touches.
     """
-    checks, kept = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]
-    names, at_s, distance = found.pair or ("", ""), found.at_s or 0.0, float(found.minimum or 0.0)
-    demand, reason, is_exact = checks.clearance_mm.si, "", found.exact
-    if checks.adds_accuracy and distance > 0.0 and kept:
-        worst = min(kept, key=lambda pair: pair.proved - pair.pair.demand)
+    checks, pairs = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]
+    names, at_s, distance = minimum.pair or ("", ""), minimum.at_s or 0.0, float(minimum.minimum or 0.0)
+    demand, reason, is_exact = checks.clearance_mm.si, "", minimum.exact
+    if checks.adds_accuracy and distance > 0.0 and pairs:
+        worst = min(pairs, key=lambda pair: pair.proved - pair.pair.demand)
         names, demand = bound.names(worst), worst.pair.demand
         at_s, distance = time_of(times, worst.at), worst.proved
         is_exact = worst.distance - distance <= EXACT_TOL

@@ -31,7 +31,7 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
     row, column = np.unravel_index(int(np.argmax(away)), away.shape)
     joint, value = robot.model.joints[column], float(away[row, column])
     unit, passed = joint.display_unit.name, value <= HOME_TOL
-    found = f"stays at its home, at most {value:.2g} {unit} from it" if passed else ""
+    outcome = f"stays at its home, at most {value:.2g} {unit} from it" if passed else ""
     far = f"joint {joint.name} is {value:.6g} {unit} from its home at {times[row]:.3f} s, although the robot is idle"
     return Check(
         name="home",
@@ -41,5 +41,5 @@ def _stands(robot: Robot, times: Array, q: Array) -> Check:
         limit=HOME_TOL,
         unit=unit,
         at_s=float(times[row]),
-        message=f"idle robot {robot.name}: {found or far}",
+        message=f"idle robot {robot.name}: {outcome or far}",
     )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from cellplan.certify.depths import FoundDepth, mounted_depths
+from cellplan.certify.depths import PairDepth, mounted_depths
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import Check
 from cellplan.model.units import MM
@@ -35,32 +35,32 @@ def check_mounting(scene: Scene, q: Array, times: Array | None = None) -> tuple[
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         times: Times of the samples in [s], shape (N,); None where there is no motion.
     """
-    found = mounted_depths(scene, q)
-    standing = [each for each in found if each.pair.mount is Mount.STANDING]
-    checks = [_check(scene, each, times) for each in found if each.pair.mount is not Mount.STANDING]
-    failed = [_check(scene, each, times) for each in standing if not _passed(each)]
+    depths = mounted_depths(scene, q)
+    standing = [depth for depth in depths if depth.pair.mount is Mount.STANDING]
+    checks = [_check(scene, depth, times) for depth in depths if depth.pair.mount is not Mount.STANDING]
+    failed = [_check(scene, depth, times) for depth in standing if not _passed(depth)]
     return (*checks, *(failed or _all_standing(scene, standing, times)))
 
 
-def _passed(found: FoundDepth) -> bool:
+def _passed(depth: PairDepth) -> bool:
     """Whether a depth is within its limit, apart from rounding."""
-    return found.depth <= found.pair.limit + DEPTH_TOL
+    return depth.depth <= depth.pair.limit + DEPTH_TOL
 
 
-def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
+def _check(scene: Scene, mounted: PairDepth, times: Array | None) -> Check:
     """The verdict on one pair."""
-    pair, (inner, outer) = found.pair, _named(scene, found)
-    depth, limit = MM * found.depth if found.depth > DEPTH_TOL else 0.0, MM * pair.limit
-    at_s = None if times is None or not pair.moves else float(times[found.row])
+    pair, (inner, outer) = mounted.pair, _named(scene, mounted)
+    depth, limit = MM * mounted.depth if mounted.depth > DEPTH_TOL else 0.0, MM * pair.limit
+    at_s = None if times is None or not pair.moves else float(times[mounted.row])
     instant = "" if at_s is None else f" at {at_s:.3f} s"
     share = f" ({limit - MM * pair.accuracy:g} mm beyond the accuracy of its body)" if pair.accuracy else ""
-    gap = MM * _gap(scene, found)
+    gap = MM * _gap(scene, mounted)
     if gap > 0.0:
         message = f"{inner} is {gap:.4g} mm away from {outer}: is the gripper open too far?"
     else:
         held = f"is {_shown(depth)} mm deep in {outer}{instant}" if depth > 0.0 else f"does not reach into {outer}"
         message = f"{inner} {held}, allowed {limit:g} mm{share}"
-    passed, cure = _passed(found), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
+    passed, cure = _passed(mounted), PIT_CURE if is_ground(scene.bodies[pair.second]) else CURES[pair.mount]
     return Check(
         name=str(pair.mount),
         subject=f"{inner} - {outer}",
@@ -73,22 +73,22 @@ def _check(scene: Scene, found: FoundDepth, times: Array | None) -> Check:
     )
 
 
-def _gap(scene: Scene, found: FoundDepth) -> float:
+def _gap(scene: Scene, depth: PairDepth) -> float:
     """How far in [m] a body that the cell names as gripping is from the part, where that is too far to grip it."""
-    if found.pair.mount is not Mount.GRIP or found.depth > 0.0:
+    if depth.pair.mount is not Mount.GRIP or depth.depth > 0.0:
         return 0.0
-    name, _ = _named(scene, found)
-    body = next(each for each in scene.bodies if each.name == name)
-    grasp = next((each for each in scene.cell.part.held_by if name in (each.bodies or ())), None)
+    name, _ = _named(scene, depth)
+    body = next(body for body in scene.bodies if body.name == name)
+    grasp = next((holder for holder in scene.cell.part.held_by if name in (holder.bodies or ())), None)
     gap = 0.0 if grasp is None else closed_gap(scene.cell, body, grasp)
     return gap if gap > FARTHEST_GRIP else 0.0
 
 
-def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | None) -> list[Check]:
+def _all_standing(scene: Scene, standing: Sequence[PairDepth], times: Array | None) -> list[Check]:
     """One passed check for all that stands, with the deepest; none where nothing stands."""
     if not standing:
         return []
-    deepest = max(standing, key=lambda each: each.depth)
+    deepest = max(standing, key=lambda depth: depth.depth)
     check = _check(scene, deepest, times)
     if deepest.depth > DEPTH_TOL:
         return [check]
@@ -97,10 +97,10 @@ def _all_standing(scene: Scene, standing: Sequence[FoundDepth], times: Array | N
     return [replace(check, subject="cell", value=0.0, message=message)]
 
 
-def _named(scene: Scene, found: FoundDepth) -> tuple[str, str]:
+def _named(scene: Scene, depth: PairDepth) -> tuple[str, str]:
     """The body that reaches into the other, and the other: holders into the part, robots and the part into things."""
-    bodies = [scene.bodies[found.pair.first], scene.bodies[found.pair.second]]
-    hosts = (Kind.PART,) if found.pair.mount is Mount.GRIP else (Kind.OBSTACLE, Kind.LINK)
+    bodies = [scene.bodies[depth.pair.first], scene.bodies[depth.pair.second]]
+    hosts = (Kind.PART,) if depth.pair.mount is Mount.GRIP else (Kind.OBSTACLE, Kind.LINK)
     if bodies[0].kind in hosts and bodies[1].kind not in hosts:
         bodies.reverse()
     return bodies[0].name, bodies[1].name

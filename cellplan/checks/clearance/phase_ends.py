@@ -32,7 +32,7 @@ from cellplan.scene.scene import Scene
 
 HALVINGS: Final = 14  # of a skew, from 200 ms to 12 us; below that none is proved
 PARTS: Final = 4  # stretches of each robot in which the places before and after an end are certified
-Kept = Callable[[float], bool]
+Predicate = Callable[[float], bool]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,7 +148,7 @@ def _across(end: _End, pair: PairSkew) -> PairSkew:
     return pair
 
 
-def _largest(is_kept: Kept, most: float) -> float:
+def _largest(is_kept: Predicate, most: float) -> float:
     """The largest skew in [s] up to the most of which it is kept, by halving."""
     if most <= 0.0 or is_kept(most):
         return most
@@ -164,7 +164,7 @@ def _largest(is_kept: Kept, most: float) -> float:
     return low
 
 
-def _demands(end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Kept]]:
+def _demands(end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Predicate]]:
     """What is demanded of two robots across an end, and whether a skew keeps it."""
     cell = end.before.scene.cell
     moves = [not stands_still(end.positions(MOST_SKEW)[1][:, cell.columns(name)]) for name in pair]
@@ -188,7 +188,7 @@ def _keeps_clearance(end: _End, pair: tuple[str, str], skew: float) -> bool:
         for j in range(PARTS)
         if after[j] - before[i + 1] < skew
     ]
-    rectangles = [index(np.concatenate(each)) for span in spans for each in (span, span[::-1])]
+    rectangles = [index(np.concatenate(ordered)) for span in spans for ordered in (span, span[::-1])]
     region = ClockRegion(first=pair[0], second=pair[1], rectangles=np.array(rectangles))
     scenes = {phase.place: phase.scene for phase in end.reached(skew)}
     return all(certify_regions(scene, q, [region])[0].is_kept for scene in scenes.values())
@@ -200,11 +200,11 @@ def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], 
     for scheduled in phase.schedule.tasks:
         task = scheduled.task
         if task.relative_to is Frame.PART:
-            own = depths.get(task.name)
+            depth = depths.get(task.name)
             yield (
                 task,
                 (task.tolerance.position_mm.si, task.tolerance.orientation_deg.si),
-                None if own is None else own.limit - own.depth,
+                None if depth is None else depth.limit - depth.depth,
             )
     cell = phase.scene.cell
     for grasp in cell.closures:
@@ -247,7 +247,7 @@ class _Tool:
         X_WT = self.phase.scene.chains[self.relation.robot].tool_poses(q[self.relation.robot])
         X_WP = part_poses(cell, self.phase.scene.chains, q)
         if isinstance(self.relation, Task):
-            schedule = next(each for each in self.phase.schedule.tasks if each.task.name == self.relation.name)
+            schedule = next(task for task in self.phase.schedule.tasks if task.task.name == self.relation.name)
             X_PT, desired = relative_to_task_frame(self.relation, X_WT, X_WP), schedule.X_PT[[row]]
         else:
             X_PT, desired = inverse(X_WP) @ X_WT, self.relation.X_PT[None]
@@ -268,13 +268,13 @@ class _Tool:
         only_part = q.copy()
         only_part[:, cell.columns(self.relation.robot)] = q[at, cell.columns(self.relation.robot)]
         X_WP = part_poses(cell, chains, {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots})
-        found = []
+        paths = []
         for poses, rows, seen_by in ((X_WT, q, None), (inverse(X_WP) @ X_WT[at], only_part, self.carrier)):
             chain, steps = arms.tool(self.relation.robot, seen_by=seen_by), arms.steps(rows)
             moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) + 0.5 * chain.bend(steps)
             turned = np.sqrt(0.5) * np.linalg.norm(np.diff(poses[:, :3, :3], axis=0), axis=(1, 2))
             ways = np.stack([moved, turned + 0.5 * chain.turn_bend(steps)], axis=1)
-            found.append(np.maximum(ways[:at].sum(axis=0), ways[at:].sum(axis=0)))
-        tool, part = found
+            paths.append(np.maximum(ways[:at].sum(axis=0), ways[at:].sum(axis=0)))
+        tool, part = paths
         part[0] += part[1] * tool[0]
         return tool, part

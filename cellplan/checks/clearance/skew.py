@@ -50,7 +50,7 @@ def allowed_skew(
     cell, times = scene.cell, schedule.times
     tools = tuple(_tools(scene, schedule, q, depths))
     moving, pairs = FreeMotion(scene, q), list(_apart(cell))
-    found = []
+    allowed = []
     for place, (first, second) in enumerate(pairs):
         progress(STAGE, place / len(pairs))
         limits = [limit for tool in tools if {tool.robot, tool.carrier} == {first, second} for limit in tool.limits()]
@@ -60,9 +60,9 @@ def allowed_skew(
         at_s = None if shift.at is None else float(np.interp(shift.at[0], np.arange(len(times)), times))
         bodies = "" if shift.bodies is None else " - ".join(shift.bodies)
         limits.append(AllowedSkew(limit=SkewLimit.CLEARANCE, skew=shift.shift, subject=bodies, at_s=at_s))
-        found.append(PairSkew(first=first, second=second, limits=tuple(limits), stated=_stated(cell, first, second)))
+        allowed.append(PairSkew(first=first, second=second, limits=tuple(limits), stated=_stated(cell, first, second)))
     results = tuple(tool.result(cell, float(times[-1])) for tool in tools)
-    return SkewReport(pairs=tuple(found), tools=results, groups=_groups(cell))
+    return SkewReport(pairs=tuple(allowed), tools=results, groups=_groups(cell))
 
 
 def has_clocks(cell: Cell) -> bool:
@@ -96,7 +96,9 @@ def _stated(cell: Cell, first: str, second: str) -> float | None:
     """Largest difference in [s] of two clocks: each statement holds for all others, so the smaller one does."""
     controls = [cell.robot(name).control for name in (first, second)]
     controllers = [cell.controllers.get(control.id) for control in controls if control is not None]
-    stated = [each.skew_ms.si for each in controllers if each is not None and each.skew_ms is not None]
+    stated = [
+        controller.skew_ms.si for controller in controllers if controller is not None and controller.skew_ms is not None
+    ]
     return min(stated, default=None)
 
 
@@ -112,7 +114,7 @@ class _Tool:
 
     def limits(self) -> Iterator[AllowedSkew]:
         """What tolerance and depth allow."""
-        skew, at_s = min(self.ways.position.allowed(), self.ways.orientation.allowed(), key=lambda found: found[0])
+        skew, at_s = min(self.ways.position.allowed(), self.ways.orientation.allowed(), key=lambda entry: entry[0])
         yield self._limit(SkewLimit.TOOL, skew, at_s)
         if self.depth is not None:
             yield self._limit(SkewLimit.DEPTH, *self.depth.allowed())

@@ -36,7 +36,7 @@ def standoffs(
         chains: Kinematics of each robot.
         q: Positions of each robot in [rad] or [m], shape (N, n).
     """
-    found = []
+    standoffs = []
     for scheduled in schedule.tasks:
         task, times = scheduled.task, schedule.times
         if task.relative_to is not Frame.PART:
@@ -46,8 +46,8 @@ def standoffs(
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(POSE_COUNT, len(rows))).round().astype(np.intp))]
         some = {name: values[rows] for name, values in q.items()}
         X_PT = inverse(part_poses(cell, chains, some)) @ chains[task.robot].tool_poses(some[task.robot])
-        found.append(standoff_on(cell, task, X_PT, times=times[rows]))
-    return tuple(found)
+        standoffs.append(standoff_on(cell, task, X_PT, times=times[rows]))
+    return tuple(standoffs)
 
 
 def standoff_on(cell: Cell, task: Task, X_PT: Array, *, times: Array | None = None) -> Standoff:
@@ -79,10 +79,10 @@ def standoff_on(cell: Cell, task: Task, X_PT: Array, *, times: Array | None = No
     )
 
 
-def check_standoffs(cell: Cell, found: Sequence[Standoff]) -> list[Check]:
+def check_standoffs(cell: Cell, standoffs: Sequence[Standoff]) -> list[Check]:
     """Distances against what each task states; those of tasks that state nothing count for a process only."""
-    tasks = [(cell.task(each.task), each) for each in found]
-    return [_check(task, each) for task, each in tasks if task.standoff is not None or task.process is not None]
+    tasks = [(cell.task(standoff.task), standoff) for standoff in standoffs]
+    return [_check(task, standoff) for task, standoff in tasks if task.standoff is not None or task.process is not None]
 
 
 def _along(shape: Solid, X_ST: Array) -> Array:
@@ -100,7 +100,7 @@ def _nearest(shape: Solid, points: Array) -> Array:
     p = np.stack([points, np.zeros_like(points)])
     poses = BodyPoses(np.broadcast_to(np.eye(3), (2, len(points), 3, 3)), p)
     readings = [measure(engine, (0, 1), poses, sample=sample) for sample in range(len(points))]
-    return np.array([0.0 if each.touches else each.bound + TIP_RADIUS for each in readings])
+    return np.array([0.0 if reading.touches else reading.bound + TIP_RADIUS for reading in readings])
 
 
 def _excused(task: Task, is_off: Flags, p_PT: Array) -> tuple[Flags, Mapping[str, float]]:
@@ -124,30 +124,30 @@ def _excused(task: Task, is_off: Flags, p_PT: Array) -> tuple[Flags, Mapping[str
     return excused, lengths
 
 
-def _check(task: Task, found: Standoff) -> Check:
+def _check(task: Task, standoff: Standoff) -> Check:
     """The check of one task."""
     low, high = task.standoff or (0.0, UNSTATED)
-    judged = found.worst_along if low > 0.0 else found.worst_nearest
-    when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
-    meets = not np.isinf(found.worst_along)
-    axis = f"{MM * found.worst_along:.1f} mm along its axis" if meets else "which its axis does not meet"
+    judged = standoff.worst_along if low > 0.0 else standoff.worst_nearest
+    when = " on its path" if standoff.at_s is None else f" at {standoff.at_s:.3f} s"
+    meets = not np.isinf(standoff.worst_along)
+    axis = f"{MM * standoff.worst_along:.1f} mm along its axis" if meets else "which its axis does not meet"
     key = "no standoff_mm is stated" if task.standoff is None else f"standoff_mm = [{MM * low:g}, {MM * high:g}]"
-    where = f"the tip is {MM * found.worst_nearest:.1f} mm from the part{when}, {axis}"
+    where = f"the tip is {MM * standoff.worst_nearest:.1f} mm from the part{when}, {axis}"
     message = f"standoff of task '{task.name}': {where}"
     cure = (
         f"allowed {MM * low:g} to {MM * high:g} mm and its tolerance ({key}): put the path on the part, state the "
         "distance of the process, or name where the tool may leave the part (off_part: [run_in, run_out, cut])"
     )
-    if found.excused:
-        names = ", ".join(f"{name} over {MM * length:.1f} mm" for name, length in found.excused.items())
+    if standoff.excused:
+        names = ", ".join(f"{name} over {MM * length:.1f} mm" for name, length in standoff.excused.items())
         message += f"; excused: {names}"
     return Check(
         name="standoff",
         subject=task.name,
-        passed=not found.is_off,
+        passed=not standoff.is_off,
         value=float(min(MM * judged, 1e6)),
         limit=MM * (low if judged < low else high),
         unit="mm",
-        at_s=found.at_s,
-        message=f"{message}; {cure}" if found.is_off else message,
+        at_s=standoff.at_s,
+        message=f"{message}; {cure}" if standoff.is_off else message,
     )

@@ -77,7 +77,7 @@ def one_stop(scene: Scene, schedule: Schedule, q: Mapping[str, Array], *, robot:
     return stops.report(lambda first, second: stops.single(first, second, robot=robot, at=at))
 
 
-def check_stops(cell: Cell, found: StopReport | None) -> list[Check]:
+def check_stops(cell: Cell, report: StopReport | None) -> list[Check]:
     """Depth and distance against what the cell demands of stops; none where it demands nothing.
 
     Args:
@@ -87,17 +87,17 @@ def check_stops(cell: Cell, found: StopReport | None) -> list[Check]:
     if demand is None:
         return []
     limits = {"stop_depth": demand.depth_mm, "stop_clearance": demand.clearance_mm}
-    if found is None:
+    if report is None:
         return [_unknown(name, limit) for name, limit in limits.items() if limit is not None]
     checks = []
     if demand.depth_mm is not None:
-        deepest = found.deepest
+        deepest = report.deepest
         depth = 0.0 if deepest is None else deepest.depth
         of = "no tool" if deepest is None else f"tool of task '{deepest.task}'"
         passed, values = depth <= demand.depth_mm.si + DEPTH_TOL, (MM * depth, demand.depth_mm)
         checks.append(_check("stop_depth", passed, values, of, None if deepest is None else deepest.worst))
     if demand.clearance_mm is not None:
-        nearest = found.nearest
+        nearest = report.nearest
         distance = np.inf if nearest is None else min(nearest.proved, nearest.distance)
         of = "no two robots" if nearest is None or nearest.bodies is None else " - ".join(nearest.bodies)
         passed, values = distance >= demand.clearance_mm.si, (MM * float(min(distance, 1e6)), demand.clearance_mm)
@@ -159,8 +159,8 @@ class _Band:
 
     def times(self, samples: Array, leads: Array) -> tuple[Array, Array]:
         """Times of both robots in [s] for all samples with all leads, shape (I L,) each."""
-        own, lead = (each.ravel() for each in np.meshgrid(samples, leads, indexing="ij"))
-        return (own - lead, own) if self.of_second else (own, own + lead)
+        sample, lead = (grid.ravel() for grid in np.meshgrid(samples, leads, indexing="ij"))
+        return (sample - lead, sample) if self.of_second else (sample, sample + lead)
 
 
 Bands = Callable[[str, str], "_Band | None"]
@@ -170,12 +170,12 @@ def _depths(cell: Cell, robot: str, X_PT: Array) -> Array:
     """Depths of a tool at poses on the part: its bodies count at even ones of many, and where its axis is deepest."""
     if len(X_PT) <= BODY_POSES:
         return tool_depth_at(cell, robot, X_PT)
-    found = tool_axis_depths(cell, robot, X_PT)
+    depths = tool_axis_depths(cell, robot, X_PT)
     half = BODY_POSES // 2
     some = np.linspace(0, len(X_PT) - 1, half).round().astype(np.intp)
-    chosen = np.union1d(some, np.argsort(-found, kind="stable")[:half])
-    found[chosen] = tool_depth_at(cell, robot, X_PT[chosen])
-    return found
+    chosen = np.union1d(some, np.argsort(-depths, kind="stable")[:half])
+    depths[chosen] = tool_depth_at(cell, robot, X_PT[chosen])
+    return depths
 
 
 def _without_touching(scene: Scene) -> Scene:
@@ -186,14 +186,14 @@ def _without_touching(scene: Scene) -> Scene:
 
 def _nearest(scene: Scene, q: Array, regions: Sequence[ClockRegion]) -> list[RegionBound]:
     """Distances in some regions: the smallest of all is searched for, the others are proved to be no smaller."""
-    found = list(certify_regions(scene, q, regions)) if regions else []
-    waiting = sorted(range(len(found)), key=lambda place: (found[place].is_kept, found[place].proved))
-    first = [place for place in waiting if not found[place].is_kept] or waiting[:1]
-    _search(scene, q, regions, places=first, found=found)
-    level = min((bound.distance for bound in found), default=np.inf)
+    bounds = list(certify_regions(scene, q, regions)) if regions else []
+    waiting = sorted(range(len(bounds)), key=lambda place: (bounds[place].is_kept, bounds[place].proved))
+    first = [place for place in waiting if not bounds[place].is_kept] or waiting[:1]
+    _search(scene, q, regions, places=first, bounds=bounds)
+    level = min((bound.distance for bound in bounds), default=np.inf)
     rest = [place for place in waiting if place not in first]
     if not rest or not level > 0.0:
-        return found
+        return bounds
     farther = tuple(
         replace(pair, demand=max(pair.demand, level)) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs
     )
@@ -201,35 +201,35 @@ def _nearest(scene: Scene, q: Array, regions: Sequence[ClockRegion]) -> list[Reg
         rest, certify_regions(replace(scene, pairs=farther), q, [regions[place] for place in rest]), strict=True
     ):
         if bound.is_kept:
-            found[place] = bound
-    _search(scene, q, regions, places=[place for place in rest if not found[place].proved >= level], found=found)
-    return found
+            bounds[place] = bound
+    _search(scene, q, regions, places=[place for place in rest if not bounds[place].proved >= level], bounds=bounds)
+    return bounds
 
 
 def _search(
-    scene: Scene, q: Array, regions: Sequence[ClockRegion], *, places: Sequence[int], found: list[RegionBound]
+    scene: Scene, q: Array, regions: Sequence[ClockRegion], *, places: Sequence[int], bounds: list[RegionBound]
 ) -> None:
     """Search for the smallest distances of some of the regions."""
     if places:
-        own = certify_regions(scene, q, [regions[place] for place in places], with_minimum=True)
-        for place, bound in zip(places, own, strict=True):
-            found[place] = bound
+        sharper = certify_regions(scene, q, [regions[place] for place in places], with_minimum=True)
+        for place, bound in zip(places, sharper, strict=True):
+            bounds[place] = bound
 
 
 class _Stops:
     """Stops in one motion."""
 
     def __init__(self, scene: Scene, schedule: Schedule, q: Mapping[str, Array], going: Mapping[str, float]) -> None:
-        self._scene = _without_touching(scene_of_run(scene, [each.task.name for each in schedule.tasks]))
+        self._scene = _without_touching(scene_of_run(scene, [task.task.name for task in schedule.tasks]))
         self._cell, self._times, self._q, self._going = scene.cell, schedule.times, q, going
-        self._tasks = [each.task for each in schedule.tasks if each.task.relative_to is Frame.PART]
+        self._tasks = [task.task for task in schedule.tasks if task.task.relative_to is Frame.PART]
         self._standing = {name for name, rows in q.items() if stands_still(rows)}
 
     def report(self, bands: Bands) -> StopReport:
         """All figures over the bands of two robots, by their names."""
         robots = [robot.name for robot in self._cell.robots]
-        found = {pair: band_ for pair in combinations(robots, 2) if (band_ := bands(*pair)) is not None}
-        regions = [ClockRegion(first=a, second=b, rectangles=each.rectangles) for (a, b), each in found.items()]
+        pair_bands = {pair: band_ for pair in combinations(robots, 2) if (band_ := bands(*pair)) is not None}
+        regions = [ClockRegion(first=a, second=b, rectangles=band.rectangles) for (a, b), band in pair_bands.items()]
         q = np.concatenate([self._q[name] for name in robots], axis=1)
         bounds = _nearest(self._scene, q, regions)
         return StopReport(
@@ -297,25 +297,25 @@ class _Stops:
         if self._cell.carrier is None:
             return []
         carrier = self._cell.robots[self._cell.carrier].name
-        found = []
+        depths = []
         for task in self._tasks:
-            own = bands(carrier, task.robot)
-            if own is None or task.robot == carrier:
+            band = bands(carrier, task.robot)
+            if band is None or task.robot == carrier:
                 continue
 
             def depth(t_part: Array, t_tool: Array, robot: str = task.robot) -> Array:
                 return _depths(self._cell, robot, self._on_part(robot, t_part, t_tool))
 
-            value, times = self._largest(depth, own)
+            value, times = self._largest(depth, band)
             worst = self._instant((carrier, task.robot), times) if value > SAME_PLACE else None
-            found.append(StopDepth(task=task.name, depth=value, worst=worst))
-        return found
+            depths.append(StopDepth(task=task.name, depth=value, worst=worst))
+        return depths
 
     def _grip(self, grasp: Grasp, bands: Bands) -> StopGrip:
         """How far a further holder is drawn from its grasp, or from the other holder."""
         carrier = self._cell.positioners[0]
-        own = bands(carrier, grasp.robot)
-        if own is None:
+        band = bands(carrier, grasp.robot)
+        if band is None:
             return StopGrip(robot=grasp.robot, distance=0.0, worst=None)
 
         def distance(t_part: Array, t_tool: Array) -> Array:
@@ -323,7 +323,7 @@ class _Stops:
             error = errors_on_part(X_PT, np.broadcast_to(grasp.X_PT, X_PT.shape), grasp)
             return np.linalg.norm(error[:, :3], axis=1)
 
-        value, times = self._largest(distance, own)
+        value, times = self._largest(distance, band)
         worst = self._instant((carrier, grasp.robot), times) if value > SAME_PLACE else None
         return StopGrip(robot=grasp.robot, distance=value, worst=worst)
 
@@ -344,7 +344,7 @@ class _Stops:
         samples, spread, step = band_.samples, band_.spread, float(np.diff(leads).max(initial=0.0))
         value, at = -np.inf, (0.0, 0.0)
         for _ in range(1 + ROUNDS):
-            t_first, t_second = (np.clip(each, 0.0, self._times[-1]) for each in band_.times(samples, leads))
+            t_first, t_second = (np.clip(times, 0.0, self._times[-1]) for times in band_.times(samples, leads))
             values = figure(t_first, t_second)
             best = int(np.argmax(values))
             if values[best] > value:
@@ -359,10 +359,10 @@ class _Stops:
 def _along_one(count: int, first_stands: bool, second_stands: bool) -> Array:
     """Rectangles of two robots of which one stands still in its first row; both where none moves."""
     edges = np.linspace(0.0, count - 1, 1 + min(count - 1, MAX_PIECES))
-    own, rest = np.column_stack([edges[:-1], edges[1:]]), np.zeros((len(edges) - 1, 2))
+    varied, rest = np.column_stack([edges[:-1], edges[1:]]), np.zeros((len(edges) - 1, 2))
     if first_stands and second_stands:
         return np.zeros((1, 4))
-    return np.hstack([rest, own] if first_stands else [own, rest])
+    return np.hstack([rest, varied] if first_stands else [varied, rest])
 
 
 def _met(bound: RegionBound, standing: Collection[str]) -> tuple[float, float]:

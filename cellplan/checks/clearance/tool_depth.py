@@ -50,9 +50,9 @@ def tool_depths(
     )
 
 
-def check_depths(cell: Cell, found: Sequence[ToolDepth]) -> list[Check]:
+def check_depths(cell: Cell, depths: Sequence[ToolDepth]) -> list[Check]:
     """The depth of each task's tool against what the task, or else the cell, allows."""
-    return [_check(cell.task(depth.task), depth) for depth in found]
+    return [_check(cell.task(depth.task), depth) for depth in depths]
 
 
 def path_depth(cell: Cell, task: Task, X_PT: Array) -> ToolDepth | None:
@@ -82,13 +82,13 @@ def tool_axis_depths(cell: Cell, robot: str, X_PT: Array) -> Array:
 
 def tool_depth_at(cell: Cell, robot: str, X_PT: Array) -> Array:
     """Depth in [m] of a robot's tool, axis and bodies, at any poses of it on the part, shape (N, 4, 4), shape (N,)."""
-    placed, found = cell.robot(robot), tool_axis_depths(cell, robot, X_PT)
+    placed, depth = cell.robot(robot), tool_axis_depths(cell, robot, X_PT)
     X_ST, zone = inverse(cell.part.X_PS) @ X_PT, cell.checks.contact_zone_mm.si
     for body in placed.bodies_at_work:
         columns = body_columns(body.shape, inverse(placed.tool.X_FT) @ body.X_BS, zone)
         if len(columns.line):
-            found = np.maximum(found, depths(columns, cell.part.shape, X_ST))
-    return found
+            depth = np.maximum(depth, depths(columns, cell.part.shape, X_ST))
+    return depth
 
 
 def tool_reach(cell: Cell, robot: str) -> float:
@@ -96,7 +96,7 @@ def tool_reach(cell: Cell, robot: str) -> float:
     tool, bodies, zone = cell.robot(robot).tool, cell.robot(robot).bodies_at_work, cell.checks.contact_zone_mm.si
     along = abs(float(tool.X_FT[:3, 3] @ tool.X_FT[:3, 2]))
     columns = (body_columns(body.shape, inverse(tool.X_FT) @ body.X_BS, zone) for body in bodies)
-    return max([along, zone, *(each.reach for each in columns)])
+    return max([along, zone, *(column.reach for column in columns)])
 
 
 def _task_depth(
@@ -129,8 +129,8 @@ def _tool_on_part(
 ) -> tuple[Array, Array]:
     """Times in [s] and tool poses on the part there; long steps are cut, every joint moving linearly in them."""
     movers = {task.robot, *(grasp.robot for grasp in cell.part.held_by[:1])}
-    own = {name: q[name] for name in sorted(movers)}
-    X_PT = inverse(part_poses(cell, chains, own)) @ chains[task.robot].tool_poses(own[task.robot])
+    positions = {name: q[name] for name in sorted(movers)}
+    X_PT = inverse(part_poses(cell, chains, positions)) @ chains[task.robot].tool_poses(positions[task.robot])
     longest = float(np.linalg.norm(np.diff(X_PT[:, :3, 3], axis=0), axis=1).max(initial=0.0))
     parts = min(int(np.ceil(longest / FINE_STEP)), MAX_TIMES // max(1, len(times) - 1))
     if parts < 2:
@@ -138,7 +138,7 @@ def _tool_on_part(
     rows = np.arange(parts * (len(times) - 1) + 1) / parts
     whole = np.minimum(rows.astype(np.intp), len(times) - 2)
     share = (rows - whole)[:, None]
-    fine = {name: values[whole] + share * (values[whole + 1] - values[whole]) for name, values in own.items()}
+    fine = {name: values[whole] + share * (values[whole + 1] - values[whole]) for name, values in positions.items()}
     fine_times = times[whole] + share[:, 0] * (times[whole + 1] - times[whole])
     return fine_times, inverse(part_poses(cell, chains, fine)) @ chains[task.robot].tool_poses(fine[task.robot])
 
@@ -149,9 +149,9 @@ def _deepest(columns: Columns, cell: Cell, X_ST: Array) -> tuple[int, float]:
         return 0, 0.0
     shape = cell.part.shape
     rows = _even_steps(columns, X_ST, MESH_POSE_COUNT if isinstance(shape, Mesh) else POSE_COUNT)
-    found = depths(columns, shape, X_ST[rows])
-    worst = int(np.argmax(found))
-    if not found[worst] > 0.0:
+    deepest = depths(columns, shape, X_ST[rows])
+    worst = int(np.argmax(deepest))
+    if not deepest[worst] > 0.0:
         return int(rows[worst]), 0.0
     low, high = rows[max(worst - 1, 0)], rows[min(worst + 1, len(rows) - 1)]
     near = np.unique(np.append(np.linspace(low, high, NEAR_WORST_COUNT).astype(np.intp), rows[worst]))
@@ -170,12 +170,12 @@ def _even_steps(columns: Columns, X_ST: Array, most: int) -> NDArray[np.intp]:
     return np.unique(np.append(np.searchsorted(moved, marks), len(X_ST) - 1))
 
 
-def _check(task: Task, found: ToolDepth) -> Check:
+def _check(task: Task, tool_depth: ToolDepth) -> Check:
     """The check of one task."""
-    depth, limit = MM * found.depth, MM * found.limit
-    passed = found.depth <= found.limit + DEPTH_TOL
-    what = "its axis" if found.body == AXIS else f"{found.robot}/{found.body}"
-    when = " on its path" if found.at_s is None else f" at {found.at_s:.3f} s"
+    depth, limit = MM * tool_depth.depth, MM * tool_depth.limit
+    passed = tool_depth.depth <= tool_depth.limit + DEPTH_TOL
+    what = "its axis" if tool_depth.body == AXIS else f"{tool_depth.robot}/{tool_depth.body}"
+    when = " on its path" if tool_depth.at_s is None else f" at {tool_depth.at_s:.3f} s"
     message = (
         f"tool depth of task '{task.name}': {depth:.3g} mm of the tool is inside the part or beyond it{when} ({what}), "
         f"allowed {limit:g} mm"
@@ -187,12 +187,12 @@ def _check(task: Task, found: ToolDepth) -> Check:
         value=depth,
         limit=limit,
         unit="mm",
-        at_s=found.at_s,
-        message=message if passed else f"{message}; {', or '.join(_cures(task, found))}",
+        at_s=tool_depth.at_s,
+        message=message if passed else f"{message}; {', or '.join(_cures(task, tool_depth))}",
     )
 
 
-def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
+def _cures(task: Task, depth: ToolDepth) -> Iterator[str]:
     """What may be wrong when a tool is too deep."""
     if task.project is not None and task.tool_axis is not None and task.tool_axis @ task.project > 0.0:
         yield "reverse tool_axis: it points out of the surface, so the tool passes through the part"
@@ -200,7 +200,7 @@ def _cures(task: Task, found: ToolDepth) -> Iterator[str]:
         yield "check the points and axes of the file: points must lie on the surface, axes must point into it"
     elif task.project is None:
         yield "project the path onto the surface (path.project), or check its pose, the sign of offset_mm and tool_axis"
-    elif found.body == AXIS:
+    elif depth.body == AXIS:
         yield "check the tool's pose and the side that the path is projected from"
     else:
         yield "use a slimmer tool or another tool_axis: the surface is concave or inclined there"

@@ -90,15 +90,15 @@ def retimed_jerk_limit(cell: Cell, robot: Robot, index: int) -> float | None:
     return None if limit is None or not cell.motion.build_up else limit / cell.motion.build_up
 
 
-def check_accelerations(cell: Cell, found: MotionAccelerations) -> list[Check]:
+def check_accelerations(cell: Cell, accelerations: MotionAccelerations) -> list[Check]:
     """Acceleration of every joint that has a limit, jerk where a limit is stated, and that of the part."""
     checks: list[Check] = []
-    for use in found.joints:
+    for use in accelerations.joints:
         checks += [] if use.limit is None else [_check_acceleration(cell, use, use.limit)]
         checks += [] if use.jerk_limit is None else [_check_jerk(use, use.jerk_limit)]
     limit = cell.checks.part_acceleration_m_s2
-    if limit is not None and found.part is not None:
-        checks.append(_check_part(found.part.corner, limit))
+    if limit is not None and accelerations.part is not None:
+        checks.append(_check_part(accelerations.part.corner, limit))
     return checks
 
 
@@ -149,8 +149,8 @@ def part_acceleration(cell: Cell, times: Array, X_WP: Array, *, window: float) -
     middle, half = bounding_box(cell.part.shape)
     points_S = middle + half * np.array([(0, 0, 0), *product((-1, 1), repeat=3)])
     points_P = points_S @ cell.part.X_PS[:3, :3].T + cell.part.X_PS[:3, 3]
-    found = [_point(times, (X_WP[:, :3, :3] @ p + X_WP[:, :3, 3])[:, None], window=window)[0] for p in points_P]
-    centre, *corners = found
+    points = [_point(times, (X_WP[:, :3, :3] @ p + X_WP[:, :3, 3])[:, None], window=window)[0] for p in points_P]
+    centre, *corners = points
     most = max(corners, key=lambda corner: corner.peak)
     jerk = max(corners, key=lambda corner: corner.peak_jerk)
     most = replace(most, peak_jerk=jerk.peak_jerk, peak_jerk_at_s=jerk.peak_jerk_at_s)
@@ -161,10 +161,10 @@ def _point(times: Array, points: Array, *, window: float) -> tuple[PointAccelera
     """Points in the world, shape (N, n, 3)."""
     accelerations = point_accelerations(times, points)
     sizes, jerk = np.linalg.norm(accelerations, axis=-1), jerks(times, accelerations, window=window)
-    found = []
+    of_points = []
     for index in range(points.shape[1]):
         k, m = first_peak(sizes[:, index]), first_peak(jerk[:, index])
-        found.append(
+        of_points.append(
             PointAcceleration(
                 peak=float(sizes[:, index].max()),
                 peak_at_s=float(times[k]),
@@ -173,7 +173,7 @@ def _point(times: Array, points: Array, *, window: float) -> tuple[PointAccelera
                 window=window,
             )
         )
-    return tuple(found)
+    return tuple(of_points)
 
 
 def _not_judged(cell: Cell) -> Iterator[NotJudged]:

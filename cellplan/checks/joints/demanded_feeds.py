@@ -18,7 +18,7 @@ from cellplan.model.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
 
-BESIDE: Final = 2  # [-] rows on both sides of a place whose accelerations count there
+NEIGHBOURS: Final = 2  # [-] rows on both sides of a place whose accelerations count there
 PERCENT: Final = 100.0
 
 
@@ -52,8 +52,8 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
 
 def _check_delay(task: Task, process: ProcessEntry, key: str, took: tuple[float, float], *, step: float) -> Check:
     """The begin of a delay and the time that it takes in a retimed program, in [s]: at most what its rate allows."""
-    asked = process.on_delay_s if key == "on_delay" else process.off_delay_s
-    limit = asked / (1.0 - process.tolerance) + step
+    delay = process.on_delay_s if key == "on_delay" else process.off_delay_s
+    limit = delay / (1.0 - process.tolerance) + step
     return Check(
         name=f"process_{key}",
         subject=task.name,
@@ -62,7 +62,7 @@ def _check_delay(task: Task, process: ProcessEntry, key: str, took: tuple[float,
         limit=limit,
         unit="s",
         at_s=took[0],
-        message=f"{key}_s of task '{task.name}': {took[1]:.4g} s at {took[0]:.3f} s, demanded {asked:g} s within "
+        message=f"{key}_s of task '{task.name}': {took[1]:.4g} s at {took[0]:.3f} s, demanded {delay:g} s within "
         f"{process.tolerance_percent:g} % and a step",
     )
 
@@ -77,23 +77,23 @@ def nearest_to_limit(cell: Cell, times: Array, q: Mapping[str, Array], step: int
         q: Positions by robot in [rad] or [m], shape (N, n) each.
         step: Number of the first row of the step.
     """
-    around = slice(max(0, step - BESIDE), step + BESIDE + 2)
-    found = []
+    around = slice(max(0, step - NEIGHBOURS), step + NEIGHBOURS + 2)
+    nearest = []
     for robot in cell.robots:
-        own, h = q[robot.name], times[step + 1] - times[step]
-        velocity = np.abs(own[step + 1] - own[step]) / h
-        signed = point_accelerations(times, own)
+        positions, h = q[robot.name], times[step + 1] - times[step]
+        velocity = np.abs(positions[step + 1] - positions[step]) / h
+        signed = point_accelerations(times, positions)
         acceleration = np.abs(signed)[around].max(axis=0)
         jerk = jerks(times, signed[..., None], window=robot.controller_cycle)[around].max(axis=0)
         for index, joint in enumerate(robot.model.joints):
             name, limit = f"{robot.name} {joint.name}", acceleration_limit(robot, index)[0]
-            found.append((float(velocity[index] / joint.velocity), name, "velocity"))
+            nearest.append((float(velocity[index] / joint.velocity), name, "velocity"))
             most = None if cell.motion.timing is Timing.AS_WRITTEN else retimed_jerk_limit(cell, robot, index)
             if most is not None:
-                found.append((float(jerk[index] / most), name, "jerk"))
+                nearest.append((float(jerk[index] / most), name, "jerk"))
             if limit is not None:
-                found.append((float(acceleration[index] / limit), name, "acceleration"))
-    share, joint_name, kind = max(found)
+                nearest.append((float(acceleration[index] / limit), name, "acceleration"))
+    share, joint_name, kind = max(nearest)
     return joint_name, kind, share
 
 

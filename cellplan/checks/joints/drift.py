@@ -52,7 +52,7 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
     return Repeatability(cycle_times=cycle_times, drifts=tuple(drifts), closes=closes)
 
 
-def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
+def check_joint_drift(repeatability: Repeatability | None, *, is_demanded: bool) -> tuple[Check, ...]:
     """Whether every joint comes back in every cycle; nothing is checked when the cell does not demand it.
 
     Args:
@@ -61,7 +61,7 @@ def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tupl
     """
     if not is_demanded:
         return ()
-    if found is None:
+    if repeatability is None:
         message = "joint drift: there is no cycle to judge, as not all tools come back to the pose of their start"
         return (
             Check(
@@ -75,7 +75,7 @@ def check_joint_drift(found: Repeatability | None, *, is_demanded: bool) -> tupl
                 message=message,
             ),
         )
-    return tuple(_check(found, drift) for drift in found.drifts)
+    return tuple(_check(repeatability, drift) for drift in repeatability.drifts)
 
 
 def _cycle_times(schedule: Schedule) -> Array:
@@ -94,7 +94,7 @@ def _limit(drift: JointDrift) -> float:
     return REVOLUTE_DRIFT_TOL if drift.is_revolute else PRISMATIC_DRIFT_TOL
 
 
-def _check(found: Repeatability, drift: JointDrift) -> Check:
+def _check(drifts: Repeatability, drift: JointDrift) -> Check:
     """One joint against its limit."""
     unit, scale = drift.display_unit
     value, limit = scale * drift.worst, scale * _limit(drift)
@@ -105,7 +105,7 @@ def _check(found: Repeatability, drift: JointDrift) -> Check:
         value=value,
         limit=limit,
         unit=unit,
-        at_s=float(found.cycle_times[drift.at_cycle]),
+        at_s=float(drifts.cycle_times[drift.at_cycle]),
         message=f"{drift.robot} {drift.joint} is {value:.3g} {unit} away from its position one cycle earlier, "
-        f"at {found.cycle_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
+        f"at {drifts.cycle_times[drift.at_cycle]:.3f} s, the end of cycle {drift.at_cycle}; allowed {limit:g} {unit}",
     )

@@ -28,12 +28,18 @@ def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:
         step = float(after.times[1] - after.times[0])
         for robot in cell.robots:
             one, other = before.q[robot.name], after.q[robot.name]
-            found = np.abs((other[1] - other[0]) - (one[-1] - one[-2])) / step**2
+            accelerations = np.abs((other[1] - other[0]) - (one[-1] - one[-2])) / step**2
             for index, joint in enumerate(robot.model.joints):
                 limit, (unit, scale) = acceleration_limit(robot, index)[0], joint.display_unit
-                if limit is not None and float(found[index]) / limit > worst[0]:
+                if limit is not None and float(accelerations[index]) / limit > worst[0]:
                     name = f"{robot.name}/{joint.name} at the begin of {after.phase}"
-                    worst = (float(found[index]) / limit, name, scale * float(found[index]), scale * limit, unit)
+                    worst = (
+                        float(accelerations[index]) / limit,
+                        name,
+                        scale * float(accelerations[index]),
+                        scale * limit,
+                        unit,
+                    )
     share, name, value, allowed, unit = worst
     verdict = "keeps its acceleration limit" if share <= 1.0 else "exceeds its acceleration limit"
     message = f"where phases meet: joint {name} {verdict}: {value:.4g} {unit}/s2, limit {allowed:.5g} {unit}/s2"

@@ -86,7 +86,7 @@ def _load_use(cell: Cell, robot: Robot, chain: ScrewChain, *, times: Array, q: A
     D = chain.link_displacements(q)
     X_WF = D[:, robot.model.flange_link + 1] @ robot.model.X_BF
     carried = [_carried(mass, X_WF, times) for mass in masses]
-    felt = np.linalg.norm(np.sum([each.force for each in carried], axis=0), axis=1) / GRAVITY
+    felt = np.linalg.norm(np.sum([load.force for load in carried], axis=0), axis=1) / GRAVITY
     return replace(
         use,
         centre_F=np.sum([mass.mass * mass.centre_F for mass in masses], axis=0) / use.known_mass,
@@ -145,11 +145,11 @@ def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array)
     s = D[:, :3, :3] @ joint.axis_B
     s0 = D[:, :3, :3] @ joint.point_B + D[:, :3, 3]
     static, moving, inertia = np.zeros((3, len(times)))
-    for each in carried:
-        arm = each.points - s0
-        static += np.sum(s * np.cross(arm, each.mass * GRAVITY * UP), axis=1)
-        moving += np.sum(s * np.cross(arm, each.force), axis=1)
-        inertia += each.mass * np.sum(np.cross(s, arm) ** 2, axis=1) + np.einsum("ni,nij,nj->n", s, each.inertia, s)
+    for load in carried:
+        arm = load.points - s0
+        static += np.sum(s * np.cross(arm, load.mass * GRAVITY * UP), axis=1)
+        moving += np.sum(s * np.cross(arm, load.force), axis=1)
+        inertia += load.mass * np.sum(np.cross(s, arm) ** 2, axis=1) + np.einsum("ni,nij,nj->n", s, load.inertia, s)
     static, moving = np.abs(static), np.abs(moving)
     return AxisUse(
         joint=joint.name,
@@ -170,7 +170,7 @@ def _checks(use: LoadUse) -> list[Check]:
     checks = [_mass_check(use, limits)]
     if use.centre_F is not None:
         checks += _centre_checks(use, limits)
-        for axis in (each for each in use.axes if each.joint in limits.axes):
+        for axis in (axis for axis in use.axes if axis.joint in limits.axes):
             checks += _axis_checks(use, axis, limits.axes[axis.joint])
     return checks
 

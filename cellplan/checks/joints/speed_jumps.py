@@ -19,9 +19,9 @@ def desired_jumps(schedule: Schedule) -> Array:
     So it does where a constant law starts, passes a corner or ends, and where a trajectory starts or ends at speed.
     """
     jump_times = schedule.jumps
-    beside = np.concatenate([jump_times - SIDE_S, jump_times, jump_times + SIDE_S])
+    around = np.concatenate([jump_times - SIDE_S, jump_times, jump_times + SIDE_S])
     is_jump = np.zeros(len(jump_times), dtype=bool)
-    for X_PT in schedule.poses(np.clip(beside, 0.0, float(schedule.times[-1]))):
+    for X_PT in schedule.poses(np.clip(around, 0.0, float(schedule.times[-1]))):
         before, at, after = np.split(X_PT, 3)
         change = (after[:, :3, 3] - 2.0 * at[:, :3, 3] + before[:, :3, 3]) / SIDE_S
         turn = (_turns(at, after) - _turns(before, at)) / SIDE_S

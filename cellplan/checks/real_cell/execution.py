@@ -35,10 +35,10 @@ class RealCell:
         Returns:
             Poses X_PT, shape (N, 4, 4) each.
         """
-        own = {robot.name: q[:, self._cell.columns(robot.name)] for robot in self._cell.robots}
-        X_WP = part_poses(self._cell, self._chains, own)
+        positions = {robot.name: q[:, self._cell.columns(robot.name)] for robot in self._cell.robots}
+        X_WP = part_poses(self._cell, self._chains, positions)
         in_world = {task.robot for task in self._cell.tasks if task.relative_to is Frame.WORLD}
-        X_WT = {name: self._chains[name].tool_poses(own[name]) for name in robots}
+        X_WT = {name: self._chains[name].tool_poses(positions[name]) for name in robots}
         return tuple(X_WT[name] if name in in_world else inverse(X_WP) @ X_WT[name] for name in robots)
 
     def accuracy(self, schedule: Schedule, q: Array) -> tuple[TaskAccuracy, ...]:

@@ -46,7 +46,7 @@ def _check(cell: Cell, run: RunRehearsal, place: int, kind: int) -> Check:
     task = cell.task(errors[0].task)
     first = run.judged_from[task.name]
     series = np.stack(
-        [np.linalg.norm((each.position_error, each.orientation_error)[kind][first:], axis=1) for each in errors]
+        [np.linalg.norm((error.position_error, error.orientation_error)[kind][first:], axis=1) for error in errors]
     )
     trial, sample = np.unravel_index(int(np.argmax(series)), series.shape)
     value, at_s = scale * float(series[trial, sample]), float(run.times[first + sample])

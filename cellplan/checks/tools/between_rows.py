@@ -98,7 +98,7 @@ class ErrorsBetweenRows:
         tools = [*self._task_tools(accuracy), *self._closure_tools(closures)]
         if off is not None:
             tools = [
-                replace(tool, off=each, at_rows=tool.at_rows + each) for tool, each in zip(tools, off, strict=True)
+                replace(tool, off=error, at_rows=tool.at_rows + error) for tool, error in zip(tools, off, strict=True)
             ]
         count = len(self._schedule.times) - 1
         middle, sag = self._middles(tools, count)
@@ -112,11 +112,13 @@ class ErrorsBetweenRows:
                 chosen[np.argsort(-middle[:, place, kind] * judged, kind="stable")[:WORST_COUNT]] = True
         k, s = _subdivided(np.flatnonzero(chosen), self._jumped, self._share)
         fine, (jump_times, corners) = self._errors(tools, k, s), self._corners(tools)
-        found = [
-            _Found(tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], jump_times, corners[:, place])
+        measured = [
+            _ToolErrors(
+                tool, middle[:, place], bounds[place], chosen, k, s, fine[:, place], jump_times, corners[:, place]
+            )
             for place, tool in enumerate(tools)
         ]
-        every = [self._worst(one, kind) for one in found for kind in range(2)]
+        every = [self._worst(one, kind) for one in measured for kind in range(2)]
         step = min((error.longest_step for error in every if error.longest_step is not None), default=None)
         if step is not None and _stops_at_once(tools, corners[jump_times > self._schedule.times[-1] - TIME_TOLERANCE]):
             step = _fitting(step, float(self._schedule.times[-1]))
@@ -229,13 +231,13 @@ class ErrorsBetweenRows:
                 errors[:, place] = _sag(after - 2.0 * at + before, tool.relation) / (4.0 * SIDE_FRACTION)
         return jump_times, errors
 
-    def _worst(self, found: "_Found", kind: int) -> BetweenError:
+    def _worst(self, measured: "_ToolErrors", kind: int) -> BetweenError:
         """The largest error of one kind, what bounds it, and the step that would keep what is allowed."""
-        tool, allowed, times = found.tool, found.tool.allowed[kind], self._schedule.times
+        tool, allowed, times = measured.tool, measured.tool.allowed[kind], self._schedule.times
         count = len(times) - 1
-        k = np.concatenate([np.arange(tool.first, count), found.k[found.k >= tool.first]])
-        s = np.concatenate([np.full(count - min(tool.first, count), 0.5), found.s[found.k >= tool.first]])
-        errors = np.concatenate([found.middle[tool.first :, kind], found.fine[found.k >= tool.first, kind]])
+        k = np.concatenate([np.arange(tool.first, count), measured.k[measured.k >= tool.first]])
+        s = np.concatenate([np.full(count - min(tool.first, count), 0.5), measured.s[measured.k >= tool.first]])
+        errors = np.concatenate([measured.middle[tool.first :, kind], measured.fine[measured.k >= tool.first, kind]])
         if not len(k):  # the last row alone is judged
             return BetweenError(largest=0.0, at_s=float(times[-1]), bound=0.0)
         worst = int(np.argmax(errors))
@@ -243,17 +245,19 @@ class ErrorsBetweenRows:
         rows = np.maximum(tool.at_rows[k, kind], tool.at_rows[k + 1, kind])
         is_plain = np.ones(count, dtype=bool)
         is_plain[self._jumped] = False
-        judged = found.bounds[tool.first :, kind][is_plain[tool.first :]]
+        judged = measured.bounds[tool.first :, kind][is_plain[tool.first :]]
         wide = bool(judged.size) and float(judged.max()) > allowed
-        known = found.bounds[tool.first :, kind][~found.chosen[tool.first :]]
+        known = measured.bounds[tool.first :, kind][~measured.chosen[tool.first :]]
         return BetweenError(
             largest=float(errors[worst]),
             at_s=at_s,
             bound=None if wide else max(float(errors[worst]), float(known.max(initial=0.0))),
-            longest_step=self._longest_step(found, kind, errors=errors, rows=rows, k=k),
+            longest_step=self._longest_step(measured, kind, errors=errors, rows=rows, k=k),
         )
 
-    def _longest_step(self, found: "_Found", kind: int, *, errors: Array, rows: Array, k: Indices) -> float | None:
+    def _longest_step(
+        self, measured: "_ToolErrors", kind: int, *, errors: Array, rows: Array, k: Indices
+    ) -> float | None:
         """A step in [s] that meets the tolerance, as all shorter ones do; None when the present one does.
 
         Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
@@ -265,22 +269,24 @@ class ErrorsBetweenRows:
             rows: Larger error of both rows of the step of each, shape (M,).
             k: Their steps, shape (M,).
         """
-        times, step, allowed = self._schedule.times, self._schedule.step, found.tool.allowed[kind]
+        times, step, allowed = self._schedule.times, self._schedule.step, measured.tool.allowed[kind]
         if not np.any(errors > allowed) or np.any(rows >= allowed):
             return None
-        corners = np.where(found.corners[:, kind] > KINK_FRACTION * allowed, found.corners[:, kind], 0.0)
-        corners[(found.jump_times < times[found.tool.first]) | (found.jump_times > times[-1] - TIME_TOLERANCE)] = 0.0
+        corners = np.where(measured.corners[:, kind] > KINK_FRACTION * allowed, measured.corners[:, kind], 0.0)
+        corners[
+            (measured.jump_times < times[measured.tool.first]) | (measured.jump_times > times[-1] - TIME_TOLERANCE)
+        ] = 0.0
         share = min(1.0, (allowed - float(rows.max())) / max(float(corners.max(initial=0.0)), allowed))
-        near = np.searchsorted(times, found.jump_times[corners > 0.0])
+        near = np.searchsorted(times, measured.jump_times[corners > 0.0])
         over = errors > allowed
-        kept = (allowed - rows[over]) / (errors[over] - rows[over])
+        shrink = (allowed - rows[over]) / (errors[over] - rows[over])
         is_near = np.isin(k[over], np.concatenate([near - 1, near]))
-        share = min(share, float(np.where(is_near, kept, np.sqrt(kept)).min()))
+        share = min(share, float(np.where(is_near, shrink, np.sqrt(shrink)).min()))
         return _shorter(step, share)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
+class _ToolErrors:
     """What was found of one tool."""
 
     tool: _Tool

@@ -29,16 +29,16 @@ def closure_accuracy(
         q: Positions of each robot, shape (N, n).
         X_WP: The part as the first holder carries it, shape (N, 4, 4) or (1, 4, 4).
     """
-    found = []
+    accuracies = []
     for grasp in cell.closures:
         X_PT = inverse(X_WP) @ chains[grasp.robot].tool_poses(q[grasp.robot])
         error = errors_on_part(X_PT, np.broadcast_to(grasp.X_PT, X_PT.shape), grasp)
-        found.append(
+        accuracies.append(
             ClosureAccuracy(
                 robot=grasp.robot, axes=grasp.axes, position_error=error[:, :3], orientation_error=error[:, 3:]
             )
         )
-    return tuple(found)
+    return tuple(accuracies)
 
 
 def check_closure(cell: Cell, times: Array, closures: Sequence[ClosureAccuracy]) -> list[Check]:

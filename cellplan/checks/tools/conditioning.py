@@ -52,9 +52,10 @@ def conditioning(
         piece = slice(first, first + most)
         positions = {name: values[piece] for name, values in q.items()}
         rows = [
-            _blocks(cell, each, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece]) for each, R_PT in relations
+            _blocks(cell, relation, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece])
+            for relation, R_PT in relations
         ]
-        names = [*cell.positioners[:1], *(each.robot for each, _ in relations)]
+        names = [*cell.positioners[:1], *(relation.robot for relation, _ in relations)]
         stack.append(_singular_values(_stacked(rows, names, moving)))
         for (relation, _), row in zip(relations, rows, strict=True):
             robots.setdefault(relation.robot, []).append(_smallest(row[relation.robot]))
@@ -74,7 +75,7 @@ def conditioning(
 
 def _relations(cell: Cell, schedule: Schedule, moving: Sequence[str]) -> list[tuple[Relation, Array]]:
     """Tasks of the run, then grasps of further holders that move, each with desired rotations of its tool in P."""
-    tasks: list[tuple[Relation, Array]] = [(each.task, each.X_PT[:, :3, :3]) for each in schedule.tasks]
+    tasks: list[tuple[Relation, Array]] = [(task.task, task.X_PT[:, :3, :3]) for task in schedule.tasks]
     count = len(schedule.times)
     grasps = [grasp for grasp in cell.closures if grasp.robot in moving]
     return tasks + [(grasp, np.broadcast_to(grasp.X_PT[:3, :3], (count, 3, 3))) for grasp in grasps]

@@ -42,15 +42,15 @@ class Way:
 
     def growth(self, shift: float) -> Array:
         """Bound of what is added to the error at each of the rows by either clock being ahead by so much, (N,)."""
-        found = np.zeros(len(self.rows))
+        growth = np.zeros(len(self.rows))
         for later in (self.rows + shift, self.rows - shift):
             way = np.abs(self._at(self.sums, later) - self._at(self.sums, self.rows))
             if self.turns.any():
                 turned = np.abs(self._at(self.turns, later) - self._at(self.turns, self.rows))
                 turned += float(np.diff(self.turns).max(initial=0.0))  # the step that begins before the later time
                 way += turned * np.abs(self._at(self.whole, later) - self._at(self.whole, self.rows))
-            np.maximum(found, way, out=found)
-        return found
+            np.maximum(growth, way, out=growth)
+        return growth
 
     def largest(self, shift: float) -> float:
         """Upper bound of the error at any skew up to this, in [m] or [rad]."""
@@ -96,8 +96,8 @@ def _crossing(sums: Array, times: Array, goals: Array) -> Array:
     after = np.clip(np.searchsorted(sums, goals, side="right"), 1, len(sums) - 1)
     rise = sums[after] - sums[after - 1]
     share = np.clip((goals - sums[after - 1]) / np.where(rise > 0.0, rise, 1.0), 0.0, 1.0)
-    found: Array = times[after - 1] + share * (times[after] - times[after - 1])
-    return found
+    crossing: Array = times[after - 1] + share * (times[after] - times[after - 1])
+    return crossing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,16 +167,16 @@ class ShiftedTool:
         at = np.interp(nodes, np.arange(len(times)), times)
         moved, bend = np.diff(X_WT[:, :3, 3], axis=0), mover.bend[step] * parts**2
         whole = _summed(np.linalg.norm(moved, axis=1) + 0.5 * bend)
-        own, turns = self._constrained(nodes, moved, bend, whole)
+        constrained, turns = self._constrained(nodes, moved, bend, whole)
         turned = self._turned(X_WT, mover.turn_bend[step] * parts**2, X_PT)
         errors = errors_on_part(X_PT, self.desired, self.relation)[self.first :]
         common = {"times": at, "rows": times[self.first :]}
         lengths, angles = np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
         still = np.zeros(len(at))
         return ToolWays(
-            position=Way(sums=own, turns=turns, whole=whole, errors=lengths, limit=self.limits[0], **common),
+            position=Way(sums=constrained, turns=turns, whole=whole, errors=lengths, limit=self.limits[0], **common),
             orientation=Way(sums=turned, turns=still, whole=turned, errors=angles, limit=self.limits[1], **common),
-            speed=float((np.diff(own) / np.diff(at)).max(initial=0.0)),
+            speed=float((np.diff(constrained) / np.diff(at)).max(initial=0.0)),
         )
 
     def depth_way(self, times: Array, depth: float, limit: float, *, reach: float) -> Way:
@@ -199,23 +199,23 @@ class ShiftedTool:
 
         With all of them the part's turn does not matter: a length is the same however it is seen.
         """
-        kept, still = [axis for axis in self.relation.axes if axis < 3], np.zeros(len(nodes))
-        if len(kept) in (0, 3):
-            return (whole if kept else still), still
+        axes, still = [axis for axis in self.relation.axes if axis < 3], np.zeros(len(nodes))
+        if len(axes) in (0, 3):
+            return (whole if axes else still), still
         R_WP = (self.carrier.poses(nodes) @ self.X_CP)[:, :3, :3]
-        seen = np.einsum("nji,nj->ni", R_WP[:-1], moved)[:, kept]
+        seen = np.einsum("nji,nj->ni", R_WP[:-1], moved)[:, axes]
         step = np.minimum(nodes[:-1].astype(np.intp), len(self.carrier.turn_bend) - 1)
         turn = _norms(np.diff(R_WP, axis=0)) + 0.5 * self.carrier.turn_bend[step] * np.diff(nodes) ** 2
         return _summed(np.linalg.norm(seen, axis=1) + 0.5 * bend), _summed(turn)
 
     def _turned(self, X_WT: Array, bend: Array, X_PT: Array) -> Array:
         """Angle by which the tool has turned in the world, as far as it matters, at the nodes, shape (K,)."""
-        kept = [axis for axis in self.relation.axes if axis > 2]
-        if not kept:
+        axes = [axis for axis in self.relation.axes if axis > 2]
+        if not axes:
             return np.zeros(len(X_WT))
         change = np.diff(X_WT[:, :3, :3], axis=0)
         chord = np.linalg.norm(change[:, :, 2], axis=1) if self.relation.is_spin_free else _norms(change)
-        return _summed((chord + 0.5 * bend) * (self._stretched(X_PT) if len(kept) < 3 else 1.0))
+        return _summed((chord + 0.5 * bend) * (self._stretched(X_PT) if len(axes) < 3 else 1.0))
 
     def _stretched(self, X_PT: Array) -> float:
         """How much faster than a tool turns one component of its rotation vector may grow.
@@ -237,5 +237,5 @@ def _summed(ways: Array) -> Array:
 
 def _norms(change: Array) -> Array:
     """Spectral norms of differences of rotations, shape (M, 3, 3)."""
-    found: Array = np.sqrt(0.5) * np.linalg.norm(change, axis=(1, 2))
-    return found
+    norms: Array = np.sqrt(0.5) * np.linalg.norm(change, axis=(1, 2))
+    return norms

@@ -68,11 +68,11 @@ def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -
         X_WT: Tool poses in the world, shape (N, 4, 4), by robot.
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
-    found = {
+    speeds = {
         scheduled.task.name: _process_speed(scheduled, schedule.times, X_WT[scheduled.task.robot], X_WP=X_WP)
         for scheduled in schedule.tasks
     }
-    return {name: speed for name, speed in found.items() if speed is not None}
+    return {name: speed for name, speed in speeds.items() if speed is not None}
 
 
 def _process_speed(scheduled: TaskSchedule, times: Array, X_WT: Array, *, X_WP: Array) -> ProcessSpeed | None:

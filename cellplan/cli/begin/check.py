@@ -80,9 +80,9 @@ def _record(result: "CellCheck") -> dict[str, Any]:
         "cell": result.cell.name,
         "status": "passed" if result.passed else "failed",
         "start": {robot.name: _start(robot) for robot in result.cell.robots},
-        "start_found": list(result.found),
+        "start_found": list(result.searched),
         "start_choice": result.choice,
-        "moved_starts": [moved_start_record(each) for each in result.moved],
+        "moved_starts": [moved_start_record(start) for start in result.moved],
         "path_length_mm": {name: number(1e3 * length) for name, length in result.path_lengths.items()},
         "path_bulge_mm": {name: number(1e3 * bulge) for name, bulge in result.bulges.items()},
         "controllers": {
@@ -93,7 +93,7 @@ def _record(result: "CellCheck") -> dict[str, Any]:
             for name, controller in result.cell.controllers.items()
         },
         "direction": {task.name: direction_record(task) for task in result.cell.tasks},
-        "checks": [check_record(each) for each in result.checks],
+        "checks": [check_record(check) for check in result.checks],
         "open_surfaces": open_surfaces,
         "remarks": [f"{result.cell.origin.at(key)}: {line}" for key, line in remarks],
         "left_out": left_out_record(result.left_out),

@@ -79,18 +79,18 @@ def _paths(incomplete: str, accepts: Callable[[Path], bool]) -> Iterator[str]:
     """Files that are accepted, run folders, and folders; what is in the only folder, so that no space follows it."""
     above, _, begin = incomplete.rpartition("/")
     folder = Path(f"{above}/") if above or incomplete.startswith("/") else Path()
-    found: list[str] = []
+    paths: list[str] = []
     for entry in _entries(folder.expanduser()):
         if entry.name.startswith(begin) and (begin.startswith(".") or not entry.name.startswith(".")):
             text = f"{incomplete[: len(incomplete) - len(begin)]}{entry.name}"
             if entry.is_dir():
-                found.append(text if (entry / REPORT).is_file() else f"{text}/")
+                paths.append(text if (entry / REPORT).is_file() else f"{text}/")
             elif accepts(entry):
-                found.append(text)
-    if len(found) == 1 and found[0].endswith("/") and found[0] != incomplete:
-        yield from list(_paths(found[0], accepts)) or found
+                paths.append(text)
+    if len(paths) == 1 and paths[0].endswith("/") and paths[0] != incomplete:
+        yield from list(_paths(paths[0], accepts)) or paths
     else:
-        yield from found
+        yield from paths
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -52,7 +52,7 @@ def refuse_ignored(command: Any, ctx: Any, args: list[str]) -> None:
         InputError: An option with one value is given twice, or one has no meaning with or without another.
     """
     _, _, order = command.make_parser(ctx).parse_args(args=list(args))
-    options = [each for each in order if each.param_type_name == "option"]
+    options = [option for option in order if option.param_type_name == "option"]
     given = {_name(option) for option in options}
     if "--help" in given:
         return

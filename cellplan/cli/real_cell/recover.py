@@ -69,9 +69,9 @@ def recover(options: RecoverOptions) -> Result:
         )
         recovery = recovered(run, at=at, frozen=frozen, keep=keep, progress=progress)
         record = write_recovery(recovery, folder)
-    status = ExitStatus.PASSED if recovery.found else ExitStatus.NO_SOLUTION
+    status = ExitStatus.PASSED if recovery.succeeded else ExitStatus.NO_SOLUTION
     verdict, *lines = recovery_lines(record)
-    place = f"tables: {folder / 'tables'}" if recovery.found else f"reason: {folder / 'recovery.json'}"
+    place = f"tables: {folder / 'tables'}" if recovery.succeeded else f"reason: {folder / 'recovery.json'}"
     about = {"exit": int(status), "folder": str(folder), "remarks": list(run.remarks)}
     return Result(status, [verdict, *notes(run.remarks), *lines, place], {**record, **about})
 

@@ -76,18 +76,18 @@ def _wrapped(line: "Text", width: int) -> "list[Text]":
     if len(line.plain) <= width or width < NARROW or _is_whole(line.plain):
         return [line]
     hanging = " " * _hanging_indent(line.plain, width)
-    pieces, start, room = [], 0, width
-    while len(line.plain) - start > room:
+    pieces, start, left = [], 0, width
+    while len(line.plain) - start > left:
         text = line.plain[start:]
         first = len(text) - len(text.lstrip())
-        end = text.rfind(" ", first, room + 1)
+        end = text.rfind(" ", first, left + 1)
         if end <= first:
-            end = text.find(" ", room)
+            end = text.find(" ", left)
         if end <= first:
             break
         pieces.append(line[start : start + end])
         start = len(line.plain) - len(text[end:].lstrip())
-        room = width - len(hanging)
+        left = width - len(hanging)
     pieces.append(line[start:])
     for piece in pieces:
         piece.rstrip()

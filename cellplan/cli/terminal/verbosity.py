@@ -23,7 +23,7 @@ class _ErrorStream(logging.Handler):
 def be_verbose(desired: bool) -> None:
     """Show what the named loggers say, or do not."""
     logger = logging.getLogger("cellplan")
-    logger.handlers = [each for each in logger.handlers if not isinstance(each, _ErrorStream)]
+    logger.handlers = [handler for handler in logger.handlers if not isinstance(handler, _ErrorStream)]
     logger.setLevel(logging.INFO if desired else logging.NOTSET)
     if desired:
         logger.addHandler(_ErrorStream())
@@ -59,9 +59,9 @@ def log_effort(record: Mapping[str, Any]) -> None:
     joints = sum(map(len, record["joints"].values()))
     checks = len(record["checks"])
     EFFORT.info("%d samples of %d joints, %d checks", record.get("samples", 0), joints, checks)
-    found = record["solver"].get("resolution")
-    if found and found["nodes"]:
-        counts = (found["nodes"], found["panels"], found["sweeps"], found["solves"])
+    resolution = record["solver"].get("resolution")
+    if resolution and resolution["nodes"]:
+        counts = (resolution["nodes"], resolution["panels"], resolution["sweeps"], resolution["solves"])
         EFFORT.info("%d nodes in %d panels, %d sweeps, %d linear systems", *counts)
     proof = record.get("clearance_proof")
     if proof:

@@ -42,7 +42,7 @@ class WatchedFiles:
         self.cell = cell
         self._digests: dict[Path, str | None] = {}
         self._stamps: dict[Path, Stamp] = {}
-        self._asked = 0.0
+        self._last_look = 0.0
         self._are_inputs_unknown = False
         self._note(cell)
 
@@ -95,9 +95,9 @@ class WatchedFiles:
         Raises:
             InputsChangedError: One of them was saved.
         """
-        if time.monotonic() - self._asked < ASK_EVERY_S:
+        if time.monotonic() - self._last_look < ASK_EVERY_S:
             return
-        self._asked = time.monotonic()
+        self._last_look = time.monotonic()
         if self.changed() is not None:
             raise InputsChangedError
 
@@ -149,10 +149,10 @@ def _neighbours(folder: Path) -> Iterator[Path]:
 def _stamp(path: Path) -> Stamp:
     """What changes when a file is saved."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
+    return status.st_mtime_ns, status.st_size, status.st_ino
 
 
 def _digest(path: Path) -> str | None:

@@ -21,11 +21,11 @@ class WatchPage:
         path: The page to open.
     """
 
-    def __init__(self, beside: Path, pages: Sequence[tuple[str, str]]) -> None:
+    def __init__(self, path: Path, pages: Sequence[tuple[str, str]]) -> None:
         """Name the page after what it stands beside, and the pages of a run that it shows by title and file name."""
-        self.path = beside.with_name(f"{beside.name}-watch.html")
+        self.path = path.with_name(f"{path.name}-watch.html")
         self._script = self.path.with_suffix(".js")
-        self._title, self._pages, self._number, self._run = beside.name, pages, 0, ""
+        self._title, self._pages, self._number, self._run = path.name, pages, 0, ""
 
     def open(self) -> None:
         """Write the page.

@@ -12,9 +12,9 @@ from cellplan.export.ros2.names import DECIMALS, ENDING, SHORTEST, file_name, jo
 from cellplan.export.timed_rows import (
     NANO,
     file_path,
-    found_error,
     line_error,
     lines_of,
+    mismatch_error,
     require_paths,
     truncated_error,
 )
@@ -97,7 +97,7 @@ def _rows(robot: Robot, files: Mapping[str, str], paths: list[str]) -> RobotRows
         _require_fit(robot, part)
         if table:
             if part.table[0] != table[-1]:
-                raise found_error(path, part.lines[0], "the last point of the part before", "another one")
+                raise mismatch_error(path, part.lines[0], "the last point of the part before", "another one")
             part.times = [times[-1] + since for since in part.times]
         table += part.table[1 if table else 0 :]
         times += part.times[1 if times else 0 :]
@@ -143,7 +143,7 @@ def _part(robot: Robot, text: str, file: str) -> _Part:
     if not ended:
         raise truncated_error(file, len(lines), "'...' at the end")
     if len(part.table) < SHORTEST:
-        raise found_error(file, len(lines), f"{SHORTEST} points or more", str(len(part.table)))
+        raise mismatch_error(file, len(lines), f"{SHORTEST} points or more", str(len(part.table)))
     _require_rest(part, count)
     return part
 
@@ -171,9 +171,9 @@ def _add_point(part: _Part, match: re.Match[str], number: int) -> None:
         raise line_error(part.file, number, "less than 1000000000 nanoseconds", match[5])
     time = int(match[4]) * NANO + int(match[5])
     if not part.times and time != 0:
-        raise found_error(part.file, number, "the first point at 0", f"{match[4]} s {match[5]} ns")
+        raise mismatch_error(part.file, number, "the first point at 0", f"{match[4]} s {match[5]} ns")
     if part.times and time <= part.times[-1]:
-        raise found_error(
+        raise mismatch_error(
             part.file, number, "a later time than that of the point before", f"{match[4]} s {match[5]} ns"
         )
     part.times.append(time)
@@ -186,7 +186,7 @@ def _require_rest(part: _Part, count: int) -> None:
     for end in (0, -1):
         if any(part.table[end][count:]):
             where = "first" if end == 0 else "last"
-            raise found_error(part.file, part.lines[end], f"velocities of zero at the {where} point", "others")
+            raise mismatch_error(part.file, part.lines[end], f"velocities of zero at the {where} point", "others")
 
 
 def _require_fit(robot: Robot, part: _Part) -> None:
@@ -204,7 +204,7 @@ def _require_fit(robot: Robot, part: _Part) -> None:
     if np.any(wrong):
         row, place = (int(index[0]) for index in np.nonzero(wrong))
         slope = f"{near[1, row, place]:.6f} and {near[2, row, place]:.6f}"
-        raise found_error(
+        raise mismatch_error(
             part.file,
             part.lines[row],
             f"a velocity of joint {robot.model.joints[place].name} near the slopes {slope} of the positions",

@@ -27,7 +27,7 @@ from cellplan.export.stream.record import (
     stream_record,
     whole_cycle,
 )
-from cellplan.export.timed_rows import file_path, found_error, line_error, lines_of, require_paths, times_of
+from cellplan.export.timed_rows import file_path, line_error, lines_of, mismatch_error, require_paths, times_of
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 
@@ -153,7 +153,7 @@ def _require_one_end_read(robot_rows: Mapping[str, RobotRows]) -> None:
     ends = {path: float(times_of(rows)[-1]) for path, rows in robot_rows.items()}
     for path, end in ends.items():
         if abs(end - ends[first]) > OFF_CYCLE:
-            raise found_error(
+            raise mismatch_error(
                 path, len(robot_rows[path]) + 1, f"the end at {ends[first]:.6f} s, as in {first}", f"{end:.6f} s"
             )
 
@@ -198,7 +198,7 @@ def _rows(robot: Robot, text: str, file: str) -> tuple[NDArray[np.float64], NDAr
         numbers.append([float(field) for field in match[1].split(",")[:-1]])
         process.append(match[2] == "1")
     if len(numbers) < 2:
-        raise found_error(file, len(lines), "two rows or more", str(len(numbers)))
+        raise mismatch_error(file, len(lines), "two rows or more", str(len(numbers)))
     return np.array(numbers), np.array(process)
 
 
@@ -210,7 +210,7 @@ def _require_rest(robot: Robot, numbers: NDArray[np.float64], file: str) -> None
         if len(moving):
             line = 2 + abs(end - int(moving[0]))
             where = "first" if end == 0 else "last"
-            raise found_error(file, line, f"rest in the {where} {REST:g} s", "other positions")
+            raise mismatch_error(file, line, f"rest in the {where} {REST:g} s", "other positions")
 
 
 STREAM: Final[Dialect] = Dialect(

@@ -12,9 +12,9 @@ from cellplan.export.joints import ARM, Angle, from_numbers
 from cellplan.export.timed_rows import (
     cycle_of,
     file_path,
-    found_error,
     line_error,
     lines_of,
+    mismatch_error,
     require_paths,
     truncated_error,
 )
@@ -270,7 +270,7 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> Robo
     if is_blended:
         raise line_error(statements.file, at.line, "a stop at the last row, without r", at.shown)
     if is_met and not marks:
-        raise found_error(statements.file, first.line, "a handshake at a row, as its output is lowered", "none")
+        raise mismatch_error(statements.file, first.line, "a handshake at a row, as its output is lowered", "none")
     rows = points.rows(times=False, marks=tuple(marks))
     return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
 

@@ -29,7 +29,7 @@ TEXTS: Final = frozenset({"up_axis", "float_array", "p", "vcount", *TRANSFORMS})
 MESHES: Final = {"geometry", "mesh", "source", "technique_common", "accessor", "param", "vertices", "input", *FACES}
 NODES: Final = {"node", "instance_geometry", "instance_node", "visual_scene", "scene", "instance_visual_scene"}
 LIBRARIES: Final = {"library_geometries", "library_nodes", "library_visual_scenes"}
-KEPT: Final = frozenset({"asset", "unit"} | LIBRARIES | MESHES | NODES | TEXTS | UNSUPPORTED)
+KNOWN_ELEMENTS: Final = frozenset({"asset", "unit"} | LIBRARIES | MESHES | NODES | TEXTS | UNSUPPORTED)
 MAX_DEPTH: Final = 64  # nesting of elements; drawings have some ten levels of nodes
 MAX_ELEMENTS: Final = 600_000  # one for each polygon of the largest allowed mesh, and the others
 MAX_STRIDE: Final = 32  # indices of one corner: vertex, normal, colours and textures
@@ -245,7 +245,7 @@ class _Reader:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         """An element opens; those that make no shape are left out with all below them."""
-        is_kept = tag in KEPT and (tag != "asset" or len(self._open) == 1)
+        is_kept = tag in KNOWN_ELEMENTS and (tag != "asset" or len(self._open) == 1)
         if self._skipped or (self._open and not is_kept):
             self._skipped += 1
             return

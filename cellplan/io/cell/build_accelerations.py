@@ -35,10 +35,10 @@ def _chosen(choice: AccelerationChoice | None) -> AccelerationRule:
 
 def controller_cycle(entry: RobotEntry, document: CellDocument) -> float:
     """Cycle of a robot's controller in [s]: as the robot states it, at either key, else that of the motion."""
-    own = entry.controller_cycle_ms
-    if own is None and entry.controller is not None:
-        own = entry.controller.cycle_ms
-    return (document.motion.controller_cycle_ms if own is None else own).si
+    cycle = entry.controller_cycle_ms
+    if cycle is None and entry.controller is not None:
+        cycle = entry.controller.cycle_ms
+    return (document.motion.controller_cycle_ms if cycle is None else cycle).si
 
 
 def written_rule(robot: Robot) -> Any:

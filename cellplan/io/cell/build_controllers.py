@@ -50,9 +50,9 @@ def control_findings(
 
 def _cycle(path: KeyPath, robot: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
     """The cycle of a controller is stated once, or twice alike."""
-    stated, own = robot.controller_cycle_ms, robot.controller.cycle_ms if robot.controller is not None else None
-    if stated is not None and own is not None and stated.si != own.si:
-        text = f"expected {stated:g}, as controller_cycle_ms says, got {own:g}; remove one of them"
+    stated, cycle = robot.controller_cycle_ms, robot.controller.cycle_ms if robot.controller is not None else None
+    if stated is not None and cycle is not None and stated.si != cycle.si:
+        text = f"expected {stated:g}, as controller_cycle_ms says, got {cycle:g}; remove one of them"
         yield document.finding((*path, "cycle_ms"), text)
 
 
@@ -170,6 +170,6 @@ def _stop(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
         return
     used = {robot.controller.id for robot in valid.robots.values() if robot.controller is not None}
     entries = [valid.controllers[name] for name in used if name in valid.controllers]
-    if not any(si_or_none(each.reaction_ms) or each.brake_s for each in entries):
+    if not any(si_or_none(entry.reaction_ms) or entry.brake_s for entry in entries):
         text = "expected controllers of robots that state reaction_ms or brake_s above 0, of which it is worked out, "
         yield document.key_finding(("checks", "stop"), f"{text}got none")

@@ -31,7 +31,7 @@ SIDES: Final = ("x", "y")
 
 
 @dataclass(slots=True)
-class _Found:
+class _Reading:
     """What was read so far."""
 
     ranges: dict[str, VaryRange] = field(default_factory=dict)
@@ -48,17 +48,17 @@ def read_layout(
     A file that says nothing lets the bases of all operators and the start of the first holder change.
     """
     entry = valid.layout or LayoutEntry()
-    context, found = Context(valid=valid, models=models, document=document), _Found()
+    context, reading = Context(valid=valid, models=models, document=document), _Reading()
     vary = entry.vary if entry.vary is not None else _usual(context)
     for key, value in vary.items():
-        _read_one(key, value, context, found)
-    ties = Ties(entry, found.ranges, context, found.findings)
+        _read_one(key, value, context, reading)
+    ties = Ties(entry, reading.ranges, context, reading.findings)
     fixed = ties.fixed()
-    _keep_on_floor(entry, found, document)
+    _keep_on_floor(entry, reading, document)
     settings = LayoutSettings(
-        ranges=tuple(found.ranges.values()),
-        paths=tuple(each for each in found.paths if f"robots.{each.robot}.path" not in fixed),
-        choices=tuple(each for each in found.choices if each.address not in fixed),
+        ranges=tuple(reading.ranges.values()),
+        paths=tuple(path for path in reading.paths if f"robots.{path.robot}.path" not in fixed),
+        choices=tuple(choice for choice in reading.choices if choice.address not in fixed),
         equal=ties.equal(),
         mirrored=ties.mirrored(),
         keep_out=tuple(_keep_out(name, area) for name, area in entry.keep_out.items()),
@@ -70,37 +70,37 @@ def read_layout(
         misplacement=entry.misplacement,
         is_default=entry.vary is None,
     )
-    return settings, found.findings
+    return settings, reading.findings
 
 
-def _read_one(key: str, value: Any, context: Context, found: _Found) -> None:
+def _read_one(key: str, value: Any, context: Context, reading: _Reading) -> None:
     """One entry of ``vary``."""
     path: KeyPath = ("layout", "vary", key)
     try:
         address = read_address(key, context.valid, context.models)
     except AddressError as error:
-        found.findings.append(context.document.key_finding(path, str(error)))
+        reading.findings.append(context.document.key_finding(path, str(error)))
         return
     if address is None:
         return
     if address.what == "path":
-        _keep(found.paths, read_path(address, value, path, context), found)
+        _keep(reading.paths, read_path(address, value, path, context), reading)
     elif address.what in CHOICES:
-        _keep(found.choices, read_choice(address, value, path, context), found)
+        _keep(reading.choices, read_choice(address, value, path, context), reading)
     else:
-        for each in read_ranges(address, value, path, context):
-            if isinstance(each, VaryRange) and each.address in found.ranges:
-                text = f"expected each variable once, got '{each.address}' twice"
-                each = context.document.key_finding(path, text)  # noqa: PLW2901
-            if isinstance(each, Finding):
-                found.findings.append(each)
+        for range_ in read_ranges(address, value, path, context):
+            if isinstance(range_, VaryRange) and range_.address in reading.ranges:
+                text = f"expected each variable once, got '{range_.address}' twice"
+                range_ = context.document.key_finding(path, text)  # noqa: PLW2901
+            if isinstance(range_, Finding):
+                reading.findings.append(range_)
             else:
-                found.ranges[each.address] = each
+                reading.ranges[range_.address] = range_
 
 
-def _keep(into: list[Any], each: Any, found: _Found) -> None:
+def _keep(into: list[Any], entry: Any, reading: _Reading) -> None:
     """What was read goes into its list, a finding to the findings."""
-    (found.findings if isinstance(each, Finding) else into).append(each)
+    (reading.findings if isinstance(entry, Finding) else into).append(entry)
 
 
 def _usual(context: Context) -> dict[str, Any]:
@@ -144,21 +144,21 @@ def _near(value: float, middle: float) -> tuple[float, float]:
     return lower, upper
 
 
-def _keep_on_floor(entry: LayoutEntry, found: _Found, document: YamlDocument) -> None:
+def _keep_on_floor(entry: LayoutEntry, reading: _Reading, document: YamlDocument) -> None:
     """Narrow the ranges of all bases to the floor."""
     floor = _floor(entry)
-    for address, each in list(found.ranges.items()) if floor is not None else ():
-        if floor is None or each.kind is not VariableKind.BASE or each.index > 1:
+    for address, span in list(reading.ranges.items()) if floor is not None else ():
+        if floor is None or span.kind is not VariableKind.BASE or span.index > 1:
             continue
-        lower, upper = (float(bound) for bound in floor[:, each.index])
-        if max(each.lower, lower) < min(each.upper, upper):
-            found.ranges[address] = replace(each, lower=max(each.lower, lower), upper=min(each.upper, upper))
+        lower, upper = (float(bound) for bound in floor[:, span.index])
+        if max(span.lower, lower) < min(span.upper, upper):
+            reading.ranges[address] = replace(span, lower=max(span.lower, lower), upper=min(span.upper, upper))
         else:
             text = (
-                f"expected bounds that overlap the range of {address}, {MM * each.lower:g} to {MM * each.upper:g} mm, "
+                f"expected bounds that overlap the range of {address}, {MM * span.lower:g} to {MM * span.upper:g} mm, "
                 f"got {MM * lower:g} to {MM * upper:g}"
             )
-            found.findings.append(document.finding(("layout", "floor", f"{SIDES[each.index]}_mm"), text))
+            reading.findings.append(document.finding(("layout", "floor", f"{SIDES[span.index]}_mm"), text))
 
 
 def _floor(entry: LayoutEntry) -> Array | None:
@@ -166,7 +166,7 @@ def _floor(entry: LayoutEntry) -> Array | None:
     if entry.floor is None:
         return None
     bounds = [entry.floor.x_mm, entry.floor.y_mm]
-    return np.array([[-math.inf, math.inf] if each is None else in_si(each) for each in bounds]).T
+    return np.array([[-math.inf, math.inf] if bound is None else in_si(bound) for bound in bounds]).T
 
 
 def _keep_out(name: str, entry: KeepOutEntry) -> KeepOut:

@@ -169,9 +169,9 @@ def mounting_findings(name: str, model: RobotModel, valid: ValidEntries, documen
     yield from _rail_findings(name, entry, model, document)
     if column is None:
         return
-    own = PEDESTAL if way[-1] == PEDESTAL else MOUNT
-    if any(body.name == own for body in model.bodies):
-        yield document.key_finding(path, f"unexpected key, a body of the model is called '{own}' already")
+    carrier = PEDESTAL if way[-1] == PEDESTAL else MOUNT
+    if any(body.name == carrier for body in model.bodies):
+        yield document.key_finding(path, f"unexpected key, a body of the model is called '{carrier}' already")
     if isinstance(column, PedestalEntry):
         yield from _floor_findings(path, entry, column, valid=valid, document=document)
     if isinstance(column, HangingEntry) and column.ceiling_z_mm - entry.base.xyz_mm[2] < ROOM_MM:
@@ -209,15 +209,15 @@ def _attachment_findings(name: str, entry: RobotEntry, model: RobotModel, docume
         if attachment.link not in links:
             text = unknown_name("a link of the robot", attachment.link, links)
             yield document.finding((*path, "link"), text)
-        own = attachment.name
-        if own is None:
+        attached = attachment.name
+        if attached is None:
             continue
-        if own in taken or own == "tool" or own.startswith("tool_"):
-            text = f"expected another name, '{own}' means another body of the robot"
+        if attached in taken or attached == "tool" or attached.startswith("tool_"):
+            text = f"expected another name, '{attached}' means another body of the robot"
             yield document.finding((*path, "name"), text)
-        if own in seen:
-            yield document.finding((*path, "name"), f"expected a name of its own, got '{own}' twice")
-        seen.add(own)
+        if attached in seen:
+            yield document.finding((*path, "name"), f"expected a name of its own, got '{attached}' twice")
+        seen.add(attached)
 
 
 def _floor_findings(

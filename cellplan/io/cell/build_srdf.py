@@ -32,7 +32,7 @@ def apply_srdfs(
     What is wrong with an SRDF, or with a name, is added to the findings of the sources, and what says nothing to their
     remarks.
     """
-    found, robots = dict(models), dict(valid.robots)
+    read_models, robots = dict(models), dict(valid.robots)
     for name, model in models.items():
         entry = valid.robots[name]
         srdf = None if entry.srdf is None else sources.srdf(name, entry.srdf, entry)
@@ -40,7 +40,7 @@ def apply_srdfs(
             if srdf is not None:
                 from cellplan.io.robots.urdf.srdf import disabled_bodies, unknown_links
 
-                found[name] = replace(model, disabled=disabled_bodies(srdf, model))
+                read_models[name] = replace(model, disabled=disabled_bodies(srdf, model))
                 remark = unknown_links(srdf, model)
                 sources.remarks += [(f"robots.{name}.srdf", remark)] if remark else []
         except InputError as error:
@@ -52,7 +52,7 @@ def apply_srdfs(
         whole = whole.model_copy(
             update={"robots": {name: robots.get(name, whole.robots[name]) for name in whole.robots}}
         )
-    return replace(valid, robots=robots, whole=whole), found
+    return replace(valid, robots=robots, whole=whole), read_models
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +70,8 @@ class _Configurations:
         written = {"start": entry.start, "home": entry.home}
         rail = entry.mount.rail if entry.mount is not None else None
         added = () if rail is None else (rail.name,)
-        found = {key: self._positions(key, word, added) for key, word in written.items() if isinstance(word, str)}
-        return entry.model_copy(update={key: value for key, value in found.items() if value is not None})
+        positions = {key: self._positions(key, word, added) for key, word in written.items() if isinstance(word, str)}
+        return entry.model_copy(update={key: value for key, value in positions.items() if value is not None})
 
     def _positions(self, key: str, word: str, added: tuple[str, ...]) -> dict[str, float] | None:
         """Positions of a configuration by joint, in the units of a cell file; None for ``auto`` and after a finding."""

@@ -52,4 +52,4 @@ def _changes(old: Any, new: Any, path: KeyPath) -> Iterator[tuple[KeyPath, objec
 
 def _are_entries(value: Any) -> bool:
     """Whether a value is a list of mappings."""
-    return isinstance(value, tuple) and all(isinstance(each, Mapping) for each in value)
+    return isinstance(value, tuple) and all(isinstance(item, Mapping) for item in value)

@@ -81,9 +81,9 @@ def _with_value(document: YamlDocument, address: str, value: object) -> YamlDocu
         root, path = _edited(document.root, steps, new, annotation=CellDocument)
     except _AddressError as error:
         raise InputError(f"{where}: {error}") from None
-    kept = {place: mark for place, mark in document.values.items() if place[: len(path)] != path}
+    values = {place: mark for place, mark in document.values.items() if place[: len(path)] != path}
     earlier = {place: text for place, text in document.changes.items() if place[: len(path)] != path}
-    return replace(document, root=root, values=kept, changes={**earlier, path: what})
+    return replace(document, root=root, values=values, changes={**earlier, path: what})
 
 
 def _steps(address: str) -> list[str]:
@@ -155,8 +155,8 @@ def _edited(node: Any, steps: list[str], value: Any, *, annotation: Any) -> tupl
         if new is LEFT_OUT:
             raise _AddressError("expected a value, as an element of a list cannot be left out, got nothing")
         return tuple(new if index == key else item for index, item in enumerate(node)), (key, *below)
-    kept = {name: item for name, item in node.items() if name != key}
-    return kept if new is LEFT_OUT else {**node, key: new}, (key, *below)
+    members = {name: item for name, item in node.items() if name != key}
+    return members if new is LEFT_OUT else {**node, key: new}, (key, *below)
 
 
 def _element(node: tuple[Any, ...], steps: list[str]) -> tuple[int, list[str], Any]:

@@ -16,8 +16,10 @@ def document_differences(documents: Sequence[Mapping[str, Any]]) -> dict[str, li
     Args:
         documents: Plain values, as ``written_document`` gives them.
     """
-    found = _differences(tuple(documents), ())
-    return {key_text(path): [None if value is ABSENT else _plain(value) for value in values] for path, values in found}
+    differences = _differences(tuple(documents), ())
+    return {
+        key_text(path): [None if value is ABSENT else _plain(value) for value in values] for path, values in differences
+    }
 
 
 def _differences(values: tuple[Any, ...], path: KeyPath) -> Iterator[tuple[KeyPath, tuple[Any, ...]]]:

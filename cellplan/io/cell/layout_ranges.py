@@ -41,10 +41,10 @@ class Context:
     document: YamlDocument
 
 
-Found = VaryRange | Finding
+RangeOrFinding = VaryRange | Finding
 
 
-def read_ranges(address: Address, value: Any, path: KeyPath, context: Context) -> Iterator[Found]:
+def read_ranges(address: Address, value: Any, path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
     """Ranges that a value under ``layout.vary`` gives, and what is wrong with it.
 
     Args:
@@ -74,11 +74,11 @@ def read_ranges(address: Address, value: Any, path: KeyPath, context: Context) -
         yield finding(path, f"expected a mapping of ranges ({listed(address.keys)}), got {shown(value)}")
 
 
-def _of_one_range(address: Address, value: Any, path: KeyPath, context: Context) -> Iterator[Found]:
+def _of_one_range(address: Address, value: Any, path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
     """A range for one number, or for all weights of a robot alike."""
     if value is True and address.what in {"spin_deg", "weights", "start", "start_deg"}:
         yield from _of_true(address, path, context)
-    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(each, int | float) for each in value):
+    elif isinstance(value, tuple) and len(value) == 2 and all(isinstance(item, int | float) for item in value):
         for index in range(len(address.parts)) if address.index is None else (address.index,):
             yield range_at(address, index, (value, path), context)
     else:
@@ -86,7 +86,7 @@ def _of_one_range(address: Address, value: Any, path: KeyPath, context: Context)
         yield context.document.finding(path, f"expected {words}, got {shown(value)}")
 
 
-def _of_true(address: Address, path: KeyPath, context: Context) -> Iterator[Found]:
+def _of_true(address: Address, path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
     """The whole range of each number."""
     if address.what in {"tool", "grasp", "part", "base"}:
         text = f"expected a mapping of ranges ({listed(address.keys)}), got true"
@@ -96,7 +96,7 @@ def _of_true(address: Address, path: KeyPath, context: Context) -> Iterator[Foun
         yield _checked(_whole_range(address, index, context), path, context)
 
 
-def _by_joint(address: Address, value: tuple[Any, ...], path: KeyPath, context: Context) -> Iterator[Found]:
+def _by_joint(address: Address, value: tuple[Any, ...], path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
     """One range for each joint."""
     count = len(address.parts)
     if len(value) != count:
@@ -109,7 +109,7 @@ def _by_joint(address: Address, value: tuple[Any, ...], path: KeyPath, context: 
             yield context.document.finding((*path, index), f"expected {ALL}, got {shown(bounds)}")
 
 
-def range_at(address: Address, index: int, at: tuple[tuple[float, float], KeyPath], context: Context) -> Found:
+def range_at(address: Address, index: int, at: tuple[tuple[float, float], KeyPath], context: Context) -> RangeOrFinding:
     """One range with its bounds in the unit of the file, and the place where they stand."""
     bounds, path = at
     low, high = bounds
@@ -117,8 +117,8 @@ def range_at(address: Address, index: int, at: tuple[tuple[float, float], KeyPat
         return context.document.finding((*path, 1), f"expected a number above {low:g}, got {high:g}")
     given, is_angle = _given(address, index, context)
     lower, upper = (in_si_of(address, bound, is_angle=is_angle) for bound in (low, high))
-    found = _named(address, index, (lower, upper), given=given, is_angle=is_angle)
-    return _checked(found, path, context)
+    range_ = _named(address, index, (lower, upper), given=given, is_angle=is_angle)
+    return _checked(range_, path, context)
 
 
 def in_si_of(address: Address, value: float, *, is_angle: bool) -> float:
@@ -192,29 +192,29 @@ def _whole_range(address: Address, index: int, context: Context) -> VaryRange:
     return _named(address, index, (lower, upper), given=given, is_angle=is_angle)
 
 
-def _checked(found: VaryRange, path: KeyPath, context: Context) -> Found:
+def _checked(range_: VaryRange, path: KeyPath, context: Context) -> RangeOrFinding:
     """The range, or what does not go with its bounds."""
-    text = _refusal(found, context)
-    return found if text is None else context.document.finding(path, text)
+    text = _refusal(range_, context)
+    return range_ if text is None else context.document.finding(path, text)
 
 
-def _refusal(found: VaryRange, context: Context) -> str | None:
+def _refusal(range_: VaryRange, context: Context) -> str | None:
     """What is wrong with the bounds of a range; None if nothing is."""
-    valid, name = context.valid, found.name
+    valid, name = context.valid, range_.name
     text = None
-    match found.kind:
-        case VariableKind.BASE if found.index in {3, 4} and _stays_upright(valid.robots[name]):
+    match range_.kind:
+        case VariableKind.BASE if range_.index in {3, 4} and _stays_upright(valid.robots[name]):
             text = "expected no range of roll or pitch for a base so mounted; to tilt it, use mount: {tilted: …}"
         case VariableKind.TOOL:
             shortest = _rod(valid.robots[name]).shortest_mm
-            if found.index == 0 and found.lower <= Mm(shortest).si:
+            if range_.index == 0 and range_.lower <= Mm(shortest).si:
                 text = f"expected lengths above {shortest:g} mm, which leave a rod between its round ends"
-            elif found.index == 1 and max(-found.lower, found.upper) > math.pi:
+            elif range_.index == 1 and max(-range_.lower, range_.upper) > math.pi:
                 text = "expected angles from -180 to 180 deg"
-        case VariableKind.WEIGHT if not WEIGHT_RANGE[0] <= found.lower < found.upper <= WEIGHT_RANGE[1]:
+        case VariableKind.WEIGHT if not WEIGHT_RANGE[0] <= range_.lower < range_.upper <= WEIGHT_RANGE[1]:
             text = f"expected weights from {WEIGHT_RANGE[0]:g} to {WEIGHT_RANGE[1]:g}"
         case VariableKind.START:
-            text = _start_refusal(found, context)
+            text = _start_refusal(range_, context)
         case VariableKind.SPIN if valid.tasks[name].free:
             text = "expected a task whose spin is prescribed, got one with free: [spin]; leave out one of them"
         case VariableKind.SPIN if sum(it.robot == valid.tasks[name].robot for it in valid.tasks.values()) > 1:
@@ -229,17 +229,17 @@ def _stays_upright(entry: RobotEntry) -> bool:
     return entry.pedestal is not None or (entry.mount is not None and entry.mount.tilted is None)
 
 
-def _start_refusal(found: VaryRange, context: Context) -> str | None:
+def _start_refusal(range_: VaryRange, context: Context) -> str | None:
     """What is wrong with the range of a joint at the start; None if nothing is."""
-    name, model = found.name, context.models[found.name]
-    joint, unit = model.joints[found.index], Deg if found.is_angle else Mm
-    if not found.address.startswith(f"robots.{name}.start_deg") and all(each.is_revolute for each in model.joints):
+    name, model = range_.name, context.models[range_.name]
+    joint, unit = model.joints[range_.index], Deg if range_.is_angle else Mm
+    if not range_.address.startswith(f"robots.{name}.start_deg") and all(joint.is_revolute for joint in model.joints):
         return f"expected {name}.start_deg, as all joints of '{name}' turn"
-    if found.address.startswith(f"robots.{name}.start_deg") and not all(each.is_revolute for each in model.joints):
+    if range_.address.startswith(f"robots.{name}.start_deg") and not all(joint.is_revolute for joint in model.joints):
         return f"expected {name}.start: {{…}} with one key per joint, as not all joints of '{name}' turn"
-    if found.lower < joint.lower - LIMIT_ROOM or found.upper > joint.upper + LIMIT_ROOM:
+    if range_.lower < joint.lower - LIMIT_ROOM or range_.upper > joint.upper + LIMIT_ROOM:
         scale = 1000.0 if unit is Mm else math.degrees(1.0)
-        limits = f"{joint.lower * scale:g} to {joint.upper * scale:g} {'deg' if found.is_angle else 'mm'}"
+        limits = f"{joint.lower * scale:g} to {joint.upper * scale:g} {'deg' if range_.is_angle else 'mm'}"
         return f"expected a range within the limits of the joint '{joint.name}', {limits}"
     if _follows(name, model, context.valid):
         return (

@@ -44,11 +44,11 @@ class Ties:
             path: KeyPath = ("layout", "equal", row)
             if len(keys) < 2:
                 self._refuse(path, f"expected at least two addresses, got {len(keys)}")
-            found = [self._varied(key, (*path, place)) for place, key in enumerate(keys)]
-            members = [each for each in found if each is not None]
+            variables = [self._varied(key, (*path, place)) for place, key in enumerate(keys)]
+            members = [variable for variable in variables if variable is not None]
             self._tie(members, path)
             self._overlap(members[:1], members[1:], path)
-            lists.append(tuple(each.address for each in members))
+            lists.append(tuple(member.address for member in members))
         return tuple(lists)
 
     def mirrored(self) -> tuple[Mirrored, ...]:
@@ -56,8 +56,8 @@ class Ties:
         pairs = []
         for row, entry in enumerate(self._entry.mirrored):
             path: KeyPath = ("layout", "mirrored", row, "bases")
-            found = [self._address(key, (*path, place)) for place, key in enumerate(entry.bases)]
-            bases = [each for each in found if each is not None]
+            addresses = [self._address(key, (*path, place)) for place, key in enumerate(entry.bases)]
+            bases = [address for address in addresses if address is not None]
             if len(bases) < 2:
                 continue
             if any(base.what != "base" or base.index is not None for base in bases):
@@ -88,20 +88,20 @@ class Ties:
 
     def cost(self) -> dict[str, float]:
         """Costs of changes by the address of the number; those of single numbers count before those of groups."""
-        found = dict[str, float]()
+        costs = dict[str, float]()
         read = [(self._address(key, ("layout", "cost", key)), cost) for key, cost in self._entry.cost.items()]
         for is_single in (False, True):
             for address, cost in read:
                 if address is not None and (address.index is not None) == is_single:
-                    found |= dict.fromkeys(address.numbers, cost)
-        return found
+                    costs |= dict.fromkeys(address.numbers, cost)
+        return costs
 
     def _tie(self, members: Sequence[VaryRange], path: KeyPath) -> None:
         """Each number follows at most one other."""
-        for each in members:
-            if each.address in self._tied:
-                self._refuse(path, f"expected each variable in one list or pair, got '{each.address}' in two")
-            self._tied.add(each.address)
+        for member in members:
+            if member.address in self._tied:
+                self._refuse(path, f"expected each variable in one list or pair, got '{member.address}' in two")
+            self._tied.add(member.address)
 
     def _overlap(self, first: Sequence[VaryRange], others: Sequence[VaryRange], path: KeyPath) -> None:
         """Equal numbers have one unit, and ranges with common values."""
@@ -121,10 +121,10 @@ class Ties:
         if len(address.numbers) != 1:
             self._refuse(path, f"expected the address of one number, such as {_example(address)}, got {shown(key)}")
             return None
-        found = self._ranges.get(address.numbers[0])
-        if found is None:
+        range_ = self._ranges.get(address.numbers[0])
+        if range_ is None:
             self._refuse(path, f"expected a variable with a range under layout.vary, got {shown(key)}, which stays")
-        return found
+        return range_
 
     def _address(self, key: str, path: KeyPath) -> Address | None:
         """What an address names."""

@@ -89,8 +89,8 @@ class CellFile:
                     "call with_values first"
                 )
         document = changed(self.document, values)
-        kept = {address: value for address, value in self.changes.items() if address not in values}
-        return _read(replace(self, document=document, changes=kept | plain_values(values)))
+        changes = {address: value for address, value in self.changes.items() if address not in values}
+        return _read(replace(self, document=document, changes=changes | plain_values(values)))
 
 
 def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path | None = None) -> Cell:
@@ -108,7 +108,7 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     """
     path = Path(path)
     document = read_yaml(path, file=str(path))
-    allowed = tuple(Path(each) for each in allow_dirs)
+    allowed = tuple(Path(folder) for folder in allow_dirs)
     return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
 
 
@@ -156,12 +156,12 @@ def _read(source: CellFile) -> Cell:
 
 def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> dict[str, RobotModel]:
     """Models of all valid robots by name."""
-    found = {name: sources.robot(name, entry) for name, entry in valid.robots.items()}
+    read = {name: sources.robot(name, entry) for name, entry in valid.robots.items()}
     for name in valid.names["robots"]:
         written = document.root["robots"][name]
-        if name not in found and isinstance(written, dict) and isinstance(written.get("model"), str):
+        if name not in read and isinstance(written, dict) and isinstance(written.get("model"), str):
             sources.look_for_model(name, written["model"])
-    models = {name: model for name, model in found.items() if model is not None}
+    models = {name: model for name, model in read.items() if model is not None}
     return {
         name: on_mount(valid.robots[name], with_statements(valid.robots[name], model)) for name, model in models.items()
     }
@@ -169,12 +169,12 @@ def _models(valid: ValidEntries, document: YamlDocument, sources: Sources) -> di
 
 def _targets(valid: ValidEntries, sources: Sources) -> Targets:
     """Tool targets from files, by task."""
-    found = {
+    samples = {
         name: sources.targets(task.path.csv, ("tasks", name, "path", "csv"))
         for name, task in valid.tasks.items()
         if task.path.csv is not None
     }
-    return {name: sampled for name, sampled in found.items() if sampled is not None}
+    return {name: sampled for name, sampled in samples.items() if sampled is not None}
 
 
 def _unknown_bodies(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
@@ -245,10 +245,10 @@ def _cell(
 
     def mesh(written: str, unit: str | None) -> Mesh:
         """A mesh that was read before."""
-        found = sources.mesh(written, unit, ())
-        if found is None:
+        mesh = sources.mesh(written, unit, ())
+        if mesh is None:
             raise InputError(f"{document.file}: mesh '{written}' could not be read")
-        return found
+        return mesh
 
     timed = {name for name, path in targets.items() if isinstance(path, TimedPath)}
     origin = Origin(

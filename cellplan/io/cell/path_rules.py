@@ -44,9 +44,9 @@ def path_findings(valid: ValidEntries, models: Mapping[str, RobotModel], documen
         yield from _excluded(name, valid, document)
         if name not in models:
             continue
-        found = list(_rows((*place, robot.path.key), robot.path, models[name], document))
-        yield from found
-        if not found and robot.given_start is not None:
+        findings = list(_rows((*place, robot.path.key), robot.path, models[name], document))
+        yield from findings
+        if not findings and robot.given_start is not None:
             yield from _start(name, valid, models[name], document)
 
 

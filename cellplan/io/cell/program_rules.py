@@ -62,9 +62,9 @@ def posture_findings(
         ):
             if given is None or robot not in models:
                 continue
-            found = list(configuration_findings(("tasks", name, key), given, models[robot], document))
-            yield from found
-            if not found:
+            findings = list(configuration_findings(("tasks", name, key), given, models[robot], document))
+            yield from findings
+            if not findings:
                 place = ("tasks", name, key if isinstance(given, dict) else f"{key}_deg")
                 yield from _limits(place, given, models[robot], document)
 
@@ -98,13 +98,13 @@ def _mark_names(document: YamlDocument) -> list[tuple[KeyPath, str]]:
     """Names of the marks and where they stand, also in a program that is wrong in other ways."""
     program = document.root["program"]
     marks = program.get("marks") if isinstance(program, dict) else None
-    found: list[tuple[KeyPath, str]] = []
+    names: list[tuple[KeyPath, str]] = []
     for index, mark in enumerate(marks if isinstance(marks, tuple) else ()):
         place: KeyPath = ("program", "marks", index)
         name = mark.get("name") if isinstance(mark, dict) else mark
         if isinstance(name, str):
-            found.append(((*place, "name") if isinstance(mark, dict) else place, name))
-    return found
+            names.append(((*place, "name") if isinstance(mark, dict) else place, name))
+    return names
 
 
 def _marks(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
@@ -129,7 +129,7 @@ def _orders(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yam
     for robot, entry in valid.robots.items():
         if entry.order is None:
             continue
-        own = [task for task, operator in operators.items() if operator == robot]
+        tasks = [task for task, operator in operators.items() if operator == robot]
         for index, text in order_faults(robot, entry.order, operators, names):
             place: KeyPath = ("robots", robot, "order")
             if index is None:
@@ -137,7 +137,7 @@ def _orders(marks: list[tuple[KeyPath, str]], valid: ValidEntries, document: Yam
                 continue
             word = entry.order[index]
             is_known = word in operators or word in names
-            hint = "" if is_known else did_you_mean(word, [*own, *names])
+            hint = "" if is_known else did_you_mean(word, [*tasks, *names])
             yield document.finding((*place, index), text + hint)
 
 

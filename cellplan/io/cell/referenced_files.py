@@ -243,14 +243,14 @@ class Sources:
 
     def _package_dirs(self, name: str, entry: RobotEntry) -> tuple[Path, ...] | None:
         """Folders for ``package://``; None after a finding."""
-        found: list[Path] = []
+        folders: list[Path] = []
         for index, written in enumerate(entry.package_dirs):
             try:
-                found.append(self._folders.directory(written))
+                folders.append(self._folders.directory(written))
             except InputError as error:
                 path = ("robots", name, "package_dirs", index)
                 self.findings.append(self._document.finding(path, str(error)))
-        return tuple(found) if len(found) == len(entry.package_dirs) else None
+        return tuple(folders) if len(folders) == len(entry.package_dirs) else None
 
 
 def _only_for_urdf(name: str, entry: RobotEntry, document: YamlDocument) -> Iterator[Finding]:

@@ -76,10 +76,10 @@ def _described(model: RobotModel, written: str) -> RobotDescription:
 
 def _links(model: RobotModel) -> list[LinkSize]:
     """The links that have bodies."""
-    found = []
+    links = []
     for link in model.links:
         bodies = tuple(body for body in model.bodies if body.link == link.index)
         if bodies:
             shapes = tuple(type(body.shape).__name__.lower() for body in bodies)
-            found.append(LinkSize(link=link.name, shapes=shapes, size=size_along(bodies, np.eye(4))))
-    return found
+            links.append(LinkSize(link=link.name, shapes=shapes, size=size_along(bodies, np.eye(4))))
+    return links

@@ -47,13 +47,13 @@ _LENGTH_UNITS: Final = ("", "_m", "_cm", "_in", "_inch", "_um", "[mm]", " mm", "
 class _Findings:
     """Findings gathered while reading."""
 
-    found: list[Finding] = field(default_factory=list)
+    entries: list[Finding] = field(default_factory=list)
     kinds: set[tuple[str, ...]] = field(default_factory=set)
 
     def add(self, line: int, text: str, *, column: str = "") -> None:
         """Note a finding about a line, or about one value of it."""
         finding = Finding(line=line, key=f"column '{column}'" if column else "", text=text)
-        self.found.append(finding)
+        self.entries.append(finding)
         self.kinds.add(kind_of(finding))
 
     @property
@@ -87,11 +87,11 @@ def read_toolpath_csv(
     findings = _Findings()
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").rstrip("\n \t").split("\n")
     columns = _read_header(lines[0], findings)
-    raise_findings(name, findings.found)
+    raise_findings(name, findings.entries)
     if len(lines) - 1 > MOST_POINTS:
         raise InputError(f"{name}: expected at most {MOST_POINTS} points, got {len(lines) - 1}")
     values = _read_rows(lines, columns, findings)
-    raise_findings(name, findings.found)
+    raise_findings(name, findings.entries)
     if len(values) < 2:
         raise InputError(f"{name}: expected at least 2 points below the header, got {len(values)}")
     axes = _units(values, columns, findings, desired=AXIS, what="tool axis")
@@ -101,7 +101,7 @@ def read_toolpath_csv(
         _examine_times(times, findings)
         if is_closed:
             _close(values, columns, (axes, quaternions), findings)
-    raise_findings(name, findings.found)
+    raise_findings(name, findings.entries)
     points = values[:, [columns.index(column) for column in POSITION]] * METRES_PER_MM
     rotations = None if quaternions is None else quaternion_to_rotation(quaternions)
     if times is None:
@@ -127,10 +127,10 @@ def _read_text(path: Path, name: str) -> str:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(f"{name}:{line}: expected text in UTF-8, got byte 0x{data[error.start]:02x}") from None
-    found = _CONTROL.search(text)
-    if found:
-        line = text.count("\n", 0, found.start()) + 1
-        raise InputError(f"{name}:{line}: expected plain text, got control character {ord(found.group()[0]):#04x}")
+    match = _CONTROL.search(text)
+    if match:
+        line = text.count("\n", 0, match.start()) + 1
+        raise InputError(f"{name}:{line}: expected plain text, got control character {ord(match.group()[0]):#04x}")
     return text
 
 
@@ -146,7 +146,7 @@ def _read_header(line: str, findings: _Findings) -> list[str]:
             findings.add(1, _unknown(column))
     for column in dict.fromkeys(column for column in columns if column in COLUMNS and columns.count(column) > 1):
         findings.add(1, f"expected column '{column}' once, got it {columns.count(column)} times")
-    if findings.found:
+    if findings.entries:
         return columns
     for group, is_needed in ((POSITION, True), (AXIS, False), (QUATERNION, False)):
         missing = [column for column in group if column not in columns]

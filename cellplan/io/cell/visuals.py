@@ -26,7 +26,7 @@ def robot_visuals(cell: Cell, robot: str) -> tuple[Visual, ...]:
     folders = AllowedFolders(folder=source.folder, allowed=(*source.allow_dirs, *user_folders(source.folder)))
     try:
         options = UrdfOptions(
-            package_dirs=tuple(folders.directory(each) for each in entry.get("package_dirs", ())),
+            package_dirs=tuple(folders.directory(folder) for folder in entry.get("package_dirs", ())),
             within=folders,
             xacro_args={key: argument_text(value) for key, value in entry.get("xacro_args", {}).items()},
         )

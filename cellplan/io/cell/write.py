@@ -44,9 +44,11 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     if not cell.origin.document:
         raise ValueError("a cell that was not read from a file has no words to write")
     document: dict[str, Any] = dict(cell.origin.document)
-    found = starts or {}
+    given_starts = starts or {}
     robots, tasks = document["robots"], document["tasks"]
-    document["robots"] = {robot.name: _robot(robots[robot.name], robot, found.get(robot.name)) for robot in cell.robots}
+    document["robots"] = {
+        robot.name: _robot(robots[robot.name], robot, given_starts.get(robot.name)) for robot in cell.robots
+    }
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
     if cell.program is not None:
@@ -72,11 +74,11 @@ def as_written(model: RobotModel, q: Array) -> Array:
     return configuration_in_si(model, in_file_units(model, q))
 
 
-def _robot(entry: Mapping[str, Any], robot: Robot, found: Array | None) -> dict[str, Any]:
+def _robot(entry: Mapping[str, Any], robot: Robot, start: Array | None) -> dict[str, Any]:
     """A robot with its weights, start posture and home written out."""
     written = {key: value for key, value in entry.items() if key not in {*CONFIGURATIONS, "order"}}
     written["base"] = _pose(entry["base"], robot.X_WB)
-    written |= _configuration("start", robot.model, robot.start if robot.start is not None else found)
+    written |= _configuration("start", robot.model, robot.start if robot.start is not None else start)
     written |= _configuration("home", robot.model, robot.home)
     if robot.order:
         written["order"] = list(robot.order)

@@ -49,12 +49,12 @@ _KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number
 
 def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object of the file."""
-    found = dict(pairs)
-    if len(found) != len(pairs):
+    members = dict(pairs)
+    if len(members) != len(pairs):
         keys = [key for key, _ in pairs]
         twice = next(key for key in keys if keys.count(key) > 1)
         raise ValueError(f"key {shown(twice)} stands twice")
-    return found
+    return members
 
 
 def _refuse_constant(word: str) -> NoReturn:

@@ -30,18 +30,18 @@ def limits_of(joint: Joint) -> StatedLimits:
     return StatedLimits(**{name: getattr(joint, name) for name in RATES})
 
 
-def tightest(own: StatedLimits, cell: StatedLimits) -> StatedLimits:
+def tightest(limits: StatedLimits, cell: StatedLimits) -> StatedLimits:
     """The tighter of both limits of each kind, or the only one that is stated."""
     return StatedLimits(
-        lower=max(_stated(own.lower, cell.lower), default=None),
-        upper=min(_stated(own.upper, cell.upper), default=None),
-        velocity=min(_stated(own.velocity, cell.velocity), default=None),
-        acceleration=min(_stated(own.acceleration, cell.acceleration), default=None),
-        jerk=min(_stated(own.jerk, cell.jerk), default=None),
+        lower=max(_stated(limits.lower, cell.lower), default=None),
+        upper=min(_stated(limits.upper, cell.upper), default=None),
+        velocity=min(_stated(limits.velocity, cell.velocity), default=None),
+        acceleration=min(_stated(limits.acceleration, cell.acceleration), default=None),
+        jerk=min(_stated(limits.jerk, cell.jerk), default=None),
     )
 
 
-def limit_findings(own: StatedLimits, cell: StatedLimits, *, is_revolute: bool) -> Iterator[tuple[str, str]]:
+def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: bool) -> Iterator[tuple[str, str]]:
     """Limits of a cell that are wider than those of the model or leave no range, by key of the cell file.
 
     Args:
@@ -55,15 +55,15 @@ def limit_findings(own: StatedLimits, cell: StatedLimits, *, is_revolute: bool) 
         return shown(round(value * unit.scale, SHOWN_DECIMALS))
 
     for name, rate in RATES.items():
-        limit, value = getattr(own, name), getattr(cell, name)
+        limit, value = getattr(limits, name), getattr(cell, name)
         sign, bound = (-1.0, "least") if name == "lower" else (1.0, "most")
         if limit is not None and value is not None and sign * (value - limit) > LIMIT_TOL:
             yield (
                 f"{name}_{unit.name}{rate}",
                 f"expected at {bound} {text(limit)}, the limit of the model, got {text(value)}",
             )
-    lower = own.lower if cell.lower is None else cell.lower
-    upper = own.upper if cell.upper is None else cell.upper
+    lower = limits.lower if cell.lower is None else cell.lower
+    upper = limits.upper if cell.upper is None else cell.upper
     if lower is not None and upper is not None and not lower < upper:
         key = "lower" if cell.upper is None else "upper"
         yield f"{key}_{unit.name}", f"expected a lower limit below the upper one, got {text(lower)} and {text(upper)}"

@@ -122,12 +122,14 @@ def tightened(
         if limits is None:
             joints.append(joint)
             continue
-        own, cell = limits_of(joint), limits_in_si(limits)
-        wider = list(limit_findings(own, cell, is_revolute=joint.is_revolute))
+        joint_limits, cell = limits_of(joint), limits_in_si(limits)
+        wider = list(limit_findings(joint_limits, cell, is_revolute=joint.is_revolute))
         if cell.wraps:
             wider = [("wrap", "unexpected key, only a continuous joint of a URDF may turn without end")]
         findings += [document.finding((*path, "limits", joint.name, key), text) for key, text in wider]
-        joints.append(joint if wider else _within(joint, tightest(own, cell), is_slowed=cell.velocity is not None))
+        joints.append(
+            joint if wider else _within(joint, tightest(joint_limits, cell), is_slowed=cell.velocity is not None)
+        )
     return replace(model, joints=tuple(joints)), findings
 
 

@@ -96,15 +96,15 @@ def _header_lines(cell: str, program: str) -> list[str]:
 def _parse_header(lines: Sequence[str], source: str) -> tuple[str, str]:
     """Name of the cell, and the digest of the program."""
     forms = (re.escape(f"# {TITLE}"), r"# cell: (.+)", r"# program digest: sha256 ([0-9a-f]{64})")
-    found = []
+    fields = []
     for number, form in enumerate(forms, start=1):
         line = lines[number - 1] if len(lines) >= number else ""
         match = re.fullmatch(form, line)
         if match is None:
             expected = _header_lines("NAME", "…")[number - 1]
             raise InputError(f"{source}:{number}: expected the line '{expected}', got {line[:60]!r}")
-        found.append(match)
-    return found[1][1], found[2][1]
+        fields.append(match)
+    return fields[1][1], fields[2][1]
 
 
 def _column_names(tasks: Sequence[str]) -> list[str]:

@@ -89,12 +89,12 @@ def _holds_listed(name: str, listed: frozenset[str] | None) -> bool:
 
 def _listed(run: Path) -> frozenset[str] | None:
     """The files that a run or an export lists, the lists themselves among them; None when it lists none."""
-    found: set[str] = set()
+    names: set[str] = set()
     for name in (MANIFEST, EXPORT, RECOVERY):
         files = _files_of(run / name)
         if files is not None:
-            found |= {name, *files}
-    return frozenset(found) or None
+            names |= {name, *files}
+    return frozenset(names) or None
 
 
 def _files_of(record: Path) -> list[str] | None:

@@ -40,25 +40,25 @@ def put_right(folder: Path) -> None:
     except OSError:
         return
     for entry in entries:
-        found = NAME.fullmatch(entry.name)
-        if found is None or not _is_left_behind(found):
+        match = NAME.fullmatch(entry.name)
+        if match is None or not _is_left_behind(match):
             continue
         with suppress(OSError):
             if not _is_own_folder(entry):
                 continue
-            target = folder / found["name"]
-            if found["kind"] == OLDER and not target.exists() and not target.is_symlink():
+            target = folder / match["name"]
+            if match["kind"] == OLDER and not target.exists() and not target.is_symlink():
                 entry.rename(target)
             elif foreign_within(entry) is None:
                 shutil.rmtree(entry)
 
 
-def _is_left_behind(found: re.Match[str]) -> bool:
+def _is_left_behind(match: re.Match[str]) -> bool:
     """Whether the process that a name speaks of was one of this system and is no more."""
-    if found["system"] != _system():
+    if match["system"] != _system():
         return False
-    process = int(found["process"])
-    return not _exists(process) or found["start"] != _start(process)
+    process = int(match["process"])
+    return not _exists(process) or match["start"] != _start(process)
 
 
 def _exists(process: int) -> bool:

@@ -40,12 +40,12 @@ def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> 
         if not line.startswith("#"):
             rows.append(line)
             continue
-        found = _GAP.fullmatch(line)
-        if found is None:
+        match = _GAP.fullmatch(line)
+        if match is None:
             raise InputError(f"{source}:{number}: expected a row, or '# {NOT_IN_PROGRAM}: A to B', got {line[:60]!r}")
         if not rows or len(rows) in gaps or number == first_line + len(lines) - 1:
             raise InputError(f"{source}:{number}: expected '# {NOT_IN_PROGRAM}' between two rows only")
-        gaps[len(rows)] = found[1]
+        gaps[len(rows)] = match[1]
     return rows, gaps
 
 

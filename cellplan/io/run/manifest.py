@@ -124,14 +124,14 @@ def parse_manifest(data: bytes, file: str) -> Manifest:
 
 def file_findings(folder: Path, manifest: Manifest) -> dict[str, InputError]:
     """Every file of a run folder that is missing, changed, exchanged or not part of the run; one line each, by name."""
-    found, findings = _walk(folder, manifest)
+    files, findings = _walk(folder, manifest)
     for name, stored in manifest.files.items():
-        if name in found:
+        if name in files:
             error = _change(folder / name, name, stored, manifest=manifest)
             findings |= {name: error} if error else {}
         elif not any(above in findings for above in (name, *map(str, PurePosixPath(name).parents))):
             findings[name] = InputError(f"{folder / name}: missing; the run was written with it")
-    for name in found:
+    for name in files:
         if name not in manifest.files and name != MANIFEST:
             findings[name] = InputError(f"{folder / name}: not part of the run; remove it, or solve the cell again")
     return dict(sorted(findings.items()))

@@ -68,8 +68,8 @@ class StoredRun:
         """The SVG pictures of one run by file name, in the order of the manifest."""
         plots = PurePosixPath(_at(place, "plots"))
         names = [PurePosixPath(name) for name in self.manifest.files]
-        found = [path.name for path in names if path.parent == plots and path.suffix == ".svg"]
-        return {name: self.content(place, f"plots/{name}") for name in found}
+        drawing_names = [path.name for path in names if path.parent == plots and path.suffix == ".svg"]
+        return {name: self.content(place, f"plots/{name}") for name in drawing_names}
 
 
 def read_stored_run(folder: Path) -> StoredRun:
@@ -164,15 +164,15 @@ def _contradictions(
     folder: Path, manifest: Manifest, *, record: Record, records: Mapping[str, Record]
 ) -> Iterator[InputError]:
     """Reports that say something else than the manifest."""
-    named = {"report.json": record} | {_at(place, "report.json"): found for place, found in records.items()}
-    for name, found in named.items():
+    named = {"report.json": record} | {_at(place, "report.json"): entry for place, entry in records.items()}
+    for name, entry in named.items():
         said = {
-            "cell": (found["cell"], manifest.cell),
-            "inputs": (found["inputs"], dict(manifest.inputs)),
-            "versions": (found["versions"], dict(manifest.versions)),
+            "cell": (entry["cell"], manifest.cell),
+            "inputs": (entry["inputs"], dict(manifest.inputs)),
+            "versions": (entry["versions"], dict(manifest.versions)),
         }
         if name == "report.json":
-            said["status"] = (found["status"], manifest.status)
+            said["status"] = (entry["status"], manifest.status)
         for key, (got, expected) in said.items():
             if got != expected:
                 yield InputError(f"{folder / name}: {key}: contradicts {MANIFEST}; solve the cell again")
@@ -232,21 +232,23 @@ def _as_it_is(path: Path) -> bytes:
 
 def _first_other_row(table: JointTable, text: str, path: Path, series: list[Record]) -> Iterator[InputError]:
     """The first number that differs from the series of the phases, where these have all rows."""
-    own = [curves.get("joints", {}).get(table.robot, {}) for curves in series]
-    if any(curves.get("every") != 1 for curves in series) or any(list(one) != list(table.joints) for one in own):
+    curves_of_robot = [curves.get("joints", {}).get(table.robot, {}) for curves in series]
+    if any(curves.get("every") != 1 for curves in series) or any(
+        list(one) != list(table.joints) for one in curves_of_robot
+    ):
         return
-    found = []
+    others = []
     for joint, q in zip(table.joints, table.q.T, strict=True):
-        is_turn = "position_deg" in own[0][joint]
+        is_turn = "position_deg" in curves_of_robot[0][joint]
         key = "position_deg" if is_turn else "position_mm"
-        said = np.concatenate([np.array(one[joint][key], dtype=np.float64) for one in own])
+        said = np.concatenate([np.array(one[joint][key], dtype=np.float64) for one in curves_of_robot])
         written = np.rad2deg(q) if is_turn else MM_PER_M * q
         if said.shape != written.shape:
             return
         other = np.flatnonzero(~np.isclose(written, said, rtol=SERIES_ROOM, atol=SERIES_ROOM))
-        found += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
-    if found:
-        row, joint, said_there, got = min(found)
+        others += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
+    if others:
+        row, joint, said_there, got = min(others)
         place = row_place(text, str(path), row)
         yield InputError(f"{place}: {joint}: expected {said_there:.7g} as in {SERIES}, got {got:.10g}")
 

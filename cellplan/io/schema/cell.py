@@ -188,8 +188,8 @@ class MotionEntry(Entry):
         if self.grid_ms is not None and not _is_multiple(self.row_step, self.step_s):
             raise rule(f"expected a multiple of step_s = {self.step_s:g} s, got {self.grid_ms:g}", "grid_ms")
         if isinstance(self.timing, CycleEntry) and not _is_multiple(self.timing.cycle_s, self.row_step):
-            own = f"step_s = {self.step_s:g}" if self.grid_ms is None else f"grid_ms = {self.grid_ms:g}"
-            raise rule(f"expected a multiple of {own}, got {self.timing.cycle_s:g}", "timing.cycle_s")
+            grid = f"step_s = {self.step_s:g}" if self.grid_ms is None else f"grid_ms = {self.grid_ms:g}"
+            raise rule(f"expected a multiple of {grid}, got {self.timing.cycle_s:g}", "timing.cycle_s")
         if self.duration_s is None:
             return self
         if self.step_s > self.duration_s:

@@ -63,8 +63,8 @@ class RectangleEntry(ClosedShapeEntry):
     def _starts_at_a_corner(self) -> Self:
         """One of the four corners."""
         if not all(abs(part) == 1.0 for part in self.start_at):
-            found = f"[{self.start_at[0]:g}, {self.start_at[1]:g}]"
-            raise rule(f"expected a corner: [1, 1], [-1, 1], [-1, -1] or [1, -1], got {found}", "start_at")
+            corner = f"[{self.start_at[0]:g}, {self.start_at[1]:g}]"
+            raise rule(f"expected a corner: [1, 1], [-1, 1], [-1, -1] or [1, -1], got {corner}", "start_at")
         return self
 
 

@@ -74,10 +74,10 @@ def _without_null(node: Any) -> Any:
         return [_without_null(item) for item in node]
     if not isinstance(node, dict):
         return node
-    kept = {key: _without_null(value) for key, value in node.items() if value is not None}
-    arms = kept.get("anyOf")
+    members = {key: _without_null(value) for key, value in node.items() if value is not None}
+    arms = members.get("anyOf")
     if isinstance(arms, list) and {"type": "null"} in arms:
         rest = [arm for arm in arms if arm != {"type": "null"}]
-        others = {key: value for key, value in kept.items() if key != "anyOf"}
+        others = {key: value for key, value in members.items() if key != "anyOf"}
         return {**rest[0], **others} if len(rest) == 1 else {**others, "anyOf": rest}
-    return kept
+    return members

@@ -101,8 +101,8 @@ def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:
 
 def _named(model: type[AnyEntry], document: YamlDocument, key: str) -> dict[str, AnyEntry]:
     """Valid entries of a section by name."""
-    found = {name: valid_entry(model, document, (key, name)) for name in _section(document, key)}
-    return {name: entry for name, entry in found.items() if entry is not None}
+    entries = {name: valid_entry(model, document, (key, name)) for name in _section(document, key)}
+    return {name: entry for name, entry in entries.items() if entry is not None}
 
 
 def _single(model: type[AnyEntry], document: YamlDocument, key: str) -> AnyEntry | None:

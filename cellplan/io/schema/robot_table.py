@@ -65,18 +65,20 @@ class JointEntry(Entry):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         """Keys of the joint's own unit, all of them, lower below upper."""
-        own, other = (TURNING_LIMITS, SLIDING_LIMITS) if self.type == "revolute" else (SLIDING_LIMITS, TURNING_LIMITS)
+        limits, other = (
+            (TURNING_LIMITS, SLIDING_LIMITS) if self.type == "revolute" else (SLIDING_LIMITS, TURNING_LIMITS)
+        )
         for name in other:
             if getattr(self, name) is not None:
-                raise rule(f"unexpected key, a {self.type} joint has {', '.join(own)}", name)
-        for name in own[:3]:
+                raise rule(f"unexpected key, a {self.type} joint has {', '.join(limits)}", name)
+        for name in limits[:3]:
             if getattr(self, name) is None:
-                raise rule(f"missing, a {self.type} joint needs {', '.join(own[:3])}", name)
+                raise rule(f"missing, a {self.type} joint needs {', '.join(limits[:3])}", name)
         if self.type == "revolute" and "point_mm" not in self.model_fields_set:
             raise rule("missing, expected a point on the axis", "point_mm")
-        lower, upper = getattr(self, own[0]), getattr(self, own[1])
+        lower, upper = getattr(self, limits[0]), getattr(self, limits[1])
         if not lower < upper:
-            raise rule(f"expected a number above {own[0]} = {lower:g}, got {upper:g}", own[1])
+            raise rule(f"expected a number above {limits[0]} = {lower:g}, got {upper:g}", limits[1])
         length = sum(component * component for component in self.axis) ** 0.5
         if abs(length - 1.0) > UNIT_ROOM:
             raise rule(f"expected a vector of length 1, got one of length {length:.6g}", "axis")

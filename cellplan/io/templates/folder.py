@@ -19,11 +19,11 @@ def refuse_unless_empty(folder: Path) -> None:
             if folder.exists() or folder.is_symlink():
                 raise InputError(f"{folder}: expected a new or an empty folder, got a file")
             return
-        found = min((entry.name for entry in folder.iterdir() if not entry.name.startswith(".")), default=None)
+        entry = min((entry.name for entry in folder.iterdir() if not entry.name.startswith(".")), default=None)
     except OSError as error:
         raise _cannot_write(folder, error) from error
-    if found is not None:
-        raise InputError(f"{folder}: holds '{found}', and nothing is overwritten; name a new or an empty folder")
+    if entry is not None:
+        raise InputError(f"{folder}: holds '{entry}', and nothing is overwritten; name a new or an empty folder")
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -56,28 +56,28 @@ def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
 
 def _nodes(text: str) -> dict[KeyPath, _Node]:
     """Every value of the text by its key path."""
-    found: dict[KeyPath, _Node] = {}
+    nodes: dict[KeyPath, _Node] = {}
     events: Iterator[Any] = iter(yaml.parse(text, Loader=yaml.SafeLoader))
     root: Any = next(event for event in events if isinstance(event, yaml.MappingStartEvent))
-    _read(events, root, (), (0, 0), found)
-    return found
+    _read(events, root, (), (0, 0), nodes)
+    return nodes
 
 
-def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int], found: dict[KeyPath, _Node]) -> _Node:
+def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int], nodes: dict[KeyPath, _Node]) -> _Node:
     """Take over the value that begins with an event, and all below it."""
     node = _Node(key=key, span=(event.start_mark.index, event.end_mark.index))
-    found[path] = node
+    nodes[path] = node
     if not isinstance(event, yaml.CollectionStartEvent):
         return node
     end, places, is_mapping = node.span[1], 0, isinstance(event, yaml.MappingStartEvent)
     entry: Any
     while not _ends(entry := next(events)):
-        own, where = entry, (entry.start_mark.index, entry.end_mark.index)
+        child, where = entry, (entry.start_mark.index, entry.end_mark.index)
         step: str | int = places
         if is_mapping:
-            step, own = str(entry.value), next(events)
+            step, child = str(entry.value), next(events)
         node.children.append((*path, step))
-        end = _read(events, own, (*path, step), where, found).span[1]
+        end = _read(events, child, (*path, step), where, nodes).span[1]
         places += 1
     node.is_block = not event.flow_style
     node.span = (node.span[0], end if node.is_block else entry.end_mark.index)

@@ -135,10 +135,10 @@ def _decoded(data: bytes, file: str) -> str:
     except UnicodeDecodeError as error:
         line = len(LINE_BREAK.findall(data[: error.start].decode("utf-8", "replace"))) + 1
         raise InputError(f"{file}:{line}: expected UTF-8 text, got byte 0x{data[error.start]:02x}") from None
-    found = CONTROL_CHARACTERS.search(text)
-    if found:
-        line = len(LINE_BREAK.findall(text, 0, found.start())) + 1
-        raise InputError(f"{file}:{line}: expected printable text, got control character U+{ord(found[0]):04X}")
+    match = CONTROL_CHARACTERS.search(text)
+    if match:
+        line = len(LINE_BREAK.findall(text, 0, match.start())) + 1
+        raise InputError(f"{file}:{line}: expected printable text, got control character U+{ord(match[0]):04X}")
     return text
 
 
@@ -289,8 +289,8 @@ class _Composer:
     def _scalar(self, event: Any, path: KeyPath, *, is_key: bool = False) -> Any:
         """Word, number or truth value."""
         refuse = self._complain if is_key else self._refuse
-        if found := CONTROL_CHARACTERS.search(event.value):
-            refuse(event, path, f"expected printable text, got control character U+{ord(found[0]):04X}")
+        if match := CONTROL_CHARACTERS.search(event.value):
+            refuse(event, path, f"expected printable text, got control character U+{ord(match[0]):04X}")
             return UNREADABLE
         if not event.implicit[0]:
             return event.value

@@ -124,11 +124,11 @@ class RobotControlEntry(Entry):
     @classmethod
     def _states_no_zero(cls, given: Any) -> Any:
         """Refuse the zero of a controller, which the robot's own file states."""
-        found = [key for key in ControllerZeroEntry.model_fields if isinstance(given, dict) and key in given]
-        if found:
+        keys = [key for key in ControllerZeroEntry.model_fields if isinstance(given, dict) and key in given]
+        if keys:
             text = (
-                f"unexpected key, the zero of a controller is no part of a cell: move {', '.join(found)} to the key "
+                f"unexpected key, the zero of a controller is no part of a cell: move {', '.join(keys)} to the key "
                 "controller of the robot's own file, or, for a URDF, to a file that controller_zero names"
             )
-            raise rule(text, found[0])
+            raise rule(text, keys[0])
         return given

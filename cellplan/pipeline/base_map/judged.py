@@ -56,16 +56,16 @@ def base_map(
     """
     ready = prepared(cell, robot, grid or BaseGrid(), progress)
     progress("finding starts", 0.0)
-    tiles = Tiles.of(ready.asked, *ready.starts())
+    tiles = Tiles.of(ready.job, *ready.starts())
     trials = []
     for place, values in enumerate(tiles.values):
         progress("judging places", place / len(tiles.values))
-        trials.append({"values": values, **judged(ready.asked, values).record})
+        trials.append({"values": values, **judged(ready.job, values).record})
     return finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
 
 
 def finished_record(
-    ready: PreparedMap, found: Sequence[PlaceVerdict], *, certify: int = 0, progress: Progress = silent
+    ready: PreparedMap, verdicts: Sequence[PlaceVerdict], *, certify: int = 0, progress: Progress = silent
 ) -> Record:
     """The record of a map whose places are judged, the best of them solved on request.
 
@@ -75,20 +75,20 @@ def finished_record(
         certify: How many of the best places are solved and verified.
         progress: Called with the stage and the fraction done.
     """
-    asked, cell = ready.asked, ready.cell
-    best = best_first(found)[: max(BEST, certify)]
-    settings = [place_settings(asked, found[place], place) for place in best]
+    job, cell = ready.job, ready.cell
+    best = best_first(verdicts)[: max(BEST, certify)]
+    settings = [place_settings(job, verdicts[place], place) for place in best]
     certified = []
     for done, values in enumerate(settings[:certify]):
         progress("certifying", done / certify)
         outcome = solved_outcome(partial(cell.with_values, values), _figures, file=Path(cell.origin.file))
         certified.append({"status": str(outcome.status), "reason": outcome.reason, "figures": dict(outcome.figures)})
     return map_record(
-        asked,
-        found,
+        job,
+        verdicts,
         best=list(zip(best, settings, strict=True)),
         certified=certified,
-        drawn=drawing(asked.scene, asked.start, ready.schedule),
+        drawn=drawing(job.scene, job.start, ready.schedule),
         versions=versions(),
     )
 
@@ -109,17 +109,17 @@ def write_base_map(record: Record, folder: Path, *, formats: Collection[str] = (
             target.write_bytes(name, content)
 
 
-def place_settings(asked: MapJob, found: PlaceVerdict, place: int) -> dict[str, Any]:
+def place_settings(job: MapJob, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
     """Values of the cell file that put the robot to a place, with its start posture there, by address."""
-    cell, robot, places = asked.scene.cell, asked.scene.cell.robot(asked.robot), asked.places
+    cell, robot, places = job.scene.cell, job.scene.cell.robot(job.robot), job.places
     xy, base = MM * places.X_WB[place, :2, 3], f"robots.{robot.name}.base"
     values: dict[str, Any] = {f"{base}.x_mm": number(xy[0]), f"{base}.y_mm": number(xy[1])}
     yaw = DEG * places.yaw[place]
     if abs(yaw - DEG * float(np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0]))) > SAME_ANGLE:
         values[f"{base}.yaw_deg"] = number(yaw)
-    if found.start is not None:
-        started = replace(robot, start=rounded(robot, found.start))
-        others = tuple(started if each.name == robot.name else each for each in cell.robots)
+    if verdict.start is not None:
+        started = replace(robot, start=rounded(robot, verdict.start))
+        others = tuple(started if other.name == robot.name else other for other in cell.robots)
         entry = written_document(replace(cell, robots=others))["robots"][robot.name]
         values |= {f"robots.{robot.name}.{key}": entry[key] for key in ("start", "start_deg") if key in entry}
     return values

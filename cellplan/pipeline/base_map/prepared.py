@@ -79,14 +79,14 @@ class PreparedMap:
     """A cell of which a map is made."""
 
     cell: Cell  # the cell as it is asked for
-    asked: MapJob  # its job and the places
+    job: MapJob  # its job and the places
     schedule: Schedule  # the tasks on the common clock
 
     def starts(self) -> tuple[Array, Indices]:
         """Start postures at all places, and the places; see ``starts_at``."""
-        asked = self.asked
-        placed = asked.scene.cell.robot(asked.robot)
-        return starts_at(_goal(asked), asked.places, placed.model, placed.X_WB, seed=self.cell.solver.seed)
+        job = self.job
+        placed = job.scene.cell.robot(job.robot)
+        return starts_at(_goal(job), job.places, placed.model, placed.X_WB, seed=self.cell.solver.seed)
 
 
 def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent) -> PreparedMap:
@@ -105,15 +105,15 @@ def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent
     scene = Scene.from_cell(cell)
     paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     start = chosen_start(scene, paths, progress=progress).start
-    robots = tuple(replace(each, start=start[cell.columns(each.name)]) for each in cell.robots)
+    robots = tuple(replace(robot, start=start[cell.columns(robot.name)]) for robot in cell.robots)
     placed = replace(cell, robots=robots)
     phase = plan_phases(placed).program[0]
     schedule = schedule_paths(placed, [paths[name] for name in phase.tasks])
     job = Job.of(placed, schedule, moving=phase.moving, nodes=enough_nodes(schedule, NODES))
     places = grid.places(placed.robot(robot), _part_at(placed)[:3, 3])
     scene = replace(scene, cell=placed, mounted=_standing(scene, robot))
-    asked = MapJob(job=job, scene=scene, robot=robot, start=start, places=places)
-    return PreparedMap(cell=cell, asked=asked, schedule=schedule)
+    map_job = MapJob(job=job, scene=scene, robot=robot, start=start, places=places)
+    return PreparedMap(cell=cell, job=map_job, schedule=schedule)
 
 
 @lru_cache(maxsize=1)
@@ -158,18 +158,18 @@ def _standing(scene: Scene, robot: str) -> tuple[MountedPair, ...]:
     )
 
 
-def _goal(asked: MapJob) -> StartGoal:
+def _goal(map_job: MapJob) -> StartGoal:
     """What the robot's tool is to reach at the start."""
-    cell, job = asked.scene.cell, asked.job
-    place = next(place for place, each in enumerate(job.relations) if each.robot == asked.robot)
+    cell, job = map_job.scene.cell, map_job.job
+    place = next(place for place, relation in enumerate(job.relations) if relation.robot == map_job.robot)
     relation = job.relations[place]
     return StartGoal(
-        robot=cell.robot(asked.robot),
-        chain=asked.scene.chains[asked.robot],
+        robot=cell.robot(map_job.robot),
+        chain=map_job.scene.chains[map_job.robot],
         relation=relation,
         X_RT=job.X[:, :, place, 0],
         X_WR=_part_at(cell) if relation.relative_to is Frame.PART else np.eye(4),
-        given=asked.start[cell.columns(asked.robot)],
+        given=map_job.start[cell.columns(map_job.robot)],
     )
 
 

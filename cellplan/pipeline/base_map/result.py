@@ -46,8 +46,8 @@ TITLES: Final = {
 
 
 def map_record(
-    asked: MapJob,
-    found: Sequence[PlaceVerdict],
+    job: MapJob,
+    verdicts: Sequence[PlaceVerdict],
     *,
     best: Sequence[tuple[int, Mapping[str, Any]]],
     certified: Sequence[Mapping[str, Any]],
@@ -64,8 +64,8 @@ def map_record(
         drawn: Outlines and paths.
         versions: Version by package.
     """
-    cell, places = asked.scene.cell, asked.places
-    base = cell.robot(asked.robot).X_WB
+    cell, places = job.scene.cell, job.places
+    base = cell.robot(job.robot).X_WB
     listed = []
     for rank, (place, settings) in enumerate(best):
         options = [f"{address}={flow_text(value)}" for address, value in plain_values(settings).items()]
@@ -74,8 +74,8 @@ def map_record(
     return {
         "schema": SCHEMA,
         "cell": cell.name,
-        "robot": asked.robot,
-        "duration_s": number(float(asked.job.times[-1])),
+        "robot": job.robot,
+        "duration_s": number(float(job.job.times[-1])),
         "present": {
             "x_mm": number(MM * base[0, 3]),
             "y_mm": number(MM * base[1, 3]),
@@ -84,82 +84,82 @@ def map_record(
         },
         "x_mm": [number(x) for x in places.x.tolist()],
         "y_mm": [number(y) for y in places.y.tolist()],
-        "counts": {str(verdict): count for verdict, count in counts(found).items()},
+        "counts": {str(verdict): count for verdict, count in counts(verdicts).items()},
         "best": listed,
-        "places": [_place(asked, each, place) for place, each in enumerate(found)],
+        "places": [_place(job, verdict, place) for place, verdict in enumerate(verdicts)],
         "drawing": dict(drawn),
         "inputs": dict(cell.inputs),
         "versions": dict(versions),
     }
 
 
-def _place(asked: MapJob, found: PlaceVerdict, place: int) -> dict[str, Any]:
+def _place(job: MapJob, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
     """One place."""
-    places = asked.places
+    places = job.places
     return {
         "x_mm": number(MM * places.X_WB[place, 0, 3]),
         "y_mm": number(MM * places.X_WB[place, 1, 3]),
         "yaw_deg": number(round(DEG * places.yaw[place], FINE)),
-        "verdict": str(found.verdict),
-        "reason": _reason(asked, found),
-        "start": _start(asked, found),
-        "figures": _figures(asked, found),
+        "verdict": str(verdict.verdict),
+        "reason": _reason(job, verdict),
+        "start": _start(job, verdict),
+        "figures": _figures(job, verdict),
     }
 
 
-def _start(asked: MapJob, found: PlaceVerdict) -> list[float] | None:
+def _start(job: MapJob, verdict: PlaceVerdict) -> list[float] | None:
     """Start posture of the robot in [deg], of sliding joints in [mm]; None where there is none."""
-    if found.start is None:
+    if verdict.start is None:
         return None
-    joints = asked.scene.cell.robot(asked.robot).model.joints
+    joints = job.scene.cell.robot(job.robot).model.joints
     scales = [joint_unit(is_revolute=joint.is_revolute).scale for joint in joints]
-    return [round(scale * value, START) + 0.0 for scale, value in zip(scales, found.start.tolist(), strict=True)]
+    return [round(scale * value, START) + 0.0 for scale, value in zip(scales, verdict.start.tolist(), strict=True)]
 
 
-def _figures(asked: MapJob, found: PlaceVerdict) -> dict[str, Any]:
+def _figures(job: MapJob, verdict: PlaceVerdict) -> dict[str, Any]:
     """Figures of a place; none where there is no motion."""
-    if found.cycle is None or found.speed is None or found.acceleration is None or found.fast is None:
+    if verdict.cycle is None or verdict.speed is None or verdict.acceleration is None or verdict.fast is None:
         return {}
-    value, unit = (None, "") if found.joint is None else _margin(asked, found)
+    value, unit = (None, "") if verdict.joint is None else _margin(job, verdict)
     return {
-        "cycle_s": round(found.cycle, FINE),
+        "cycle_s": round(verdict.cycle, FINE),
         "margin": None if value is None else round(value, FINE),
         "margin_unit": unit,
-        "margin_joint": "/".join(found.joint or ()),
-        "max_velocity_ratio": round(found.speed, FINE),
-        "max_acceleration_ratio": round(found.acceleration, FINE),
-        "fastest_joint": "/".join(found.fast),
+        "margin_joint": "/".join(verdict.joint or ()),
+        "max_velocity_ratio": round(verdict.speed, FINE),
+        "max_acceleration_ratio": round(verdict.acceleration, FINE),
+        "fastest_joint": "/".join(verdict.fast),
     }
 
 
-def _margin(asked: MapJob, found: PlaceVerdict) -> tuple[float, str]:
+def _margin(job: MapJob, verdict: PlaceVerdict) -> tuple[float, str]:
     """Smallest distance of the joint that leaves least from its limits, and its unit."""
-    robot, name = found.joint or ("", "")
-    joint = next(each for each in asked.scene.cell.robot(robot).model.joints if each.name == name)
+    robot, name = verdict.joint or ("", "")
+    joint = next(joint for joint in job.scene.cell.robot(robot).model.joints if joint.name == name)
     unit = joint_unit(is_revolute=joint.is_revolute)
-    return unit.scale * (found.margin or 0.0), unit.name
+    return unit.scale * (verdict.margin or 0.0), unit.name
 
 
-def _reason(asked: MapJob, found: PlaceVerdict) -> str:
+def _reason(job: MapJob, verdict: PlaceVerdict) -> str:
     """Why a place does not pass; empty where it does."""
-    if found.verdict is Verdict.OUT_OF_REACH:
-        if found.start is None:
+    if verdict.verdict is Verdict.OUT_OF_REACH:
+        if verdict.start is None:
             return "no start posture reaches the path"
-        return f"a tool loses its path at {found.lost_at:.3g} s"
-    if found.verdict is Verdict.LIMIT:
-        value, unit = _margin(asked, found)
-        where = " at the start" if found.cycle is None else ""
-        return f"{'/'.join(found.joint or ())} is {-value:.3g} {unit} beyond its limit{where}"
-    if found.verdict is Verdict.SPEED:
-        speed, rate = found.speed or 0.0, found.acceleration or 0.0
+        return f"a tool loses its path at {verdict.lost_at:.3g} s"
+    if verdict.verdict is Verdict.LIMIT:
+        value, unit = _margin(job, verdict)
+        where = " at the start" if verdict.cycle is None else ""
+        return f"{'/'.join(verdict.joint or ())} is {-value:.3g} {unit} beyond its limit{where}"
+    if verdict.verdict is Verdict.SPEED:
+        speed, rate = verdict.speed or 0.0, verdict.acceleration or 0.0
         what = "speed" if speed >= np.sqrt(rate) else "acceleration"
         share = 100.0 * (speed if what == "speed" else rate)
-        return f"{'/'.join(found.fast or ())} at {share:.4g} % of its {what} limit"
-    if found.verdict is Verdict.COLLISION and found.pair is not None:
-        distance = MM * (found.distance or 0.0)
+        return f"{'/'.join(verdict.fast or ())} at {share:.4g} % of its {what} limit"
+    if verdict.verdict is Verdict.COLLISION and verdict.pair is not None:
+        distance = MM * (verdict.distance or 0.0)
         how = f"{distance:.3g} mm apart" if distance > 0.0 else f"{-distance:.3g} mm into each other"
-        return f"{found.pair[0]} and {found.pair[1]} {how} at {found.at or 0.0:.3g} s"
-    return found.reason
+        return f"{verdict.pair[0]} and {verdict.pair[1]} {how} at {verdict.at or 0.0:.3g} s"
+    return verdict.reason
 
 
 # Text
@@ -174,9 +174,9 @@ def map_lines(record: Record, folder: Path) -> list[str]:
     lines = [
         f"{record['cell']}, {record['robot']}: {counts['passes']} of {len(record['places'])} places pass; {others}"
     ]
-    for each in record["best"][:1]:
-        place = record["places"][each["place"]]
-        figures, options = place["figures"], " ".join(f"--set '{option}'" for option in each["options"])
+    for place_of_base in record["best"][:1]:
+        place = record["places"][place_of_base["place"]]
+        figures, options = place["figures"], " ".join(f"--set '{option}'" for option in place_of_base["options"])
         margin = "no joint with limits"
         if figures["margin"] is not None:
             margin = f"margin {figures['margin']:.1f} {figures['margin_unit']} ({figures['margin_joint']})"
@@ -184,9 +184,9 @@ def map_lines(record: Record, folder: Path) -> list[str]:
             f"  best: x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: cycle {figures['cycle_s']:.3f} s, {margin}",
             f"  to solve it: {options}",
         ]
-    outcomes = [each["certified"] for each in record["best"] if each["certified"] is not None]
-    for each, outcome in zip(record["best"], outcomes, strict=False):
-        place = record["places"][each["place"]]
+    outcomes = [best["certified"] for best in record["best"] if best["certified"] is not None]
+    for best, outcome in zip(record["best"], outcomes, strict=False):
+        place = record["places"][best["place"]]
         why = f": {outcome['reason']}" if outcome["reason"] else ""
         lines.append(f"  solved at x {place['x_mm']:g} mm, y {place['y_mm']:g} mm: {outcome['status']}{why}")
     return [*lines, f"map: {folder / 'map.html'}"]
@@ -247,7 +247,7 @@ def _places(record: Record, half: float) -> Iterator[Item]:
     """Every place as a square; neighbours of one colour in a row as one rectangle."""
     classes, columns, x = cycle_classes(record), len(record["x_mm"]), record["x_mm"]
     for row, y in enumerate(record["y_mm"]):
-        colours = [_colour(each, classes) for each in record["places"][row * columns : (row + 1) * columns]]
+        colours = [_colour(place, classes) for place in record["places"][row * columns : (row + 1) * columns]]
         first = 0
         for colour, places in groupby(colours):
             last = first + len(list(places)) - 1
@@ -258,22 +258,22 @@ def _places(record: Record, half: float) -> Iterator[Item]:
 def _things(record: Record) -> Iterator[Item]:
     """Robots at the start, part, surroundings, paths and the present base."""
     drawn, robot = record["drawing"], record["robot"]
-    for each in drawn["outlines"]:
-        colour = LIMIT if each["robot"] == robot else INK
-        width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.45
-        yield outline(each["outline_mm"], colour=colour, width=width)
-    for index, each in enumerate(drawn["paths"]):
-        yield line(each["points_mm"], colour=ROBOTS[index % len(ROBOTS)], width=1.6)
-    for each in drawn["robots"]:
-        colour = LIMIT if each["name"] == robot else INK
-        yield Note(each["x_mm"], each["y_mm"], each["name"], colour, size=8.5, is_bold=True)
+    for other in drawn["outlines"]:
+        colour = LIMIT if other["robot"] == robot else INK
+        width = 1.1 if other["is_at_rest"] or other["kind"] == "part" else 0.45
+        yield outline(other["outline_mm"], colour=colour, width=width)
+    for index, other in enumerate(drawn["paths"]):
+        yield line(other["points_mm"], colour=ROBOTS[index % len(ROBOTS)], width=1.6)
+    for other in drawn["robots"]:
+        colour = LIMIT if other["name"] == robot else INK
+        yield Note(other["x_mm"], other["y_mm"], other["name"], colour, size=8.5, is_bold=True)
 
 
 def _best(record: Record) -> Iterator[Item]:
     """The best places: a star and dots, white where they were verified, red where they failed."""
-    for rank, each in enumerate(record["best"]):
-        place = record["places"][each["place"]]
-        colour = {"passed": PAPER, None: INK}.get((each["certified"] or {}).get("status"), LIMIT)
+    for rank, best in enumerate(record["best"]):
+        place = record["places"][best["place"]]
+        colour = {"passed": PAPER, None: INK}.get((best["certified"] or {}).get("status"), LIMIT)
         size, edge = 6.5 if rank == 0 else 3.5, INK if colour == PAPER else PAPER
         yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
 
@@ -296,7 +296,7 @@ def map_page(record: Record, plot: bytes) -> str:
         plot: Its picture as SVG.
     """
     colours = colours_of(record)
-    best: list[dict[str, Any]] = [{**each, **record["places"][each["place"]]} for each in record["best"]]
+    best: list[dict[str, Any]] = [{**place, **record["places"][place["place"]]} for place in record["best"]]
     examples = {
         verdict: next((place["reason"] for place in record["places"] if place["verdict"] == verdict), "")
         for verdict in colours

@@ -80,7 +80,7 @@ def map_study(
             pool = opened.enter_context(Workers(workers, modules=MODULES, first=partial(prepared_request, sent)))
         ready = prepared_request(sent)
         progress("finding starts", 0.0)
-        tiles = Tiles.of(ready.asked, *ready.starts())
+        tiles = Tiles.of(ready.job, *ready.starts())
 
         def propose(finished: Sequence[Trial]) -> Sequence[Mapping[str, Any]]:
             return [] if finished else tiles.values
@@ -93,7 +93,7 @@ def map_study(
         record = finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
     files = map_files(record, request.formats)
     listed = [{"name": name, "sha256": digest(content)} for name, content in files.items()]
-    tried = [{"trial": each["trial"], "status": each["status"], "reason": each["reason"]} for each in trials]
+    tried = [{"trial": trial["trial"], "status": trial["status"], "reason": trial["reason"]} for trial in trials]
     result = {"schema": SCHEMA, **header, "trials": tried, "files": listed}
     write_results(folder, {RESULT: as_json(result).encode(), **files})
     return record

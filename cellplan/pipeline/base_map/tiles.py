@@ -35,7 +35,7 @@ class Tiles:
     values: Sequence[Mapping[str, Any]]
 
     @classmethod
-    def of(cls, asked: MapJob, q: Array, at: Indices) -> Self:
+    def of(cls, job: MapJob, q: Array, at: Indices) -> Self:
         """The tiles of a map.
 
         Args:
@@ -43,7 +43,7 @@ class Tiles:
             q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
             at: Their places, shape (S,).
         """
-        known, inside = verdicts_at_start(asked, q, at)
+        known, inside = verdicts_at_start(job, q, at)
         q, at = q[inside], at[inside]
         places, number = np.unique(at, return_inverse=True)
         count = 1 if len(places) <= AT_ONCE // SHARES else SHARES * -(-len(places) // (SHARES * AT_ONCE))
@@ -56,32 +56,32 @@ class Tiles:
         Args:
             trials: The trials of all tiles as plain data, in their order.
         """
-        found = list(self.known)
+        verdicts = list(self.known)
         for trial in trials:
             judged = trial["figures"].get("places")
             if judged is None:
                 for place in trial["values"]["places"]:
-                    found[place] = PlaceVerdict(verdict=Verdict.NOT_JUDGED, reason=trial["reason"])
-            for place, each in (judged or {}).items():
-                found[int(place)] = _verdict(each).or_better(found[int(place)])
-        return found
+                    verdicts[place] = PlaceVerdict(verdict=Verdict.NOT_JUDGED, reason=trial["reason"])
+            for place, values in (judged or {}).items():
+                verdicts[int(place)] = _verdict(values).or_better(verdicts[int(place)])
+        return verdicts
 
 
 def evaluate(request: MapRequest, variant: Variant) -> Outcome:
     """Judge the places of a tile."""
-    return judged(prepared_request(request).asked, variant.values)
+    return judged(prepared_request(request).job, variant.values)
 
 
-def judged(asked: MapJob, values: Mapping[str, Any]) -> Outcome:
+def judged(job: MapJob, values: Mapping[str, Any]) -> Outcome:
     """What becomes of the places of a tile.
 
     Args:
         asked: The job and the places.
         values: See ``Tiles``.
     """
-    found = judge(asked, np.array(values["starts"]), np.array(values["places"], dtype=np.intp))
-    listed = list(found.values())
-    figures: dict[str, Any] = {"places": {str(place): _plain(each) for place, each in sorted(found.items())}}
+    verdicts = judge(job, np.array(values["starts"]), np.array(values["places"], dtype=np.intp))
+    listed = list(verdicts.values())
+    figures: dict[str, Any] = {"places": {str(place): _plain(verdict) for place, verdict in sorted(verdicts.items())}}
     passing = best_first(listed)
     if not passing:
         return Outcome(status=TrialStatus.FAILED, reason="no place passes", figures=figures)
@@ -89,16 +89,18 @@ def judged(asked: MapJob, values: Mapping[str, Any]) -> Outcome:
     return Outcome(status=TrialStatus.PASSED, figures={**best, **figures})
 
 
-def _plain(found: PlaceVerdict) -> dict[str, Any]:
+def _plain(verdict: PlaceVerdict) -> dict[str, Any]:
     """A verdict as plain data, without what it does not have."""
-    values = {each.name: getattr(found, each.name) for each in fields(found)}
-    if found.start is not None:
-        values["start"] = found.start.tolist()
+    values = {field.name: getattr(verdict, field.name) for field in fields(verdict)}
+    if verdict.start is not None:
+        values["start"] = verdict.start.tolist()
     return {name: value for name, value in values.items() if value is not None and name != "reason"}
 
 
 def _verdict(values: Mapping[str, Any]) -> PlaceVerdict:
     """The verdict of plain data."""
-    found: dict[str, Any] = {name: tuple(value) if name in PAIRS else value for name, value in values.items()}
-    found |= {"verdict": Verdict(values["verdict"]), "start": np.array(values["start"])}
-    return PlaceVerdict(**found)
+    fields_of_verdict: dict[str, Any] = {
+        name: tuple(value) if name in PAIRS else value for name, value in values.items()
+    }
+    fields_of_verdict |= {"verdict": Verdict(values["verdict"]), "start": np.array(values["start"])}
+    return PlaceVerdict(**fields_of_verdict)

@@ -97,7 +97,7 @@ def compare(
     is_modes = len(sources) == 1
     variants = _modes(sources[0]) if is_modes else _subjects(job)
     names = [str(variant.values[MODE]) for variant in variants] if is_modes else _names(job.subjects)
-    found = {} if is_modes else _differences(job, sources)
+    differences = {} if is_modes else _differences(job, sources)
     header = {
         "kind": "compare",
         "of": "modes" if is_modes else "cells",
@@ -112,7 +112,7 @@ def compare(
     finished = study.run(partial(evaluate_subject, job), workers=workers, resume=resume, progress=progress)
     trials = [trial.record for trial in finished.trials]
     curves = [trial["figures"].pop("curves", None) for trial in trials]
-    record = comparison_record(header, trials, found)
+    record = comparison_record(header, trials, differences)
     write_results(folder, comparison_files(record, curves, job.formats))
     return record
 
@@ -136,14 +136,14 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
     path = job.subjects[0 if is_mode else variant.number]
     if path.is_dir():
         return _stored_outcome(job, path)
-    kept = None if job.runs is None else run_folder(job.runs, variant.number)
+    folder = None if job.runs is None else run_folder(job.runs, variant.number)
 
     def solved(values: Mapping[str, object]) -> Outcome:
         def cell() -> Cell:
             given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
             return given.with_values(values) if values else given
 
-        return solved_outcome(cell, _solved_figures, file=path, task=job.task, folder=kept)
+        return solved_outcome(cell, _solved_figures, file=path, task=job.task, folder=folder)
 
     whole = solved(variant.values if is_mode else {})
     if whole.status is not TrialStatus.NO_SOLUTION or PROGRAM not in variant.values:
@@ -231,19 +231,19 @@ def _inputs(source: Cell | StoredRun) -> dict[str, str]:
 
 def _differences(job: CompareJob, sources: Sequence[Cell | StoredRun]) -> dict[str, list[Any]]:
     """Inputs that differ: keys of the cell files with every default filled in, and files of the same name."""
-    found = document_differences([_document(source) for source in sources])
+    differences = document_differences([_document(source) for source in sources])
     worked_on = [_tasks(job, source) for source in sources]
     if any(tasks != worked_on[0] for tasks in worked_on):
-        found["tasks worked on"] = worked_on
+        differences["tasks worked on"] = worked_on
     files = []
     for path, source in zip(job.subjects, sources, strict=True):
-        own = path.name if isinstance(source, Cell) else source.manifest.cell_file
-        files.append({name: sha for name, sha in _inputs(source).items() if name not in {own, "manifest.json"}})
-    for name in dict.fromkeys(name for each in files for name in each):
-        digests = [each.get(name) for each in files]
+        cell_file = path.name if isinstance(source, Cell) else source.manifest.cell_file
+        files.append({name: sha for name, sha in _inputs(source).items() if name not in {cell_file, "manifest.json"}})
+    for name in dict.fromkeys(name for file in files for name in file):
+        digests = [file.get(name) for file in files]
         if len({sha for sha in digests if sha is not None}) > 1:
-            found[f"inputs.{name}"] = digests
-    return found
+            differences[f"inputs.{name}"] = digests
+    return differences
 
 
 def _tasks(job: CompareJob, source: Cell | StoredRun) -> list[str]:

@@ -60,7 +60,7 @@ def comparison_record(
         **{key: header[key] for key in ("of", "cell", "settings", "task")},
         "sentences": sentences(variants),
         "differences": [{"key": key, "values": list(values)} for key, values in differences.items()],
-        "counts": {str(status): sum(each["status"] == status for each in variants) for status in TrialStatus},
+        "counts": {str(status): sum(variant["status"] == status for variant in variants) for status in TrialStatus},
         "variants": variants,
         "inputs": header["inputs"],
         "versions": header["versions"],
@@ -96,21 +96,22 @@ def comparison_lines(record: Record, folder: Path) -> list[str]:
     """All lines about a comparison."""
     variants = record["variants"]
     subject = "modes" if record["of"] == "modes" else "cells and runs"
-    rows = [["", *(each["name"] for each in variants)], ["verdict", *map(_verdict, variants)]]
+    rows = [["", *(variant["name"] for variant in variants)], ["verdict", *map(_verdict, variants)]]
     rows += [
-        [title, *(cell(each["figures"]) if each["figures"] else DASH for each in variants)] for title, cell in ROWS
+        [title, *(cell(variant["figures"]) if variant["figures"] else DASH for variant in variants)]
+        for title, cell in ROWS
     ]
     rows += [
-        [f"load of {robot}, s (share)", *(_robot(each["figures"], robot) for each in variants)]
+        [f"load of {robot}, s (share)", *(_robot(variant["figures"], robot) for variant in variants)]
         for robot in robot_names(record)
     ]
     lines = [f"{record['cell']}: {record['counts']['passed']} of {len(variants)} {subject} passed"]
     lines += [f"  {sentence}" for sentence in record["sentences"]]
     lines += list(_aligned(rows))
     lines += [
-        f"  {each['name']}: FAILED {message}"
-        for each in variants
-        for message in each["figures"].get("failed", [])[:MAX_FAILED]
+        f"  {variant['name']}: FAILED {message}"
+        for variant in variants
+        for message in variant["figures"].get("failed", [])[:MAX_FAILED]
     ]
     lines += _differences(record)
     return [*lines, f"report: {folder / 'study.html'}", f"table: {folder / 'study.csv'}"]
@@ -133,12 +134,12 @@ def _verdict(variant: Record) -> str:
 
 def _differences(record: Record) -> list[str]:
     """Inputs that differ."""
-    found = record["differences"]
+    differences = record["differences"]
     if record["of"] == "modes":
         return []
-    rows = [[each["key"], *map(short_value, each["values"])] for each in found[:MAX_SHOWN]]
+    rows = [[difference["key"], *map(short_value, difference["values"])] for difference in differences[:MAX_SHOWN]]
     lines = [f"  {line.strip()}" for line in _aligned(rows)] if rows else ["  none"]
-    more = [f"    and {len(found) - MAX_SHOWN} more in study.json"] if len(found) > MAX_SHOWN else []
+    more = [f"    and {len(differences) - MAX_SHOWN} more in study.json"] if len(differences) > MAX_SHOWN else []
     return ["  inputs that differ:", *(f"  {line}" for line in lines), *more]
 
 
@@ -150,8 +151,8 @@ def short_value(value: Any) -> str:
 
 def _robot(figures: Record, robot: str) -> str:
     """Load and share of a robot."""
-    found = figures["robots"].get(robot) if figures else None
-    return f"{found['load_s']:.3g} ({100.0 * found['motion_share']:.0f} %)" if found else DASH
+    robot_figures = figures["robots"].get(robot) if figures else None
+    return f"{robot_figures['load_s']:.3g} ({100.0 * robot_figures['motion_share']:.0f} %)" if robot_figures else DASH
 
 
 def _of_joint(key: str, scale: float, *, form: Callable[[float], str] = "{:.1f}".format) -> Callable[[Record], str]:
@@ -203,17 +204,17 @@ def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[
     Args:
         curves: Curves of each variant; None for one without a motion.
     """
-    found = [
-        {**each["figures"], "name": each["name"], "curves": its}
-        for each, its in zip(record["variants"], curves, strict=True)
+    solved_variants = [
+        {**variant["figures"], "name": variant["name"], "curves": its}
+        for variant, its in zip(record["variants"], curves, strict=True)
         if its
     ]
-    solved: dict[str, Any] = dict(zip(ROBOTS, found, strict=False))
+    solved: dict[str, Any] = dict(zip(ROBOTS, solved_variants, strict=False))
     robots = drawn_robots(record)
     if not solved or not robots:
         return {}
     figures = {"joints": _joints(solved, robots), "speeds": _speeds(solved, robots)}
-    if any(each["curves"]["clearance_mm"] for each in solved.values()):
+    if any(variant["curves"]["clearance_mm"] for variant in solved.values()):
         figures["clearance"] = _distances(solved)
     return figures
 
@@ -227,17 +228,17 @@ def drawn_robots(record: Record) -> list[str]:
 
 def _peak(record: Record, robot: str) -> float:
     """Highest joint speed of a robot in any variant, as a fraction of its limit."""
-    uses = [each["figures"]["robots"].get(robot) for each in record["variants"] if each["figures"]]
+    uses = [variant["figures"]["robots"].get(robot) for variant in record["variants"] if variant["figures"]]
     return max((joint["velocity_ratio"] or 0.0 for use in uses if use for joint in use["joints"].values()), default=0.0)
 
 
 def _joints(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     """Bars of every joint: range used and highest speed."""
-    uses = {robot: {colour: each["robots"].get(robot) for colour, each in solved.items()} for robot in robots}
-    count = max(len(use["joints"]) for found in uses.values() for use in found.values() if use)
+    uses = {robot: {colour: variant["robots"].get(robot) for colour, variant in solved.items()} for robot in robots}
+    count = max(len(use["joints"]) for joint_uses in uses.values() for use in joint_uses.values() if use)
     panels = [
-        _bars(f"{robot}: {text}", {colour: _percent(use, key) for colour, use in found.items()})
-        for robot, found in uses.items()
+        _bars(f"{robot}: {text}", {colour: _percent(use, key) for colour, use in joint_uses.items()})
+        for robot, joint_uses in uses.items()
         for key, text in (
             ("range_ratio", "range used, in % of the limit"),
             ("velocity_ratio", "highest velocity, in % of its limit"),
@@ -254,11 +255,11 @@ def _percent(use: Record | None, key: str) -> list[float]:
 
 def _bars(title: str, values: Mapping[str, Sequence[float]]) -> Panel:
     """Bars side by side at each joint; the value of one that is cut off stands on it."""
-    top = min(TOP, max(105.0, *(max(own, default=0.0) for own in values.values())))
+    top = min(TOP, max(105.0, *(max(bars, default=0.0) for bars in values.values())))
     axis, width = value_axis(0.0, top, unit="%", is_floored=True), BARS / len(values)
     items: list[Item] = [Limit(PERCENT)]
-    for place, (colour, own) in enumerate(values.items()):
-        for joint, value in enumerate(own, start=1):
+    for place, (colour, bars) in enumerate(values.items()):
+        for joint, value in enumerate(bars, start=1):
             left = joint - 0.5 * BARS + place * width
             items.append(Box((left, left + width), (0.0, min(value, top)), colour))
             if value > top:
@@ -268,7 +269,7 @@ def _bars(title: str, values: Mapping[str, Sequence[float]]) -> Panel:
 
 def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     """Highest joint speed of every robot over time."""
-    end = max(each["cycle_time_s"] for each in solved.values())
+    end = max(variant["cycle_time_s"] for variant in solved.values())
     title = "highest joint velocity of each robot over time, in % of the limit"
     panels = [_speed_panel(solved, robot) for robot in robots]
     return Figure(title=title, x=time_axis(np.array([0.0, end])), panels=panels, columns=2)
@@ -277,9 +278,13 @@ def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
 def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
     """Highest joint speed of one robot in every variant."""
     curves = {
-        colour: (each["name"], each["curves"]["times_s"], PERCENT * np.array(each["curves"]["velocity_ratio"][robot]))
-        for colour, each in solved.items()
-        if robot in each["curves"]["velocity_ratio"]
+        colour: (
+            variant["name"],
+            variant["curves"]["times_s"],
+            PERCENT * np.array(variant["curves"]["velocity_ratio"][robot]),
+        )
+        for colour, variant in solved.items()
+        if robot in variant["curves"]["velocity_ratio"]
     }
     highest = max(float(values.max()) for _, _, values in curves.values())
     top = min(TOP, highest)
@@ -296,15 +301,15 @@ def _distances(solved: Mapping[str, Any]) -> Figure:
     """Smallest distance of all bodies over time."""
     curves = {
         colour: (
-            each["name"],
-            np.array(each["curves"]["clearance_times_s"]),
-            np.array(each["curves"]["clearance_mm"]),
+            variant["name"],
+            np.array(variant["curves"]["clearance_times_s"]),
+            np.array(variant["curves"]["clearance_mm"]),
         )
-        for colour, each in solved.items()
-        if each["curves"]["clearance_mm"]
+        for colour, variant in solved.items()
+        if variant["curves"]["clearance_mm"]
     }
-    end = max(each["cycle_time_s"] for each in solved.values())
-    required = {each["required_clearance_mm"] for each in solved.values()}
+    end = max(variant["cycle_time_s"] for variant in solved.values())
+    required = {variant["required_clearance_mm"] for variant in solved.values()}
     highest = max(float(values.max()) for _, _, values in curves.values())
     items: list[Item] = []
     if len(required) == 1:
@@ -322,12 +327,14 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
     Args:
         plots: Its plots as SVG, by name.
     """
-    solved = [each["name"] for each in record["variants"] if each["figures"]]
+    solved = [variant["name"] for variant in record["variants"] if variant["figures"]]
     robots = robot_names(record)
     return template("comparison.html").render(
         r=record,
         robots=robots,
-        tasks=list(dict.fromkeys(name for each in record["variants"] for name in each["figures"].get("tasks", {}))),
+        tasks=list(
+            dict.fromkeys(name for variant in record["variants"] for name in variant["figures"].get("tasks", {}))
+        ),
         plots={name: inline_svg(text) for name, text in plots.items()},
         titles=PLOT_TITLES,
         legend=list(zip(ROBOTS, solved, strict=False)) if plots else [],

@@ -33,13 +33,14 @@ def sentences(variants: Sequence[Record]) -> list[str]:
         variants: Entries with ``name``, ``status``, ``reason`` and ``figures`` each; see ``comparison_record``.
     """
     passed = sorted(
-        (each for each in variants if each["status"] == "passed"), key=lambda each: each["figures"]["cycle_time_s"]
+        (variant for variant in variants if variant["status"] == "passed"),
+        key=lambda variant: variant["figures"]["cycle_time_s"],
     )
     return [
         *_payment(passed),
-        *(_failure(each) for each in variants if each["status"] != "passed"),
-        *_orders([each for each in variants if each["figures"]]),
-        *_reservations([each for each in variants if each["figures"]]),
+        *(_failure(variant) for variant in variants if variant["status"] != "passed"),
+        *_orders([variant for variant in variants if variant["figures"]]),
+        *_reservations([variant for variant in variants if variant["figures"]]),
     ]
 
 
@@ -57,8 +58,8 @@ def _payment(passed: Sequence[Record]) -> Iterator[str]:
         if lead is None:
             both = f"{best['name']} and {other['name']} take the same time ({_time(best)})"
             worse = ((best["name"], costs), (other["name"], gains))
-            found = [f"Worse in {name}: {'; '.join(its)}" for name, its in worse if its]
-            yield f"{both}. {'. '.join(found)}." if found else f"{both}, and {COMPARED} is the same."
+            drawbacks = [f"Worse in {name}: {'; '.join(its)}" for name, its in worse if its]
+            yield f"{both}. {'. '.join(drawbacks)}." if drawbacks else f"{both}, and {COMPARED} is the same."
         elif costs:
             yield f"{lead}. The price: {'; '.join(costs)}."
         else:
@@ -81,16 +82,16 @@ def _lead(best: Record, other: Record) -> str | None:
 
 def _worse(one: Record, other: Record) -> list[str]:
     """Figures in which one variant is worse than another one, with both values."""
-    found = []
+    drawbacks = []
     for key, (title, scale, unit, more_is_worse) in COSTS.items():
-        own, its = one["figures"][key], other["figures"][key]
-        if own is None or its is None:
+        value, its = one["figures"][key], other["figures"][key]
+        if value is None or its is None:
             continue
-        room = EQUAL * max(abs(own), abs(its))
-        if (own - its if more_is_worse else its - own) > room:
+        tolerance = EQUAL * max(abs(value), abs(its))
+        if (value - its if more_is_worse else its - value) > tolerance:
             show = _three_digits if more_is_worse else floored
-            found.append(f"{title} {show(scale * own)} instead of {show(scale * its)}{unit}")
-    return found
+            drawbacks.append(f"{title} {show(scale * value)} instead of {show(scale * its)}{unit}")
+    return drawbacks
 
 
 def _failure(variant: Record) -> str:
@@ -106,7 +107,7 @@ def _orders(solved: Sequence[Record]) -> Iterator[str]:
     """Who works hardest in which variant, also where a check fails."""
     seen: list[dict[str, float]] = []
     for title, key in LOADS.items():
-        loads = {each["name"]: each["figures"][key] or 0.0 for each in solved}
+        loads = {variant["name"]: variant["figures"][key] or 0.0 for variant in solved}
         if len(loads) > 1 and any(loads.values()) and loads not in seen:
             order = sorted(loads, key=lambda name: -loads[name])
             shown = ", ".join(f"{name} {_three_digits(loads[name])} s" for name in order)
@@ -116,12 +117,12 @@ def _orders(solved: Sequence[Record]) -> Iterator[str]:
 
 def _reservations(solved: Sequence[Record]) -> Iterator[str]:
     """What the figures leave out or rest on."""
-    without = [each["name"] for each in solved if each["figures"]["not_in_program"]]
+    without = [variant["name"] for variant in solved if variant["figures"]["not_in_program"]]
     if without:
         yield f"Without moves that no program holds, such as those to and from the homes: {', '.join(without)}."
-    for each in solved:
-        if each["status"] == "passed" and each["figures"]["proof"] not in {"solved", "verified"}:
-            yield f"{each['name']} was not verified again: {each['figures']['proof']}."
+    for variant in solved:
+        if variant["status"] == "passed" and variant["figures"]["proof"] not in {"solved", "verified"}:
+            yield f"{variant['name']} was not verified again: {variant['figures']['proof']}."
 
 
 def _time(variant: Record) -> str:

@@ -88,14 +88,14 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
     for name in chosen:
         if name not in names:
             raise InputError(f"--robot: expected one of {listed(names)}, got '{name}'{did_you_mean(name, names)}")
-    asked = [name for name in names if not chosen or name in chosen]
+    requested = [name for name in names if not chosen or name in chosen]
     if not dialect.kinds:
-        return tuple(asked)
-    found = tuple(name for name in asked if _plays(cell, dialect, name))
-    missing = [name for name in asked if name not in found]
-    if missing and (chosen or not found):
+        return tuple(requested)
+    playing = tuple(name for name in requested if _plays(cell, dialect, name))
+    missing = [name for name in requested if name not in playing]
+    if missing and (chosen or not playing):
         raise_findings([InputError(_not_played(cell, dialect, name)) for name in missing])
-    return found
+    return playing
 
 
 def _plays(cell: Cell, dialect: Dialect, robot: str) -> bool:

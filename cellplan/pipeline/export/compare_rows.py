@@ -31,17 +31,17 @@ def other_rows(dialect: Dialect, job: ExportJob, read: tuple[ProgramRows, ...]) 
     if len(read) != len(job.programs):
         yield f"expected {len(job.programs)} programs, read {len(read)}"
         return
-    for written, found in zip(job.programs, read, strict=True):
+    for written, recovered in zip(job.programs, read, strict=True):
         where = "" if written.name is None else f"program '{written.name}', "
-        if found.name != written.name:
-            yield f"expected a program named {written.name!r}, read {found.name!r}"
-        if set(found.robots) != set(written.robots):
-            yield f"{where}expected rows of {', '.join(written.robots)}, read those of {', '.join(found.robots)}"
+        if recovered.name != written.name:
+            yield f"expected a program named {written.name!r}, read {recovered.name!r}"
+        if set(recovered.robots) != set(written.robots):
+            yield f"{where}expected rows of {', '.join(written.robots)}, read those of {', '.join(recovered.robots)}"
             continue
         shares = row_shares(job, written)
         for name, rows in written.robots.items():
-            finding = _other(dialect, job, rows, found.robots[name])
-            finding = finding or _other_rounding(rows, found.robots[name], shares[name])
+            finding = _other(dialect, job, rows, recovered.robots[name])
+            finding = finding or _other_rounding(rows, recovered.robots[name], shares[name])
             if finding is not None:
                 yield f"{where}robot '{name}': {finding}"
 
@@ -109,14 +109,14 @@ def _off(robot: Robot, dialect: Dialect, written: Array, read: Array, *, is_solv
     """Positions that are farther from those that were written than rounding takes them, shape (N, n)."""
     if is_solved:
         return np.abs(read - written) > SOLVED_ROOM
-    own = None if robot.control is None or not dialect.kinds else robot.control.decimals
-    decimals = dialect.decimals if own is None else own
+    control_decimals = None if robot.control is None or not dialect.kinds else robot.control.decimals
+    decimals = dialect.decimals if control_decimals is None else control_decimals
     units = np.array([joint.display_unit.scale for joint in robot.model.joints])
-    found = np.ones(written.shape, dtype=bool)
+    off = np.ones(written.shape, dtype=bool)
     for angle, quantum in ((Angle.DEGREES, QUANTA * 10.0**-decimals / units), (Angle.RADIANS, 0.0)):
         expected = _rounded(robot, written, decimals, angle)
-        found &= ~(np.abs(read - expected) <= quantum + ROUNDING_ROOM)
-    return found
+        off &= ~(np.abs(read - expected) <= quantum + ROUNDING_ROOM)
+    return off
 
 
 def _rounded(robot: Robot, written: Array, decimals: int, angle: Angle) -> Array:

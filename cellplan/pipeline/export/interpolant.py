@@ -35,17 +35,17 @@ class HermiteRows:
         k, u = self._places(times)
         h, chord = self._steps[k], np.diff(self.q, axis=0)[k]
         first, last = h * self.qd[k] - chord, h * self.qd[k + 1] - chord
-        found: Array = self.q[k] + u * chord + u * (1.0 - u) * ((1.0 - u) * first - u * last)
-        return found
+        positions: Array = self.q[k] + u * chord + u * (1.0 - u) * ((1.0 - u) * first - u * last)
+        return positions
 
     def speeds(self, times: Array) -> Array:
         """Speeds at times in [s], shape (M,), shape (M, n); zero outside of the rows."""
         k, u = self._places(times)
         s = (np.diff(self.q, axis=0) / self._steps)[k]
         first, last = self.qd[k] - s, self.qd[k + 1] - s
-        found: Array = s + (1.0 - u) * (1.0 - 3.0 * u) * first - u * (2.0 - 3.0 * u) * last
-        found[(times < self.times[0]) | (times > self.times[-1])] = 0.0
-        return found
+        velocities: Array = s + (1.0 - u) * (1.0 - 3.0 * u) * first - u * (2.0 - 3.0 * u) * last
+        velocities[(times < self.times[0]) | (times > self.times[-1])] = 0.0
+        return velocities
 
     def chord_deviation(self) -> Array:
         """No position between two rows is farther from their chord, in [rad] or [m], shape (N - 1, n)."""
@@ -123,8 +123,8 @@ def row_speeds(times: Array, q: Array, *, rests: Flags, lower: Array, upper: Arr
         if not np.any(steep):
             break
         for rows in (slice(None, -1), slice(1, None)):
-            kept = np.sign(s) * np.clip(np.sign(s) * qd[rows], 0.0, MONOTONE * np.abs(s))
-            qd[rows] = np.where(steep, kept, qd[rows])
+            limited = np.sign(s) * np.clip(np.sign(s) * qd[rows], 0.0, MONOTONE * np.abs(s))
+            qd[rows] = np.where(steep, limited, qd[rows])
     return qd
 
 

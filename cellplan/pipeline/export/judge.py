@@ -108,11 +108,11 @@ def played_programs(
 ) -> Iterator[Played]:
     """The programs as targets play them."""
     by_name = {program.name: program for program in full_rows(run)}
-    for written, found in zip(job.programs, read, strict=True):
+    for written, recovered in zip(job.programs, read, strict=True):
         yield Played.of(
             run,
             by_name[written.name],
-            (found, written),
+            (recovered, written),
             shares=row_shares(job, written),
             interpolation=dialect.interpolation,
             lead=lead,
@@ -124,12 +124,12 @@ def _judged_once(
 ) -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
     """Findings, deviations and corners of one program, kept for programs that are played and judged alike."""
 
-    def found() -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
+    def judgement() -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
         findings = tuple(_program_findings(played, shared.scenes, dialect, job))
         return findings, tuple(_deviations(played, shared.scenes)), tuple(_corners(played, shared.scenes))
 
     promise = job.frame.promise
-    return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), found)
+    return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), judgement)
 
 
 def _program_findings(played: Played, scenes: Sequence[Scene], dialect: Dialect, job: ExportJob) -> Iterator[str]:
@@ -200,13 +200,13 @@ def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
     """How far a program is from the rows of the run, between which joints move evenly."""
     run = played.run
     times = played.grid(0.0, played.end)
-    own, tables = played.at(times), list(run.programs.values())[played.place]
+    of_program, tables = played.at(times), list(run.programs.values())[played.place]
     of_run = {
         name: np.stack([np.interp(times, played.run_times, column) for column in table.q.T], axis=1)
         for name, table in tables.items()
     }
     for name in played.exported:
-        off = np.abs(own[name] - of_run[name])
+        off = np.abs(of_program[name] - of_run[name])
         for index, joint in enumerate(run.cell.robot(name).model.joints):
             row, (unit, scale) = int(np.argmax(off[:, index])), joint.display_unit
             at_s = max(0.0, float(times[row]) - played.lead)
@@ -224,7 +224,7 @@ def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
         if not tools.relations:
             continue
         inside = (times >= stretch.begin) & (times <= stretch.end)
-        tips = [tools.tips({name: q[inside] for name, q in each.items()}) for each in (of_run, own)]
+        tips = [tools.tips({name: q[inside] for name, q in positions.items()}) for positions in (of_run, of_program)]
         for name, errors in zip(tools.names, tools.errors(*map(tools.poses, tips)), strict=True):
             for kind, (unit, scale) in enumerate((MILLIMETRES, DEGREES)):
                 row = int(np.argmax(errors[:, kind]))
@@ -256,16 +256,16 @@ def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
 def _rounded(programs: Sequence[Played]) -> tuple[int, int]:
     """Rows that are rounded, and all rows, of the robots that are exported."""
     shares = [played.shares[name] for played in programs for name in played.exported]
-    return sum(int(np.count_nonzero(each)) for each in shares), sum(map(len, shares))
+    return sum(int(np.count_nonzero(share)) for share in shares), sum(map(len, shares))
 
 
-def _largest(found: Sequence[Deviation]) -> list[Deviation]:
+def _largest(deviations: Sequence[Deviation]) -> list[Deviation]:
     """The largest of each subject and unit, in the order in which they were found."""
     largest: dict[tuple[str, str], Deviation] = {}
-    for each in found:
-        key = each.subject, each.unit
-        if key not in largest or each.largest > largest[key].largest:
-            largest[key] = each
+    for deviation in deviations:
+        key = deviation.subject, deviation.unit
+        if key not in largest or deviation.largest > largest[key].largest:
+            largest[key] = deviation
     return list(largest.values())
 
 

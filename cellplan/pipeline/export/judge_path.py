@@ -69,20 +69,20 @@ class PathRows:
 
         Between two times it is no more than the value between both values.
         """
-        found = np.zeros((len(self.times), 2))
+        deviations = np.zeros((len(self.times), 2))
         if not self.is_off:
-            return found
+            return deviations
         arms = LeverArms(self.scene, self.stacked)
         if np.any(self.off):
             steps = np.pad(tool_margins(arms, self.scene, relation, self.off), ((1, 1), (0, 0)))
-            found += np.maximum(steps[:-1], steps[1:])
-        return found + tool_corners(arms, self.scene, relation, self.stacked, self.corners)
+            deviations += np.maximum(steps[:-1], steps[1:])
+        return deviations + tool_corners(arms, self.scene, relation, self.stacked, self.corners)
 
     def depth_off(self, task: Task) -> Array:
         """By how much deeper a tool may be for it at each time in [m], shape (M,): as far as any point of it moves."""
         off = self.tool_off(task)
-        found: Array = off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
-        return found
+        depths: Array = off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
+        return depths
 
 
 def path_rows(played: Played, stretch: Stretch, scene: Scene) -> PathRows:
@@ -137,11 +137,15 @@ def _checks(rows: PathRows) -> list[Check]:
     accuracy = tuple(with_off(errors, off) for errors, off in zip(accuracy, tools, strict=True))
     closures = tuple(with_off(errors, off) for errors, off in zip(closures, holders, strict=True))
     checks: list[Check] = []
-    for own, given, errors, plain in zip(schedule.tasks, rows.schedule.tasks, accuracy, strict_accuracy, strict=True):
-        tolerance = own.task.tolerance
-        found = with_between(check_accuracy(schedule, errors, own.task), check_task_between(errors, tolerance))
-        strict = _at_rows(rows, given, plain) if all(check.passed for check in found) else ()
-        both = [*found, *strict]
+    for scheduled, given, errors, plain in zip(
+        schedule.tasks, rows.schedule.tasks, accuracy, strict_accuracy, strict=True
+    ):
+        tolerance = scheduled.task.tolerance
+        accuracy_checks = with_between(
+            check_accuracy(schedule, errors, scheduled.task), check_task_between(errors, tolerance)
+        )
+        strict = _at_rows(rows, given, plain) if all(check.passed for check in accuracy_checks) else ()
+        both = [*accuracy_checks, *strict]
         checks += with_locked_joints(both, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     checks += check_depths(cell, _depths(rows, schedule))
@@ -180,9 +184,9 @@ def _longer(vectors: Array, by: Array) -> Array:
 
 def _depths(rows: PathRows, schedule: Schedule) -> tuple[ToolDepth, ...]:
     """The largest depth of the tool of each task, with what it may be deeper by rounding."""
-    found = tool_depths(rows.scene.cell, schedule, rows.scene.chains, rows.q)
+    depths = tool_depths(rows.scene.cell, schedule, rows.scene.chains, rows.q)
     tasks = {scheduled.task.name: scheduled.task for scheduled in schedule.tasks}
-    return tuple(replace(each, depth=each.depth + float(rows.depth_off(tasks[each.task]).max())) for each in found)
+    return tuple(replace(depth, depth=depth.depth + float(rows.depth_off(tasks[depth.task]).max())) for depth in depths)
 
 
 def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple[Check, ...]:
@@ -212,11 +216,11 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
         first, second = bound.names(pair)
         sample = min((*pair.touches, *pair.unproved), default=pair.at)
         at_s = float(np.interp(sample, np.arange(rows.is_break.sum()), rows.times[rows.is_break]))
-        kept = f"are proved to keep {MM * pair.proved:.4g} mm only"
+        proof = f"are proved to keep {MM * pair.proved:.4g} mm only"
         if np.isfinite(pair.distance) and pair.distance < pair.demand:
-            kept = f"come as near as {MM * pair.distance:.4g} mm or nearer"
+            proof = f"come as near as {MM * pair.distance:.4g} mm or nearer"
         if pair.touches:
-            kept = "touch"
+            proof = "touch"
         usual = rows.scene.pairs[pair.row]
         added = pair.demand - (usual.demand if usual.rule is Rule.CLEARANCE else 0.0)
         wide, cure = "", "let them pass farther apart"
@@ -224,7 +228,7 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
             wide = f", {MM * added:.2g} mm of it for what rows may be off by rounding"
             cure = f"leave out less (--thin-mm, --thin-deg), so that rounding takes less, or {cure}"
         demanded = f"demanded {MM * pair.demand:.4g} mm{wide}"
-        yield f"clearance: {first} and {second} {kept}, at {at_s:.3f} s, {demanded}; {cure}"
+        yield f"clearance: {first} and {second} {proof}, at {at_s:.3f} s, {demanded}; {cure}"
 
 
 def _demanding(rows: PathRows) -> Scene:

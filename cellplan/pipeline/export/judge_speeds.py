@@ -55,10 +55,10 @@ def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
         robot = played.run.cell.robot(name)
         times, q = _as_played(played, robot)
         uses = joint_uses(robot, times, q)
-        yield from _failed((each for each in check_joints(uses, times, q) if each.name != POSITION), played.phase_at)
+        yield from _failed((check for check in check_joints(uses, times, q) if check.name != POSITION), played.phase_at)
         if accelerations:
-            found = MotionAccelerations(joints=tuple(joint_peaks(played.run.cell, robot, times, q, jumps_at=jumps)))
-            checks = check_accelerations(played.run.cell, found)
+            motion = MotionAccelerations(joints=tuple(joint_peaks(played.run.cell, robot, times, q, jumps_at=jumps)))
+            checks = check_accelerations(played.run.cell, motion)
             judged = (check for check in checks if check.name != JERK or _is_even(times))
             yield from _failed(judged, played.phase_at)
 
@@ -69,19 +69,19 @@ def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[
     They are taken at even times, as far apart as the rows of the run, or as the rows of the slowest cycle where these
     are farther apart.
     """
-    own = scene.cell
+    cell = scene.cell
     steps = [np.diff(played.run_times).max(), *(np.diff(times_of(played.rows[name])).max() for name in played.exported)]
     count = max(2, round((stretch.end - stretch.begin) / max(steps)))
     times = np.linspace(0.0, stretch.end - stretch.begin, count + 1)
     q: Mapping[str, Array] = played.at(stretch.begin + times)
-    X_WP, schedule = part_poses(own, scene.chains, q), schedule_at(stretch.motion.schedule, times)
-    speeds = {robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in own.robots}
-    checks = [*check_feeds(scene, schedule, q, X_WP), *check_tool_speeds(own, speeds)]
-    checks += check_payload(load_uses(own, scene.chains, times, q))
-    if own.checks.part_acceleration_m_s2 is not None and own.positioners:
-        window = own.robot(own.positioners[0]).controller_cycle
-        part = part_acceleration(own, times, X_WP, window=window)
-        checks += check_accelerations(own, MotionAccelerations(part=part))
+    X_WP, schedule = part_poses(cell, scene.chains, q), schedule_at(stretch.motion.schedule, times)
+    speeds = {robot.name: robot_speed(robot, scene.chains[robot.name], times, q[robot.name]) for robot in cell.robots}
+    checks = [*check_feeds(scene, schedule, q, X_WP), *check_tool_speeds(cell, speeds)]
+    checks += check_payload(load_uses(cell, scene.chains, times, q))
+    if cell.checks.part_acceleration_m_s2 is not None and cell.positioners:
+        window = cell.robot(cell.positioners[0]).controller_cycle
+        part = part_acceleration(cell, times, X_WP, window=window)
+        checks += check_accelerations(cell, MotionAccelerations(part=part))
     yield from _failed(checks, lambda _: stretch.motion.name or "")
 
 
@@ -98,9 +98,9 @@ def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
 
 def _jumps(played: Played) -> Array:
     """Times in [s] of the played program at which the desired speed of a tool jumps."""
-    schedules = ((each.begin, each.motion.schedule) for each in played.stretches())
-    found = [begin + desired_jumps(schedule) for begin, schedule in schedules if schedule.is_continuous]
-    return np.concatenate([NO_TIMES, *found])
+    schedules = ((stretch.begin, stretch.motion.schedule) for stretch in played.stretches())
+    jumps = [begin + desired_jumps(schedule) for begin, schedule in schedules if schedule.is_continuous]
+    return np.concatenate([NO_TIMES, *jumps])
 
 
 def _is_even(times: Array) -> bool:

@@ -40,12 +40,12 @@ def corner_vectors(rows: RobotRows, shares: Array) -> Array:
     Args:
         shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
     """
-    found = np.zeros_like(rows.q)
+    vectors = np.zeros_like(rows.q)
     h = np.maximum(np.diff(times_of(rows)), SHORTEST)
     v = np.diff(rows.q, axis=0) / h[:, None]
     time = shares[1:-1] * h[:-1] * h[1:] / (h[:-1] + h[1:])
-    found[1:-1] = time[:, None] * np.diff(v, axis=0)
-    return found
+    vectors[1:-1] = time[:, None] * np.diff(v, axis=0)
+    return vectors
 
 
 def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
@@ -57,28 +57,28 @@ def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
         shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
         times: Times in [s], shape (M,).
     """
-    own, largest = times_of(rows), corner_vectors(rows, shares)
-    step = np.clip(np.searchsorted(own, times, side="right") - 1, 0, len(own) - 2)
-    u = np.clip((times - own[step]) / np.maximum(np.diff(own), SHORTEST)[step], 0.0, 1.0)
+    marks, largest = times_of(rows), corner_vectors(rows, shares)
+    step = np.clip(np.searchsorted(marks, times, side="right") - 1, 0, len(marks) - 2)
+    u = np.clip((times - marks[step]) / np.maximum(np.diff(marks), SHORTEST)[step], 0.0, 1.0)
     before, after = (
         np.where(share > 0.0, 1.0 - way / np.maximum(share, SHORTEST), 0.0)
         for share, way in ((shares[step], u), (shares[step + 1], 1.0 - u))
     )
-    found: Array = (
+    between: Array = (
         np.maximum(before, 0.0)[:, None] * largest[step] + np.maximum(after, 0.0)[:, None] * largest[step + 1]
     )
-    return found
+    return between
 
 
 def all_corners(played: Played, times: Array) -> Array:
     """As ``corners_at`` of all robots of a program, shape (M, nq)."""
-    found = []
+    corners = []
     for robot in played.run.cell.robots:
         rows, shares = played.rows[robot.name], played.shares.get(robot.name)
         is_rounded = robot.name in played.exported and shares is not None and bool(np.any(shares > 0.0))
         empty = np.zeros((len(times), rows.q.shape[1]))
-        found.append(corners_at(rows, shares, times) if is_rounded and shares is not None else empty)
-    return np.concatenate(found, axis=1)
+        corners.append(corners_at(rows, shares, times) if is_rounded and shares is not None else empty)
+    return np.concatenate(corners, axis=1)
 
 
 def robot_corners(played: Played) -> dict[str, Array]:
@@ -96,13 +96,13 @@ def off_chords(played: Played, times: Array) -> Array:
     off = []
     for robot in played.run.cell.robots:
         rows = played.rows[robot.name]
-        own = np.zeros((len(times) - 1, rows.q.shape[1]))
+        off_chord = np.zeros((len(times) - 1, rows.q.shape[1]))
         if robot.name in played.exported and played.interpolation is Interpolation.CUBIC:
             middle = 0.5 * (times[:-1] + times[1:])
             step = np.clip(np.searchsorted(times_of(rows), middle, side="right") - 1, 0, len(rows) - 2)
             parts = np.diff(times_of(rows))[:, None] / played.parts(robot.name)
-            own += (played.curve(robot.name).largest_accelerations() * parts**2 / 8.0)[step]
-        off.append(own)
+            off_chord += (played.curve(robot.name).largest_accelerations() * parts**2 / 8.0)[step]
+        off.append(off_chord)
     return np.concatenate(off, axis=1)
 
 
@@ -141,30 +141,30 @@ def tool_corners(arms: LeverArms, scene: Scene, relation: Relation, q: Array, co
         q: Straight motion in [rad] or [m], shape (M, nq).
         corners: How far all joints may be off at these times, see ``corners_at``, shape (M, nq).
     """
-    found = np.zeros((len(q), 2))
+    largest = np.zeros((len(q), 2))
     near = np.flatnonzero(np.any(corners != 0.0, axis=1))
     if not len(near):
-        return found
+        return largest
     twists = _twists(scene, relation, q[near], corners[near])
     sums = [*twists, np.sum(twists, axis=0)]
     lengths = [
-        np.stack([np.linalg.norm(each[:, part], axis=1) for part in (slice(3), slice(3, 6))], 1) for each in sums
+        np.stack([np.linalg.norm(total[:, part], axis=1) for part in (slice(3), slice(3, 6))], 1) for total in sums
     ]
-    found[near] = np.max(lengths, axis=0)
-    return found + _changes(arms, scene, relation, q, corners)
+    largest[near] = np.max(lengths, axis=0)
+    return largest + _changes(arms, scene, relation, q, corners)
 
 
 def _twists(scene: Scene, relation: Relation, q: Array, corners: Array) -> list[Array]:
     """Motion of a tool on the part by what each robot that takes part may be off, tip then turn, shape (M, 6) each."""
     cell, holder = scene.cell, _holder(scene, relation)
     p = scene.chains[relation.robot].tool_poses(q[:, cell.columns(relation.robot)])[:, :3, 3]
-    found = []
+    twists = []
     for sign, robot in ((1.0, relation.robot), (-1.0, holder)):
         if robot is not None:
-            own = cell.columns(robot)
-            screw = np.einsum("nij,nj->ni", scene.chains[robot].flange_screws(q[:, own]), corners[:, own])
-            found.append(sign * np.concatenate([screw[:, :3] + np.cross(screw[:, 3:], p), screw[:, 3:]], axis=1))
-    return found
+            columns = cell.columns(robot)
+            screw = np.einsum("nij,nj->ni", scene.chains[robot].flange_screws(q[:, columns]), corners[:, columns])
+            twists.append(sign * np.concatenate([screw[:, :3] + np.cross(screw[:, 3:], p), screw[:, 3:]], axis=1))
+    return twists
 
 
 def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corners: Array) -> Array:
@@ -173,8 +173,8 @@ def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corner
     way = arms.steps(q) + off
     mixed = [0.5 * (bend(way + off) - bend(way) - bend(off)) for bend in (chain.bend, chain.turn_bend)]
     steps = np.pad(np.stack(mixed, axis=1), ((1, 1), (0, 0)))
-    found: Array = np.maximum(steps[:-1], steps[1:])
-    return found
+    changes: Array = np.maximum(steps[:-1], steps[1:])
+    return changes
 
 
 def _holder(scene: Scene, relation: Relation) -> str | None:

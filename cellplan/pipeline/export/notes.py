@@ -30,7 +30,7 @@ def _notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Iterat
     yield from promised.remarks
     yield from skew_lines(prepared)
     if prepared.orders:
-        yield f"all robots of the cell wait at {sum(len(own.marks) for own in prepared.orders)} marks"
+        yield f"all robots of the cell wait at {sum(len(order.marks) for order in prepared.orders)} marks"
     if prepared.thinning is not None:
         yield f"rows left out within {prepared.thinning[0]:g} mm and {prepared.thinning[1]:g} deg"
     yield deviation_line(judgement)
@@ -51,10 +51,10 @@ def skew_lines(prepared: Prepared) -> Iterator[str]:
 def deviation_line(judgement: Judgement) -> str:
     """The largest deviations of what is written from the run: of any joint in each unit, and of any tool."""
     largest: dict[tuple[bool, str], Deviation] = {}
-    for each in judgement.deviations:
-        kind = ("/" in each.subject, each.unit)
-        if kind not in largest or each.largest > largest[kind].largest:
-            largest[kind] = each
+    for deviation in judgement.deviations:
+        kind = ("/" in deviation.subject, deviation.unit)
+        if kind not in largest or deviation.largest > largest[kind].largest:
+            largest[kind] = deviation
     return "largest deviation from the run: " + (", ".join(map(_deviation, largest.values())) or "none")
 
 
@@ -62,7 +62,9 @@ def rounding_line(blend: float, judgement: Judgement) -> str:
     """Which share of rows is rounded, and by how much the tools may be off for it."""
     if blend <= 0.0 or not judgement.rounded[0]:
         return "every row is a stop"
-    most = {each.unit: max(o.largest for o in judgement.corners if o.unit == each.unit) for each in judgement.corners}
+    most = {
+        corner.unit: max(o.largest for o in judgement.corners if o.unit == corner.unit) for corner in judgement.corners
+    }
     off = " and ".join(f"{largest:.2g} {unit}" for unit, largest in most.items()) or "nothing"
     rounded, count = judgement.rounded
     return (
@@ -81,6 +83,12 @@ def _deviation(deviation: Deviation) -> str:
 def deviation_records(judgement: Judgement, *, of_corners: bool = False) -> list[dict[str, object]]:
     """All deviations as records; or by how much more tools may be off at rounded rows."""
     return [
-        {"of": each.subject, "largest": each.largest, "unit": each.unit, "at_s": each.at_s, "phase": each.phase or None}
-        for each in (judgement.corners if of_corners else judgement.deviations)
+        {
+            "of": deviation.subject,
+            "largest": deviation.largest,
+            "unit": deviation.unit,
+            "at_s": deviation.at_s,
+            "phase": deviation.phase or None,
+        }
+        for deviation in (judgement.corners if of_corners else judgement.deviations)
     ]

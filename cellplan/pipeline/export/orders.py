@@ -76,7 +76,7 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
     Raises:
         NotVerifiedError: With the robots, the phase and the distance where marks do not suffice.
     """
-    scenes, found = scenes_of(run), []
+    scenes, orders = scenes_of(run), []
     for program in run_programs(run):
         known: dict[int, list[Stretch]] = {}
         stretches: list[Stretch] = []
@@ -87,14 +87,16 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
             if phase.place not in known:
                 known[phase.place] = list(PhaseSearch(run.cell, scenes[phase.place], program, phase).stretches())
             by = phase.first - known[phase.place][0].first
-            stretches += [replace(each, first=each.first + by, last=each.last + by) for each in known[phase.place]]
+            stretches += [
+                replace(stretch, first=stretch.first + by, last=stretch.last + by) for stretch in known[phase.place]
+            ]
         if len(stretches) > MOST_MARKS:
             raise NotVerifiedError([f"sequence only: {len(stretches)} waits would be needed, at most {MOST_MARKS} are"])
-        marks = [stretches[0].first, *(each.last for each in stretches)]
+        marks = [stretches[0].first, *(stretch.last for stretch in stretches)]
         times = tuple(float(program.times[row]) for row in marks)
-        found.append(Orders(program=program.name, stretches=tuple(stretches), times=times))
+        orders.append(Orders(program=program.name, stretches=tuple(stretches), times=times))
     progress(STAGE, 1.0)
-    return tuple(found)
+    return tuple(orders)
 
 
 def certify_written(
@@ -114,12 +116,12 @@ def certify_written(
         corners: How far each robot may be off at its rows by rounding, see ``margins.robot_corners``, by program.
         progress: Called with the stage and the fraction done.
     """
-    for own, rows, off in zip(orders, read, corners, strict=True):
-        for name, each in rows.robots.items():
-            if len(each.marks) != len(own.marks):
-                yield f"program of '{name}': expected {len(own.marks)} marks, got {len(each.marks)}"
+    for order, rows, off in zip(orders, read, corners, strict=True):
+        for name, robot_rows in rows.robots.items():
+            if len(robot_rows.marks) != len(order.marks):
+                yield f"program of '{name}': expected {len(order.marks)} marks, got {len(robot_rows.marks)}"
                 return
-        yield from dict.fromkeys(finding for _, finding in blocked_orders(run, own, rows, off, progress=progress))
+        yield from dict.fromkeys(finding for _, finding in blocked_orders(run, order, rows, off, progress=progress))
 
 
 def blocked_orders(
@@ -140,18 +142,18 @@ def blocked_orders(
         progress: Called with the stage and the fraction done.
     """
     scenes = scenes_of(run)
-    program = next(each for each in run_programs(run) if each.name == orders.program)
+    program = next(program for program in run_programs(run) if program.name == orders.program)
     known: dict[tuple[bytes, ...], list[str]] = {}
     for count, stretch in enumerate(orders.stretches):
         progress(STAGE, count / len(orders.stretches))
         if not stretch.pairs:
             continue
         q, off = _positions(run.cell, program, rows, count, stretch), _off(run.cell, rows, corners, count)
-        key = (str(stretch.place).encode(), *(each.tobytes() for each in q.values()), off.tobytes())
+        key = (str(stretch.place).encode(), *(positions.tobytes() for positions in q.values()), off.tobytes())
         if key not in known:  # or else a further cycle
             scene, regions = scenes[stretch.place], [_region(q, pair) for pair in stretch.pairs]
             if np.any(off):
-                ends = [np.stack([each.min(axis=0), each.max(axis=0)]) for each in q.values()]
+                ends = [np.stack([positions.min(axis=0), positions.max(axis=0)]) for positions in q.values()]
                 scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off[None], in_step=False)
             times = program.times[[stretch.first, stretch.last]]
             bounds = certify_regions(scene, q, regions)
@@ -220,8 +222,8 @@ class PhaseSearch:
                 high = middle
         if low == 0:
             nearest = rows[0] if rows else self._last
-            bounds = [each for each in self._bounds(first, nearest, pairs) if not each.is_kept]
-            worst = min(bounds, key=lambda each: each.distance)
+            bounds = [bound for bound in self._bounds(first, nearest, pairs) if not bound.is_kept]
+            worst = min(bounds, key=lambda bound: bound.distance)
             raise NotVerifiedError([_not_clear(self._phase.name, worst, self._times[[first, nearest]])])
         return rows[low - 1]
 
@@ -241,23 +243,23 @@ def _region(q: dict[str, Array], pair: Pair) -> ClockRegion:
 
 def _positions(cell: Cell, program: RunProgram, rows: ProgramRows, count: int, stretch: Stretch) -> dict[str, Array]:
     """Rows of every robot between two marks: as they were read, or those of the run where it is not exported."""
-    found = {}
+    positions = {}
     for robot in cell.robots:
-        own = rows.robots.get(robot.name)
-        if own is None:
-            found[robot.name] = program.q[stretch.first : stretch.last + 1, cell.columns(robot.name)]
+        robot_rows = rows.robots.get(robot.name)
+        if robot_rows is None:
+            positions[robot.name] = program.q[stretch.first : stretch.last + 1, cell.columns(robot.name)]
         else:
-            found[robot.name] = own.q[own.marks[count] : own.marks[count + 1] + 1]
-        if len(found[robot.name]) < 2:
-            found[robot.name] = np.repeat(found[robot.name], 2, axis=0)
-    return found
+            positions[robot.name] = robot_rows.q[robot_rows.marks[count] : robot_rows.marks[count + 1] + 1]
+        if len(positions[robot.name]) < 2:
+            positions[robot.name] = np.repeat(positions[robot.name], 2, axis=0)
+    return positions
 
 
 def _off(cell: Cell, rows: ProgramRows, corners: Mapping[str, Array], count: int) -> Array:
     """How far all joints may be off by rounding between two marks, in [rad] or [m], shape (nq,)."""
     off = np.zeros(cell.joint_count)
-    for name, each in rows.robots.items():
-        between = slice(each.marks[count], each.marks[count + 1] + 1)
+    for name, robot_rows in rows.robots.items():
+        between = slice(robot_rows.marks[count], robot_rows.marks[count + 1] + 1)
         off[cell.columns(name)] = corners[name][between].max(axis=0, initial=0.0)
     return off
 

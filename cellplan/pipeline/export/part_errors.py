@@ -40,17 +40,19 @@ class ToolsOnPart:
         """
         holder = {grasp.robot for grasp in cell.part.held_by[:1]}
         limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
-        found: list[tuple[Relation, str, frozenset[str], tuple[float, float]]] = []
+        related: list[tuple[Relation, str, frozenset[str], tuple[float, float]]] = []
         for task in cell.tasks:
-            own = {task.robot} if task.relative_to is Frame.WORLD else {task.robot, *holder}
+            robots_at_work = {task.robot} if task.relative_to is Frame.WORLD else {task.robot, *holder}
             if task.name in tasks:
-                found.append((task, f"the tool of task '{task.name}'", frozenset(own), task.tolerance.between))
-        found += [
+                related.append(
+                    (task, f"the tool of task '{task.name}'", frozenset(robots_at_work), task.tolerance.between)
+                )
+        related += [
             (grasp, f"'{grasp.robot}' on the part", frozenset({grasp.robot, *holder}), limits)
             for grasp in cell.closures
         ]
-        found = [each for each in found if each[2] & set(robots)]
-        relations, names, movers, allowed = zip(*found, strict=True) if found else ((), (), (), ())
+        related = [entry for entry in related if entry[2] & set(robots)]
+        relations, names, movers, allowed = zip(*related, strict=True) if related else ((), (), (), ())
         return cls(cell=cell, chains=chains, relations=relations, names=names, movers=movers, allowed=allowed)
 
     def tips(self, q: Mapping[str, Array]) -> dict[str, Array]:
@@ -60,7 +62,7 @@ class ToolsOnPart:
             q: Joint positions in [rad] or [m], shape (N, n), by robot.
         """
         taking_part = frozenset[str]().union(*self.movers)
-        return {name: self.chains[name].tool_poses(own) for name, own in q.items() if name in taking_part}
+        return {name: self.chains[name].tool_poses(positions) for name, positions in q.items() if name in taking_part}
 
     def poses(self, X_WT: Mapping[str, Array]) -> list[Array]:
         """Pose of each tool in the frame of its task, or on the part, shape (N, 4, 4) each.
@@ -71,8 +73,10 @@ class ToolsOnPart:
         part = self.cell.part
         X_PW = inverse(X_WT[part.held_by[0].robot] @ part.X_CP if self._is_carried else part.X_CP[None])
         return [
-            X_WT[each.robot] if isinstance(each, Task) and each.relative_to is Frame.WORLD else X_PW @ X_WT[each.robot]
-            for each in self.relations
+            X_WT[relation.robot]
+            if isinstance(relation, Task) and relation.relative_to is Frame.WORLD
+            else X_PW @ X_WT[relation.robot]
+            for relation in self.relations
         ]
 
     @property
@@ -83,12 +87,12 @@ class ToolsOnPart:
 
     def errors(self, desired: Sequence[Array], poses: Sequence[Array]) -> list[Array]:
         """Position errors in [m] and orientation errors in [rad] of each, shape (N, 2); open components are zero."""
-        found = []
+        errors = []
         for relation, one, other in zip(self.relations, desired, poses, strict=True):
             error = errors_on_part(other, one, relation)
             lengths = [np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)]
-            found.append(np.stack(lengths, axis=1))
-        return found
+            errors.append(np.stack(lengths, axis=1))
+        return errors
 
     def shares(self, desired: Sequence[Array], poses: Sequence[Array], *, most: float) -> list[Array]:
         """Errors as shares of what is allowed, the larger one of each row, shape (N,).

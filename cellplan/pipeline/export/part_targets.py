@@ -71,21 +71,21 @@ def joints_of_part_poses(
             the one before that a straight line there is another path.
         InputError: The programs have other rows.
     """
-    found = tuple(
+    programs = tuple(
         replace(
-            own,
+            given,
             robots={
-                name: rows if rows.X_PT is None else _with_joints(frame, own, rows, program.robots[name])
-                for name, rows in own.robots.items()
+                name: rows if rows.X_PT is None else _with_joints(frame, given, rows, program.robots[name])
+                for name, rows in given.robots.items()
             },
         )
-        for program, own in zip(written, read, strict=True)
+        for program, given in zip(written, read, strict=True)
     )
-    for program in found:
+    for program in programs:
         for rows in program.robots.values():
             if rows.X_PT is not None:
                 _require_straight(frame, program, rows)
-    return found
+    return programs
 
 
 def _require_straight(frame: ExportFrame, program: ProgramRows, rows: RobotRows) -> None:
@@ -94,13 +94,13 @@ def _require_straight(frame: ExportFrame, program: ProgramRows, rows: RobotRows)
         return
     ends = np.flatnonzero(np.all(np.isfinite(rows.X_PT), axis=(1, 2)))
     holder = frame.cell.part.held_by[0].robot
-    own, held = rows.q, program.robots[holder].q
+    arm, held = rows.q, program.robots[holder].q
     before, after, middle = (
         _tool_on_part(frame, rows.robot, q=mine, q_holder=others)
         for mine, others in (
-            (own[ends - 1], held[ends - 1]),
-            (own[ends], held[ends]),
-            (0.5 * (own[ends - 1] + own[ends]), 0.5 * (held[ends - 1] + held[ends])),
+            (arm[ends - 1], held[ends - 1]),
+            (arm[ends], held[ends]),
+            (0.5 * (arm[ends - 1] + arm[ends]), 0.5 * (held[ends - 1] + held[ends])),
         )
     )
     half_turn = 0.5 * rotation_vector(np.swapaxes(before[:, :3, :3], 1, 2) @ after[:, :3, :3])
@@ -152,13 +152,13 @@ def _with_joints(frame: ExportFrame, program: ProgramRows, rows: RobotRows, writ
     first = written.q[at].copy()
     external = list(Axes.of(robot).external)
     first[:, external] = rows.q[at][:, external]
-    found, misses = _solved(ScrewChain(robot), X_WT, first, arm=list(Axes.of(robot).arm))
-    far = (misses > POSE_TOL) | (np.max(np.abs(found - first), axis=1) > STEP_TOL)
+    solutions, misses = _solved(ScrewChain(robot), X_WT, first, arm=list(Axes.of(robot).arm))
+    far = (misses > POSE_TOL) | (np.max(np.abs(solutions - first), axis=1) > STEP_TOL)
     if np.any(far):
         place = int(at[np.argmax(far)])
         raise NotVerifiedError([f"robot '{rows.robot}': row {place}: its target on the part is not met by its joints"])
-    stated = configuration(robot, found)
-    same = _same_configuration(stated, rows.configuration[at], to_numbers(robot, found, decimals=9))
+    stated = configuration(robot, solutions)
+    same = _same_configuration(stated, rows.configuration[at], to_numbers(robot, solutions, decimals=9))
     if not np.all(same):
         place = int(np.argmin(same))
         raise NotVerifiedError(
@@ -168,7 +168,7 @@ def _with_joints(frame: ExportFrame, program: ProgramRows, rows: RobotRows, writ
             ]
         )
     q = rows.q.copy()
-    q[at] = found
+    q[at] = solutions
     return replace(rows, q=q)
 
 
@@ -190,11 +190,11 @@ def _solved(chain: ScrewChain, X_WT: Array, first: Array, *, arm: list[int]) -> 
     return q, misses
 
 
-def _same_configuration(own: NDArray[np.int_], read: NDArray[np.int_], numbers: Array) -> NDArray[np.bool_]:
+def _same_configuration(configuration: NDArray[np.int_], read: NDArray[np.int_], numbers: Array) -> NDArray[np.bool_]:
     """Whether configuration data are those of the joints, either side of an edge being right on it, shape (N,)."""
     axes = numbers[:, [-6, -3, -1]]
-    beside = np.abs(axes - np.rint(axes / QUARTER) * QUARTER) < EDGE_TOL
-    turns = (own[:, :3] == read[:, :3]) | (beside & (np.abs(own[:, :3] - read[:, :3]) <= 1))
+    is_at_edge = np.abs(axes - np.rint(axes / QUARTER) * QUARTER) < EDGE_TOL
+    turns = (configuration[:, :3] == read[:, :3]) | (is_at_edge & (np.abs(configuration[:, :3] - read[:, :3]) <= 1))
     is_straight = np.abs(numbers[:, -2]) < EDGE_TOL
-    sides = (own[:, 3] == read[:, 3]) | (is_straight & (own[:, 3] // 2 == read[:, 3] // 2))
+    sides = (configuration[:, 3] == read[:, 3]) | (is_straight & (configuration[:, 3] // 2 == read[:, 3] // 2))
     return np.all(turns, axis=1) & sides

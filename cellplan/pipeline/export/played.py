@@ -88,14 +88,14 @@ class Played:
 
     def at(self, times: Array) -> dict[str, Array]:
         """Positions of all robots at times in [s] of the played program, shape (M,), shape (M, n), by robot."""
-        found = {}
+        positions = {}
         for name, rows in self.rows.items():
             if name in self._curves:
-                found[name] = self._curves[name].at(times)
+                positions[name] = self._curves[name].at(times)
             else:
-                own = times_of(rows)
-                found[name] = np.stack([np.interp(times, own, column) for column in rows.q.T], axis=1)
-        return found
+                row_times = times_of(rows)
+                positions[name] = np.stack([np.interp(times, row_times, column) for column in rows.q.T], axis=1)
+        return positions
 
     @cached_property
     def _curves(self) -> Mapping[str, HermiteRows]:

@@ -19,7 +19,7 @@ from cellplan.pipeline.export.part_targets import with_part_poses
 from cellplan.pipeline.export.promises import Promised, choose_promise, controllers_of
 from cellplan.pipeline.export.resample import lead_time, resampled
 from cellplan.pipeline.export.round_rows import stops_left, with_rounding
-from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.rows import essential_rows, full_rows
 from cellplan.pipeline.export.run_programs import run_programs
 from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.skew import RunSkew, run_skew
@@ -43,7 +43,7 @@ class Prepared:
     dialect: Dialect  # the format
     job: ExportJob  # frame and rows, without notes
     promised: Promised  # what is promised
-    asked: Promise | None  # the promise that was asked for; None where the best one was
+    requested: Promise | None  # the promise that was asked for; None where the best one was
     skew: RunSkew | None
     orders: tuple[Orders, ...]
     thinning: tuple[float, float] | None
@@ -70,7 +70,7 @@ def prepare(
     shared = shared or Shared(run)
     robots = exported_robots(run.cell, dialect, choice.robots)
     skew = run_skew(run, progress=progress) if Promise.TIMED in dialect.promises else None
-    promised = choose_promise(run, dialect, robots, skew=skew, asked=choice.promise)
+    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise)
     frame = frame_of(run, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))
     has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
@@ -86,7 +86,7 @@ def prepare(
         dialect=dialect,
         job=job,
         promised=promised,
-        asked=choice.promise,
+        requested=choice.promise,
         skew=skew if promised.promise is Promise.TIMED else None,
         orders=orders,
         thinning=thinning_of(dialect, promised.promise, choice),
@@ -131,7 +131,7 @@ def refuse_unfit(run: ReadRun, dialect: Dialect, choice: Choice) -> None:
     choice.refuse_for(dialect)
     robots = exported_robots(run.cell, dialect, choice.robots)
     try:
-        promise = choose_promise(run, dialect, robots, asked=choice.promise).promise
+        promise = choose_promise(run, dialect, robots, requested=choice.promise).promise
     except InputError as error:
         unstated = error.findings if isinstance(error, InvalidFileError) else [error]
         promise = choice.promise or dialect.promises[0]
@@ -164,7 +164,7 @@ def _shaped(
     """Rows of the robots that are exported, with marks, as the format holds them; and by how much they are later."""
     run, programs = shared.run, full_rows(shared.run)
     if orders:
-        programs = tuple(_with_marks(program, own) for program, own in zip(programs, orders, strict=True))
+        programs = tuple(_with_marks(program, order) for program, order in zip(programs, orders, strict=True))
     thinning = thinning_of(dialect, frame.promise, choice)
     if is_at_cycle(dialect, frame.promise):
         cycles = {robot.name: cycle_of(robot) for robot in run.cell.robots}  # all start and end together
@@ -175,10 +175,10 @@ def _shaped(
             turn=thinning[1] / DEG, slide=thinning[0] / MM, tool=thinning[0] / MM, shortest_time=dialect.shortest_time
         )
         scene, groups = shared.scene, row_groups(frame)
-        kept = kept_rows(run)
+        rows_of_run = essential_rows(run)
         programs = tuple(
-            thinned(scene, program, groups=groups, limits=limits, kept=rows)
-            for program, rows in zip(programs, kept, strict=True)
+            thinned(scene, program, groups=groups, limits=limits, essential_rows=rows)
+            for program, rows in zip(programs, rows_of_run, strict=True)
         )
     return tuple(_only(program, frame.robots) for program in programs), 0.0
 

@@ -44,7 +44,7 @@ class _Export:
     dialect: Dialect
     robots: tuple[str, ...]
     skew: RunSkew | None
-    asked: Promise | None
+    requested: Promise | None
 
     @property
     def controllers(self) -> dict[str, ControllerEntry]:
@@ -59,7 +59,7 @@ def choose_promise(
     robots: Sequence[str],
     *,
     skew: RunSkew | None = None,
-    asked: Promise | None = None,
+    requested: Promise | None = None,
 ) -> Promised:
     """The best promise that a format can keep for some robots of a run, or the one that is asked for.
 
@@ -75,20 +75,20 @@ def choose_promise(
         NotVerifiedError: None can be kept with this motion; the first line says why not the least one that the format
             can hold, indented ones say why not the better ones.
     """
-    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, asked=asked)
-    found: dict[Promise, _Against] = {}
+    export = _Export(run=run, dialect=dialect, robots=tuple(robots), skew=skew, requested=requested)
+    failures: dict[Promise, _Against] = {}
     for promise in BEST_FIRST:
         against = _against(export, promise)
         if against is None:
-            reasons = tuple(f"not {better}: {each.text}" for better, each in found.items())
+            reasons = tuple(f"not {better}: {reason.text}" for better, reason in failures.items())
             return Promised(promise=promise, reasons=reasons, remarks=tuple(_remarks(export, promise)))
-        found[promise] = against
-    unstated = [found[promise].text for promise in dialect.promises if found[promise].is_input]
+        failures[promise] = against
+    unstated = [failures[promise].text for promise in dialect.promises if failures[promise].is_input]
     if unstated:
         raise InvalidFileError([InputError(text) for text in unstated])
-    *better, last = [promise for promise in found if promise in dialect.promises]
-    details = [f"  not {promise}: {found[promise].text}" for promise in better]
-    raise NotVerifiedError([f"{dialect.name}: not {last}: {found[last].text}", *details, f"  cure: {_cure(export)}"])
+    *better, last = [promise for promise in failures if promise in dialect.promises]
+    details = [f"  not {promise}: {failures[promise].text}" for promise in better]
+    raise NotVerifiedError([f"{dialect.name}: not {last}: {failures[last].text}", *details, f"  cure: {_cure(export)}"])
 
 
 def _cure(export: _Export) -> str:
@@ -113,19 +113,19 @@ def _cure(export: _Export) -> str:
 
 def controllers_of(cell: Cell, robots: Sequence[str]) -> dict[str, str]:
     """Name of the controller of each robot; one without a stated controller counts as having one of its own."""
-    found = {}
+    controllers = {}
     for name in robots:
         control = cell.robot(name).control
-        found[name] = f"that of {name}" if control is None else control.id
-    return found
+        controllers[name] = f"that of {name}" if control is None else control.id
+    return controllers
 
 
 def _against(export: _Export, promise: Promise) -> _Against | None:
     """Why a promise cannot be made; None where it can."""
     if promise not in export.dialect.promises:
         return _Against(f"{export.dialect.name} programs cannot state it")
-    if export.asked is not None and promise is not export.asked:
-        return _Against(f"'{export.asked}' was asked for")
+    if export.requested is not None and promise is not export.requested:
+        return _Against(f"'{export.requested}' was asked for")
     match promise:
         case Promise.TIMED:
             return _against_timed(export)
@@ -220,7 +220,7 @@ def waits(cell: Cell, robot: str) -> bool:
     """Whether the controller of a robot plays a format whose programs wait for one another at marks."""
     control = cell.robot(robot).control
     kind = None if control is None else cell.controllers[control.id].kind
-    return any(kind in each.kinds and Promise.SEQUENCE_ONLY in each.promises for each in DIALECTS.values())
+    return any(kind in dialect.kinds and Promise.SEQUENCE_ONLY in dialect.promises for dialect in DIALECTS.values())
 
 
 def _skew_remarks(export: _Export) -> Iterator[str]:

@@ -27,7 +27,7 @@ def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Rec
     frame = written.job.frame
     about = {
         "promise": str(frame.promise),
-        "asked_promise": None if prepared.asked is None else str(prepared.asked),
+        "asked_promise": None if prepared.requested is None else str(prepared.requested),
         "reasons": list(prepared.promised.reasons),
         "remarks": list(prepared.promised.remarks),
         "robots": list(frame.robots),
@@ -38,7 +38,7 @@ def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Rec
         "deviation": deviation_line(written.judgement),
         "deviations": deviation_records(written.judgement),
         "not_judged": list(written.judgement.not_judged),
-        "marks": [_marks(own, place, written) for place, own in enumerate(prepared.orders)],
+        "marks": [_marks(order, place, written) for place, order in enumerate(prepared.orders)],
         "thinning": None if prepared.thinning is None else _thinning(prepared.thinning),
         "blend": written.job.blend,
         "rounded": _rounded(written),
@@ -59,10 +59,14 @@ def record_text(record: Record) -> str:
 
 def _rounded(written: Written) -> Record | None:
     """How many rows are rounded, and by how much more the tools may be off there."""
-    found = written.judgement
-    if not found.rounded[0]:
+    judgement = written.judgement
+    if not judgement.rounded[0]:
         return None
-    return {"rows": found.rounded[0], "of": found.rounded[1], "corners": deviation_records(found, of_corners=True)}
+    return {
+        "rows": judgement.rounded[0],
+        "of": judgement.rounded[1],
+        "corners": deviation_records(judgement, of_corners=True),
+    }
 
 
 def _record(run: VerifiedRun, name: str, about: Record, files: Mapping[str, str]) -> Record:
@@ -103,13 +107,13 @@ def _thinning(thinning: tuple[float, float]) -> Record:
 
 def _marks(orders: Orders, place: int, written: Written) -> Record:
     """Marks of one program: rows of the run, rows of each robot in its file, and what was certified between."""
-    own = written.job.programs[place].robots
+    robot_rows = written.job.programs[place].robots
     return {
         "program": orders.program,
         "times_s": list(orders.times),
         "run_rows": list(orders.marks),
-        "rows": {name: list(rows.marks) for name, rows in own.items()},
-        "certified": [_stretch(each) for each in orders.stretches],
+        "rows": {name: list(rows.marks) for name, rows in robot_rows.items()},
+        "certified": [_stretch(stretch) for stretch in orders.stretches],
     }
 
 

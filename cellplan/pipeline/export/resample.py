@@ -40,12 +40,12 @@ def resampled(cell: Cell, program: ProgramRows, cycle_of: Mapping[str, float]) -
     common = _common_cycle(cycle_of)
     last = max(float(times_of(rows)[-1]) for rows in program.robots.values())
     end = common * math.ceil((round(MICRO * (lead + last)) + round(MICRO * REST)) / common) / MICRO
-    found = {
+    on_cycle = {
         name: _on_cycle(cell.robot(name), rows, cycle_of[name], lead=lead, end=end)
         for name, rows in program.robots.items()
         if name in cycle_of
     }
-    return replace(program, robots=found)
+    return replace(program, robots=on_cycle)
 
 
 def lead_time(cycle_of: Mapping[str, float]) -> float:
@@ -83,7 +83,9 @@ def _on_cycle(robot: Robot, rows: RobotRows, cycle: float, *, lead: float, end: 
     times = np.round(np.arange(round(end / cycle) + 1) * cycle, TIME_DECIMALS)
     curve = HermiteRows(times=times_of(rows), q=rows.q, qd=rows.qd)
     lower, upper = (np.array([getattr(joint, side) for joint in robot.model.joints]) for side in ("lower", "upper"))
-    own = np.clip(curve.at(times - lead), np.minimum(lower, rows.q.min(axis=0)), np.maximum(upper, rows.q.max(axis=0)))
+    resampled_rows = np.clip(
+        curve.at(times - lead), np.minimum(lower, rows.q.min(axis=0)), np.maximum(upper, rows.q.max(axis=0))
+    )
     process = None
     if rows.process is not None:
         before = np.searchsorted(times_of(rows), times - lead + TIME_TOLERANCE, side="right") - 1
@@ -91,9 +93,9 @@ def _on_cycle(robot: Robot, rows: RobotRows, cycle: float, *, lead: float, end: 
     return replace(
         rows,
         stops=(),
-        q=own,
+        q=resampled_rows,
         times=times,
-        qd=row_speeds(times, own, rests=resting(own), lower=lower, upper=upper),
+        qd=row_speeds(times, resampled_rows, rests=resting(resampled_rows), lower=lower, upper=upper),
         process=process,
         marks=_marks_on_cycle(rows, times - lead),
     )

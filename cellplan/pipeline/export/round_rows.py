@@ -65,8 +65,8 @@ def with_rounding(
         rounded = replace(job, blend=LARGEST_SHARE)
         programs, largest = [], 0.0
         played = played_programs(shared.run, dialect, rounded, _plain(read or job.programs), lead=lead)
-        for place, (program, own) in enumerate(zip(job.programs, played, strict=True)):
-            chosen = _Choice(rounded, program, own, shared)
+        for place, (program, executed) in enumerate(zip(job.programs, played, strict=True)):
+            chosen = _Choice(rounded, program, executed, shared)
             chosen.keep_demands()
             if orders:
                 chosen.keep_orders(orders[place])
@@ -89,7 +89,7 @@ def stops_left(job: ExportJob) -> tuple[int, int]:
     for program in job.programs:
         free, shares = may_round(program, job.frame.promise), row_shares(job, program)
         stops += sum(int(np.count_nonzero(free[name] & (shares[name] == 0.0))) for name in free)
-        count += sum(int(np.count_nonzero(own)) for own in free.values())
+        count += sum(int(np.count_nonzero(shares)) for shares in free.values())
     return stops, count
 
 
@@ -112,7 +112,7 @@ class _Choice:
     @property
     def largest(self) -> float:
         """Largest share chosen so far."""
-        return max(float(own.max(initial=0.0)) for own in self._chosen.values())
+        return max(float(shares.max(initial=0.0)) for shares in self._chosen.values())
 
     def keep_demands(self) -> None:
         """Choose shares with which every phase keeps what is demanded of tools and bodies."""
@@ -135,8 +135,8 @@ class _Choice:
     def keep_orders(self, orders: Orders) -> None:
         """Take back what does not keep its distance in every order between two marks."""
         for reach in (*REACHES[1:], 0.0):
-            own, run = replace(self._played, shares=self._shares()), self._shared.run
-            blocked = {place for place, _ in blocked_orders(run, orders, self.program, robot_corners(own))}
+            executed, run = replace(self._played, shares=self._shares()), self._shared.run
+            blocked = {place for place, _ in blocked_orders(run, orders, self.program, robot_corners(executed))}
             if not blocked:
                 return
             for place in blocked:
@@ -149,10 +149,10 @@ class _Choice:
     def _round(self, stretch: Stretch, scene: Scene, inside: Mapping[str, slice]) -> None:
         """Choose the shares of a phase."""
         begun = {name: self._chosen[name][rows].copy() for name, rows in inside.items()}
-        for room in ROOMS:
+        for margin in ROOMS:
             for name, rows in inside.items():
                 self._chosen[name][rows] = begun[name]
-            if self._keep_tools(stretch, scene, room):
+            if self._keep_tools(stretch, scene, margin):
                 break
         else:
             self._limit(inside, scene, 0.0)
@@ -163,21 +163,21 @@ class _Choice:
                 return
         self._limit(inside, scene, 0.0)
 
-    def _keep_tools(self, stretch: Stretch, scene: Scene, room: float) -> bool:
+    def _keep_tools(self, stretch: Stretch, scene: Scene, reserve: float) -> bool:
         """Lower shares until no tool leaves a share of what is allowed; whether all is kept then, between rows too."""
         allowed: dict[str, float] = {}
         for _ in range(len(SHARES) * 4):
             rows = self._rows(stretch, scene)
             lowered = False
             for relation, errors, limit in _errors(rows):
-                is_over = np.any(errors > room * np.array(limit), axis=1)
+                is_over = np.any(errors > reserve * np.array(limit), axis=1)
                 lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(scene, relation))
-            lowered |= self._lower_depths(stretch, rows, allowed, room)
+            lowered |= self._lower_depths(stretch, rows, allowed, reserve)
             if not lowered:
                 return keeps_tools(rows)
         return False
 
-    def _lower_depths(self, stretch: Stretch, rows: PathRows, known: dict[str, float], room: float) -> bool:
+    def _lower_depths(self, stretch: Stretch, rows: PathRows, known: dict[str, float], reserve: float) -> bool:
         """Lower the shares of rows at which a tool may be deeper by more than it may; whether there were any."""
         if not known:
             known |= {task.name: limit - depth for task, depth, limit in straight_depths(rows)}
@@ -185,7 +185,7 @@ class _Choice:
         for scheduled in rows.schedule.tasks:
             task = scheduled.task
             if task.name in known:
-                is_over = rows.depth_off(task) > room * max(known[task.name], 0.0)
+                is_over = rows.depth_off(task) > reserve * max(known[task.name], 0.0)
                 lowered |= self._lower(rows.times[is_over] + stretch.begin, movers_of(rows.scene, task))
         return lowered
 
@@ -197,9 +197,9 @@ class _Choice:
             every = np.any(list(rows_of.values()), axis=0)
             rows_of = {name: every.copy() for name in self._chosen}
         for name, is_near in rows_of.items():
-            own = self._chosen[name]
-            is_lowered = is_near & (own > 0.0)
-            own[is_lowered] = _next_lower(own[is_lowered])
+            chosen = self._chosen[name]
+            is_lowered = is_near & (chosen > 0.0)
+            chosen[is_lowered] = _next_lower(chosen[is_lowered])
             lowered |= bool(np.any(is_lowered))
         return lowered
 
@@ -210,9 +210,9 @@ class _Choice:
         arms = LeverArms(scene, stacked(scene.cell, self._played.at(self._played.run_times)))
         most = {}
         for name in self._chosen:
-            own = self._played.rows[name]
-            off = np.zeros((len(own), scene.cell.joint_count))
-            off[:, scene.cell.columns(name)] = np.abs(corner_vectors(own, np.ones(len(own))))
+            executed = self._played.rows[name]
+            off = np.zeros((len(executed), scene.cell.joint_count))
+            off[:, scene.cell.columns(name)] = np.abs(corner_vectors(executed, np.ones(len(executed))))
             ways = np.sort(body_reach(arms, scene, off), axis=0)[-2:].sum(axis=0)
             most[name] = reach / np.maximum(ways, 1e-12)
         if self._in_step:
@@ -249,9 +249,9 @@ def _are_alike(rows: RobotRows, free: Flags, one: slice, other: slice) -> bool:
 def straight_depths(rows: PathRows) -> Iterator[tuple[Task, float, float]]:
     """Depth of the tool of each task in straight motion, and what is allowed, in [m]."""
     scene = rows.scene
-    found = tool_depths(scene.cell, schedule_at(rows.schedule, rows.times), scene.chains, rows.q)
-    for each in found:
-        yield scene.cell.task(each.task), each.depth, each.limit
+    depths = tool_depths(scene.cell, schedule_at(rows.schedule, rows.times), scene.chains, rows.q)
+    for depth in depths:
+        yield scene.cell.task(depth.task), depth.depth, depth.limit
 
 
 def movers_of(scene: Scene, relation: Relation) -> frozenset[str]:
@@ -268,8 +268,8 @@ def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, floa
     X_WP = part_poses(cell, scene.chains, rows.q)
     checks = cell.checks
     pairs: list[tuple[Relation, Array, tuple[float, float], int]] = [
-        (each.task, each.X_PT, each.task.tolerance.between, each.task.first_judged(rows.times))
-        for each in schedule.tasks
+        (task.task, task.X_PT, task.task.tolerance.between, task.task.first_judged(rows.times))
+        for task in schedule.tasks
     ]
     limits = checks.closure_mm.si, checks.closure_deg.si
     pairs += [(grasp, grasp.X_PT[None], limits, 0) for grasp in cell.closures]
@@ -283,14 +283,14 @@ def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, floa
         yield relation, lengths, allowed
 
 
-def _rounded_at(own: Array, shares: Array, times: Array) -> Flags:
+def _rounded_at(row_times: Array, shares: Array, times: Array) -> Flags:
     """Rows that are rounded at one of some times, or all but, shape (N,)."""
-    found = np.zeros(len(own), dtype=bool)
-    step = np.clip(np.searchsorted(own, times, side="right") - 1, 0, len(own) - 2)
-    u = (times - own[step]) / np.maximum(own[step + 1] - own[step], SAME)
-    found[step[u <= NEARLY * shares[step]]] = True
-    found[step[1.0 - u <= NEARLY * shares[step + 1]] + 1] = True
-    return found & (shares > 0.0)
+    is_inside = np.zeros(len(row_times), dtype=bool)
+    step = np.clip(np.searchsorted(row_times, times, side="right") - 1, 0, len(row_times) - 2)
+    u = (times - row_times[step]) / np.maximum(row_times[step + 1] - row_times[step], SAME)
+    is_inside[step[u <= NEARLY * shares[step]]] = True
+    is_inside[step[1.0 - u <= NEARLY * shares[step + 1]] + 1] = True
+    return is_inside & (shares > 0.0)
 
 
 def _next_lower(shares: Array) -> Array:
@@ -301,5 +301,5 @@ def _next_lower(shares: Array) -> Array:
 def _largest_within(most: Array) -> Array:
     """The largest share that is tried, and not larger than each."""
     ordered = np.array(SHARES[::-1])
-    found: Array = ordered[np.maximum(np.searchsorted(ordered, most, side="right") - 1, 0)]
-    return found
+    largest: Array = ordered[np.maximum(np.searchsorted(ordered, most, side="right") - 1, 0)]
+    return largest

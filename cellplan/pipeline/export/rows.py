@@ -32,7 +32,7 @@ class WorkRows(NamedTuple):
     tasks: tuple[str, ...]  # names of the tasks that are worked on
 
 
-class KeptRows(NamedTuple):
+class EssentialRows(NamedTuple):
     """What a thinned program keeps."""
 
     rows: tuple[int, ...]  # ends, ends of phases, stops, and the ends of dwells
@@ -55,10 +55,10 @@ def full_rows(run: VerifiedRun, robots: Collection[str] | None = None) -> tuple[
     )
 
 
-def kept_rows(run: VerifiedRun) -> tuple[KeptRows, ...]:
+def essential_rows(run: VerifiedRun) -> tuple[EssentialRows, ...]:
     """What a thinned program keeps of each program of a run, in their order."""
     plan = run.motion.plan
-    found = []
+    rows_of_programs = []
     for place, nominal in enumerate(_programs(run)):
         times = [*nominal.begins, *(stop for stops in plan.stops.values() for stop in stops)]
         times += [end for dwell in plan.dwells for end in dwell]
@@ -68,8 +68,8 @@ def kept_rows(run: VerifiedRun) -> tuple[KeptRows, ...]:
                 first = int(np.searchsorted(nominal.sigma, time - TIME_TOLERANCE))
                 last = int(np.searchsorted(nominal.sigma, time + TIME_TOLERANCE, side="right")) - 1
                 rows |= {min(first, len(nominal.sigma) - 1), max(last, 0)}
-        found.append(KeptRows(tuple(sorted(rows)), tuple(_work(run, nominal, place))))
-    return tuple(found)
+        rows_of_programs.append(EssentialRows(tuple(sorted(rows)), tuple(_work(run, nominal, place))))
+    return tuple(rows_of_programs)
 
 
 def times_of(rows: RobotRows) -> Array:
@@ -109,7 +109,7 @@ def _work(run: VerifiedRun, nominal: NominalRows, place: int) -> Iterator[WorkRo
 def _robot_rows(cell: Cell, plan: Plan, nominal: NominalRows, *, robot: str) -> RobotRows:
     """Rows of one robot."""
     table, joints = nominal.tables[robot], cell.robot(robot).model.joints
-    own = [task.name for task in cell.tasks if task.robot == robot]
+    tasks = [task.name for task in cell.tasks if task.robot == robot]
     rests = resting(table.q) | _is_at(nominal.sigma, _all_stop(plan, nominal))
     return RobotRows(
         robot=robot,
@@ -122,8 +122,8 @@ def _robot_rows(cell: Cell, plan: Plan, nominal: NominalRows, *, robot: str) -> 
             lower=np.array([joint.lower for joint in joints]),
             upper=np.array([joint.upper for joint in joints]),
         ),
-        process=_in_process(nominal.sigma, [stretch for task in own for stretch in plan.process.get(task, ())]),
-        stops=tuple(np.flatnonzero(_is_at(nominal.sigma, _own_stops(plan, own))).tolist()),
+        process=_in_process(nominal.sigma, [stretch for task in tasks for stretch in plan.process.get(task, ())]),
+        stops=tuple(np.flatnonzero(_is_at(nominal.sigma, _own_stops(plan, tasks))).tolist()),
     )
 
 
@@ -137,12 +137,12 @@ def _own_stops(plan: Plan, tasks: Sequence[str]) -> list[float]:
 
 def _all_stop(plan: Plan, nominal: NominalRows) -> tuple[float, ...]:
     """Nominal times at which no tool moves along its path: phases meet, or all tasks that are on have a stop there."""
-    found = list(nominal.begins)
+    instants = list(nominal.begins)
     for time in {stop for stops in plan.stops.values() for stop in stops}:
         on = [task for task, stretches in plan.process.items() if np.any(_is_within(np.array([time]), stretches))]
         if all(np.any(np.abs(np.array(plan.stops.get(task, ())) - time) <= TIME_TOLERANCE) for task in on):
-            found.append(time)
-    return tuple(found)
+            instants.append(time)
+    return tuple(instants)
 
 
 def _is_at(sigma: Array, times: Sequence[float]) -> Flags:

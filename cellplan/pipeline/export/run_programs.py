@@ -49,10 +49,10 @@ class RunProgram:
 
     def busy(self) -> Flags:
         """Whether some tool stays in process from the row before to the row after, shape (N,)."""
-        found = np.zeros(len(self.times), dtype=bool)
+        is_busy = np.zeros(len(self.times), dtype=bool)
         for inside in self.process.values():
-            found[1:-1] |= inside[:-2] & inside[1:-1] & inside[2:]
-        return found
+            is_busy[1:-1] |= inside[:-2] & inside[1:-1] & inside[2:]
+        return is_busy
 
 
 def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
@@ -63,19 +63,19 @@ def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
     rows = [rows_of(phase, motion.sigma) for phase in plan.program]
     if run.cell.program is not None:
         phases = tuple(
-            RunPhase(name=phase.name, place=place % len(run.motions), first=own.start, last=own.stop - 1)
-            for place, (phase, own) in enumerate(zip(plan.program, rows, strict=True))
+            RunPhase(name=phase.name, place=place % len(run.motions), first=columns.start, last=columns.stop - 1)
+            for place, (phase, columns) in enumerate(zip(plan.program, rows, strict=True))
         )
         return (RunProgram(name=None, times=motion.times, q=motion.q, phases=phases, process=process),)
     return tuple(
         RunProgram(
             name=verified.name,
             times=verified.schedule.times,
-            q=motion.q[own],
-            phases=(RunPhase(name=phase.name, place=place, first=0, last=own.stop - own.start - 1),),
-            process={task: process[task][own] for task in phase.tasks},
+            q=motion.q[columns],
+            phases=(RunPhase(name=phase.name, place=place, first=0, last=columns.stop - columns.start - 1),),
+            process={task: process[task][columns] for task in phase.tasks},
         )
-        for place, (phase, own, verified) in enumerate(zip(plan.program, rows, motions, strict=True))
+        for place, (phase, columns, verified) in enumerate(zip(plan.program, rows, motions, strict=True))
     )
 
 
@@ -90,13 +90,13 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
     if len(holders) > 1 and moves.any():
         yield f"{_where(program, moves)}: the holders {' and '.join(holders)} move the part: another order strains it"
     for task, inside in program.process.items():
-        own = next((each for each in cell.tasks if each.name == task), None)
-        if own is None or own.relative_to is Frame.WORLD:
+        work = next((other for other in cell.tasks if other.name == task), None)
+        if work is None or work.relative_to is Frame.WORLD:
             continue
         spoilt = moves & inside[:-1] & inside[1:]
         if spoilt.any():
             yield (
-                f"{_where(program, spoilt)}: the part moves while the tool of '{own.robot}' is in process ('{task}'): "
+                f"{_where(program, spoilt)}: the part moves while the tool of '{work.robot}' is in process ('{task}'): "
                 f"another order spoils the tool path"
             )
 
@@ -108,7 +108,7 @@ def scenes_of(run: VerifiedRun) -> list[Scene]:
     else:
         made = DemandedProgram.of(run.cell).scenes(run.cell)
     return [
-        scene_of_run(scene, [each.task.name for each in motion.schedule.tasks])
+        scene_of_run(scene, [scheduled.task.name for scheduled in motion.schedule.tasks])
         for scene, motion in zip(made, run.motions, strict=True)
     ]
 
@@ -120,10 +120,10 @@ def moving_robots(cell: Cell, program: RunProgram) -> tuple[str, ...]:
 
 def _moves(cell: Cell, q: Array, robots: tuple[str, ...]) -> Flags:
     """Whether one of some robots moves in each step, shape (N - 1,)."""
-    found = np.zeros(len(q) - 1, dtype=bool)
+    moves = np.zeros(len(q) - 1, dtype=bool)
     for name in robots:
-        found |= np.any(np.abs(np.diff(q[:, cell.columns(name)], axis=0)) > STILL_TOL, axis=1)
-    return found
+        moves |= np.any(np.abs(np.diff(q[:, cell.columns(name)], axis=0)) > STILL_TOL, axis=1)
+    return moves
 
 
 def _where(program: RunProgram, steps: Flags) -> str:

@@ -97,7 +97,7 @@ def export_programs(
     refuse_unless_writable([folder / form for form in chosen], run.folder)
     _refuse_unknown(run, choice.robots)
     with nothing_kept():  # a proof rests on the files themselves
-        return tuple(_each(Shared(run), folder, chosen, choice, progress))
+        return tuple(_exports(Shared(run), folder, chosen, choice, progress))
 
 
 class NothingFitsError(NotVerifiedError):
@@ -110,7 +110,9 @@ class NothingFitsError(NotVerifiedError):
 
     def __init__(self, run: ReadRun, refused: tuple[Exported, ...]) -> None:
         """Join all that speaks against the formats."""
-        super().__init__([f"{each.form}: {line}" for each in refused for line in str(each.refusal).splitlines()])
+        super().__init__(
+            [f"{refusal.form}: {line}" for refusal in refused for line in str(refusal.refusal).splitlines()]
+        )
         self.run, self.refused = run, refused
 
 
@@ -154,7 +156,7 @@ def refuse_unless_writable(folders: Iterable[Path], run: Path) -> None:
         refuse_unless_exportable(folder, run)
 
 
-def _each(
+def _exports(
     shared: Shared, folder: Path, formats: Mapping[str, bool], choice: Choice, progress: Progress
 ) -> Iterator[Exported]:
     """What comes of each format."""

@@ -14,7 +14,7 @@ from cellplan.pipeline.export.played import Played
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.scene.scene import Scene
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 class Shared:
@@ -26,7 +26,7 @@ class Shared:
     def __init__(self, run: VerifiedRun) -> None:
         """Begin with nothing."""
         self.run = run
-        self._found: dict[object, Any] = {}
+        self._results: dict[object, Any] = {}
 
     @cached_property
     def scene(self) -> Scene:
@@ -48,17 +48,17 @@ class Shared:
         """
         return self.once("orders", lambda: certified_orders(self.run, progress=progress))
 
-    def once(self, key: object, make: Callable[[], Found]) -> Found:
+    def once(self, key: object, make: Callable[[], Result]) -> Result:
         """What was found for a key before, or else what is found now.
 
         Args:
             key: What the result depends on besides the run.
             make: Finds it.
         """
-        if key not in self._found:
-            self._found[key] = make()
-        found: Found = self._found[key]
-        return found
+        if key not in self._results:
+            self._results[key] = make()
+        known: Result = self._results[key]
+        return known
 
 
 def played_digest(played: Played) -> str:

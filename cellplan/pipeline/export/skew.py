@@ -70,7 +70,7 @@ def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None
     """
     if not has_clocks(run.cell):
         return None
-    found: dict[tuple[str, str], ClockPair] = {}
+    clock_pairs: dict[tuple[str, str], ClockPair] = {}
     for scene, motion in zip(scenes_of(run), run.motions, strict=True):
         q = {name: motion.tables[name].q for name in (robot.name for robot in run.cell.robots)}
         report = motion.report.skew  # found by the same function when the run was verified
@@ -78,10 +78,10 @@ def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None
             report = allowed_skew(scene, motion.schedule, q, motion.report.depths, progress=progress)
         for pair in report.pairs:
             key = (pair.first, pair.second)
-            own = _clock_pair(pair, motion.name)
-            if key not in found or own.allowed < found[key].allowed:
-                found[key] = own
-    return RunSkew(pairs=tuple(found.values()), cycle=float(run.motion.times[-1]))
+            clock_pair = _clock_pair(pair, motion.name)
+            if key not in clock_pairs or clock_pair.allowed < clock_pairs[key].allowed:
+                clock_pairs[key] = clock_pair
+    return RunSkew(pairs=tuple(clock_pairs.values()), cycle=float(run.motion.times[-1]))
 
 
 def skew_text(seconds: float) -> str:

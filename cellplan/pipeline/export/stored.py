@@ -45,7 +45,7 @@ class StoredExport:
         Raises:
             InputError: It is no promise.
         """
-        return Promise(self._one_of("promise", [str(each) for each in Promise]))
+        return Promise(self._one_of("promise", [str(promise) for promise in Promise]))
 
     @property
     def choice(self) -> Choice:
@@ -59,24 +59,26 @@ class StoredExport:
         if split is not None:
             split = required(self.record, "split", int, file=self.where)
         mm, deg = (None, None) if thinning is None else (self._number("mm"), self._number("deg"))
-        targets = Targets(self._one_of("targets", [str(each) for each in Targets]))
-        asked = self.record.get("asked_promise")
+        targets = Targets(self._one_of("targets", [str(targets) for targets in Targets]))
+        requested = self.record.get("asked_promise")
         return Choice(
             robots=tuple(str(name) for name in robots),
             targets=targets,
             split=split,
             thin_mm=mm,
             thin_deg=deg,
-            promise=None if asked is None else Promise(self._one_of("asked_promise", [str(each) for each in Promise])),
+            promise=None
+            if requested is None
+            else Promise(self._one_of("asked_promise", [str(promise) for promise in Promise])),
         )
 
     def changed(self) -> Iterator[InputError]:
         """Programs that are not as they were exported."""
         for name, text in self.files.items():
-            found = digest(text.encode("utf-8", "surrogateescape"))
-            if found != self.record["files"][name]:
+            got = digest(text.encode("utf-8", "surrogateescape"))
+            if got != self.record["files"][name]:
                 yield InputError(
-                    f"{self.folder / name}: changed since it was exported (SHA-256 {found[:12]}…); export the run again"
+                    f"{self.folder / name}: changed since it was exported (SHA-256 {got[:12]}…); export the run again"
                 )
 
     def _one_of(self, key: str, allowed: list[str]) -> str:
@@ -159,17 +161,17 @@ def _entries(folder: Path, names: Mapping[str, Any]) -> Iterator[InputError]:
         if path.is_absolute() or ".." in path.parts or "\\" in name or str(path) != name or name == EXPORT:
             yield InputError(f"{folder / EXPORT}: files: expected paths inside the folder, got {shown(name)}")
             return
-    found = set()
+    entries = set()
     for entry in sorted(folder.rglob("*")):
         name = entry.relative_to(folder).as_posix()
         if entry.is_symlink():
             yield InputError(f"{entry}: expected a file or folder of the export, got a symbolic link")
         elif not entry.is_dir() and name not in {EXPORT, IGNORED}:
-            found.add(name)
+            entries.add(name)
             if name not in names:
                 yield InputError(f"{entry}: not part of the export; remove it, or export the run again")
     for name in names:
-        if name not in found:
+        if name not in entries:
             yield InputError(f"{folder / name}: missing; the programs were written with it")
 
 

@@ -17,11 +17,11 @@ from cellplan.model.exported import ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.pipeline.export.interpolant import row_speeds
 from cellplan.pipeline.export.part_errors import ToolsOnPart
-from cellplan.pipeline.export.rows import KeptRows, WorkRows, times_of
+from cellplan.pipeline.export.rows import EssentialRows, WorkRows, times_of
 from cellplan.scene.scene import Scene
 
 TIME_ROOM: Final = 1e-9  # [s] rounding of differences of times
-NOTHING_KEPT: Final = KeptRows((), ())
+NO_ROWS: Final = EssentialRows((), ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ def thinned(
     *,
     groups: Sequence[Sequence[str]],
     limits: ThinningLimits,
-    kept: KeptRows = NOTHING_KEPT,
+    essential_rows: EssentialRows = NO_ROWS,
 ) -> ProgramRows:
     """A program with fewer rows.
 
@@ -65,36 +65,40 @@ def thinned(
     """
     robots = {name: rows for group in groups for name, rows in program.robots.items() if name in group}
     sets = [
-        _Group(scene, [robots[name] for name in group if name in robots], limits, kept.rows)
+        _Group(scene, [robots[name] for name in group if name in robots], limits, essential_rows.rows)
         for group in groups
         if any(name in robots for name in group)
     ]
     for one in sets:
         one.split_by_joints()
-    _split_by_tools(scene, program, sets, work=kept.work)
+    _split_by_tools(scene, program, sets, work=essential_rows.work)
     chosen = {rows.robot: one.chosen for one in sets for rows in one.rows}
-    own = {name: _chosen_rows(scene, rows, chosen[name]) for name, rows in program.robots.items() if name in chosen}
-    return replace(program, robots=own)
+    thinned_rows = {
+        name: _chosen_rows(scene, rows, chosen[name]) for name, rows in program.robots.items() if name in chosen
+    }
+    return replace(program, robots=thinned_rows)
 
 
 class _Group:
     """Robots that share rows, and the rows chosen so far."""
 
-    def __init__(self, scene: Scene, rows: Sequence[RobotRows], limits: ThinningLimits, kept: Sequence[int]) -> None:
+    def __init__(
+        self, scene: Scene, rows: Sequence[RobotRows], limits: ThinningLimits, essential_rows: Sequence[int]
+    ) -> None:
         self.rows, self.limits = rows, limits
-        joints = [joint for each in rows for joint in scene.cell.robot(each.robot).model.joints]
-        self._q = np.concatenate([each.q for each in rows], axis=1)
+        joints = [joint for end_rows in rows for joint in scene.cell.robot(end_rows.robot).model.joints]
+        self._q = np.concatenate([end_rows.q for end_rows in rows], axis=1)
         self._scaled = self._q / np.array([limits.turn if joint.is_revolute else limits.slide for joint in joints])
         self.times = times_of(rows[0])
-        tips = [scene.chains[each.robot].tool_poses(each.q)[:, :3, 3] for each in rows]
+        tips = [scene.chains[end_rows.robot].tool_poses(end_rows.q)[:, :3, 3] for end_rows in rows]
         ways = np.max([np.linalg.norm(np.diff(tip, axis=0), axis=1) for tip in tips], axis=0)
         self._way = np.concatenate([[0.0], np.cumsum(ways)])
         self._is_chosen = np.zeros(len(self.times), dtype=bool)
-        self._is_chosen[[0, -1, *kept]] = True
+        self._is_chosen[[0, -1, *essential_rows]] = True
         self._is_chosen |= _ends_of_standstill(self._q)
-        for each in rows:
-            self._is_chosen[[*each.marks, *each.stops]] = True
-            self._is_chosen |= _switches(each)
+        for end_rows in rows:
+            self._is_chosen[[*end_rows.marks, *end_rows.stops]] = True
+            self._is_chosen |= _switches(end_rows)
 
     @property
     def chosen(self) -> Indices:
@@ -107,7 +111,7 @@ class _Group:
         k = np.clip(np.searchsorted(chosen, np.arange(len(self.times)), side="right") - 1, 0, len(chosen) - 2)
         first, last = chosen[k], chosen[k + 1]
         share = ((self.times - self.times[first]) / (self.times[last] - self.times[first]))[:, None]
-        return {each.robot: each.q[first] + share * (each.q[last] - each.q[first]) for each in self.rows}
+        return {row.robot: row.q[first] + share * (row.q[last] - row.q[first]) for row in self.rows}
 
     def split_by_joints(self) -> None:
         """Choose rows until every joint keeps its tolerance."""
@@ -140,10 +144,10 @@ class _Group:
         tips = tools.tips(full)
         desired, rows = tools.poses(tips), np.arange(first, last + 1)
         while len(rows):
-            own = rows - first
+            relative = rows - first
             moved = tools.tips({name: q[rows] for name, q in self.linear().items()})
-            poses = tools.poses({name: X_WT[own] for name, X_WT in tips.items()} | moved)
-            shares = tools.shares([each[own] for each in desired], poses, most=self.limits.tool)
+            poses = tools.poses({name: X_WT[relative] for name, X_WT in tips.items()} | moved)
+            shares = tools.shares([velocities[relative] for velocities in desired], poses, most=self.limits.tool)
             off = np.zeros(len(self.times))
             off[rows] = (np.stack(shares, axis=1) * count).max(axis=1)
             rows = self._split_where(off, " and ".join(tools.names))
@@ -170,7 +174,7 @@ class _Group:
         moved = np.minimum(way[inner] - way[first], way[last] - way[inner])
         fits = (nearest >= least.shortest_time - TIME_ROOM) & (moved >= least.shortest_distance)
         if not np.any(fits):
-            names = ", ".join(each.robot for each in self.rows)
+            names = ", ".join(row.robot for row in self.rows)
             raise InputError(
                 f"rows of {names} at {times[first + 1 + int(np.argmax(off))]:.3f} s: expected tolerances that rows at "
                 f"least {least.shortest_time:g} s and {MM * least.shortest_distance:g} mm apart can keep, got {what} "
@@ -187,7 +191,7 @@ def _split_by_tools(scene: Scene, program: ProgramRows, groups: Sequence[_Group]
     Where several groups move a tool, each has an equal share of its tolerance, with the others as they are in the run:
     the errors of all are no more than added.
     """
-    names = [[each.robot for each in group.rows] for group in groups]
+    names = [[row.robot for row in group.rows] for group in groups]
     for phase in work:
         full = {name: rows.q[phase.rows] for name, rows in program.robots.items()}
         for place, group in enumerate(groups):

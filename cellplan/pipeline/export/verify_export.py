@@ -89,7 +89,7 @@ def _made_again(
     except InputError as error:
         raise _placed(stored, error) from None
     except NotVerifiedError as error:
-        named = (each if each.startswith("  ") else f"{stored.folder}: {each}" for each in error.findings)
+        named = (finding if finding.startswith("  ") else f"{stored.folder}: {finding}" for finding in error.findings)
         raise NotVerifiedError([*named]) from None
 
 
@@ -126,7 +126,10 @@ def _placed(stored: StoredExport, error: InputError) -> InputError:
     findings = error.findings if isinstance(error, InvalidFileError) else [error]
     names = tuple(stored.files)
     return InvalidFileError(
-        [InputError(f"{stored.folder}{'/' if str(each).startswith(names) else ': '}{each}") for each in findings]
+        [
+            InputError(f"{stored.folder}{'/' if str(finding).startswith(names) else ': '}{finding}")
+            for finding in findings
+        ]
     )
 
 
@@ -137,8 +140,8 @@ def _other_texts(stored: StoredExport, files: Mapping[str, str]) -> Iterator[Inp
         if got is None:
             yield InputError(f"{stored.folder / name}: missing; the run gives it")
         elif got != text:
-            line, expected, found = _first_other_line(text, got)
-            yield InputError(f"{stored.folder / name}:{line}: expected {shown(expected)}, got {shown(found)}")
+            line, expected, actual = _first_other_line(text, got)
+            yield InputError(f"{stored.folder / name}:{line}: expected {shown(expected)}, got {shown(actual)}")
     for name in stored.files:
         if name not in files:
             yield InputError(f"{stored.folder / name}: expected no such file; the run does not give it")

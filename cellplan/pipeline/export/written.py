@@ -85,17 +85,17 @@ def judged(
     if prepared.job.frame.targets is Targets.PART:
         read = joints_of_part_poses(prepared.job.frame, prepared.job.programs, read)
     progress(STAGE, 0.0)
-    found = judge(run, prepared.dialect, prepared.job, read, lead=prepared.lead, shared=prepared.shared)
+    judgement = judge(run, prepared.dialect, prepared.job, read, lead=prepared.lead, shared=prepared.shared)
     progress(STAGE, 1.0)
-    findings = list(found.findings)
+    findings = list(judgement.findings)
     if not findings and prepared.orders:
         played = played_programs(run, prepared.dialect, prepared.job, read, lead=prepared.lead)
-        corners = [robot_corners(each) for each in played]
+        corners = [robot_corners(program) for program in played]
         findings += certify_written(run, prepared.orders, read, corners, progress=progress)
     if findings:
         named = [f"{prepared.dialect.name}: {finding}" for finding in findings]
         raise NotVerifiedError([*named, *_unresolved(run, prepared, named), *_stated_coarsely(run, prepared)])
-    return found
+    return judgement
 
 
 def _unresolved(run: VerifiedRun, prepared: Prepared, findings: Sequence[str]) -> Iterator[str]:

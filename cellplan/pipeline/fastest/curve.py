@@ -60,17 +60,17 @@ def production_curve(
     factors = [LONGEST ** ((k + 1) / points) for k in range(points)]
     sought = [(program.law, _values(base, program, factor)) for program, factor in product(shortest, factors)]
     variants = [Variant(number, values) for number, (_, values) in enumerate(sought)]
-    found: dict[Law, list[CurvePoint]] = {
+    by_law: dict[Law, list[CurvePoint]] = {
         program.law: [CurvePoint(law=program.law, values=program.values, figures=program.figures.record(LOAD))]
         for program in shortest
     }
     laws = tuple(law for law, _ in sought)
     with outcomes(variants, partial(_outcome, base, laws, task), workers) as every:
         for (law, values), outcome in zip(sought, every, strict=True):
-            found[law].append(CurvePoint(law=law, values=values, figures=outcome.figures, reason=outcome.reason))
-            done = sum(map(len, found.values())) - len(shortest)
+            by_law[law].append(CurvePoint(law=law, values=values, figures=outcome.figures, reason=outcome.reason))
+            done = sum(map(len, by_law.values())) - len(shortest)
             progress(f"production curve: cycle {done} of {len(sought)}", done / len(sought))
-    return tuple(point for each in found.values() for point in each)
+    return tuple(point for group in by_law.values() for point in group)
 
 
 def _values(base: Cell, shortest: TimedProgram, factor: float) -> dict[str, object]:

@@ -45,8 +45,8 @@ def read_demand(text: str) -> float:
     Raises:
         InputError: It is of another form, or not above 0.
     """
-    found = WRITTEN.fullmatch(text.strip())
-    per_hour = float(found[1]) * PER_HOUR[found[2]] if found else 0.0
+    match = WRITTEN.fullmatch(text.strip())
+    per_hour = float(match[1]) * PER_HOUR[match[2]] if match else 0.0
     if not per_hour > 0.0:
         raise InputError(f"--demand: expected parts in a time, N/h or N/min with N above 0, got {shown(text)}")
     return per_hour
@@ -66,7 +66,7 @@ def refuse_unless_possible(per_hour: float, shortest: TimedProgram, step: float)
     allowed = steps_within(HOUR / per_hour, step) * step
     if shortest.cycle <= allowed + NEAR:
         return
-    binding = max(shortest.bindings, key=lambda each: each.time_share)
+    binding = max(shortest.bindings, key=lambda binding: binding.time_share)
     raise NoSolutionError(
         f"--demand: expected at most {_floored(HOUR / shortest.cycle)}/h, one part in {shortest.cycle:.6g} s, where "
         f"{binding.text}; got {per_hour:g}/h, one part in {HOUR / per_hour:.6g} s"
@@ -94,17 +94,17 @@ def calmest(
     step = base.motion.step
     allowed = steps_within(HOUR / per_hour, step) * step
     cycle = min(allowed, max(steps_within(SLOWEST * common.cycle, step) * step, written.cycle))
-    found = [program for program in (common, laws) if program.cycle <= cycle + NEAR]
+    fitting = [program for program in (common, laws) if program.cycle <= cycle + NEAR]
     if laws.cycle < cycle:
         with suppress(InputError, NoSolutionError):
-            found += _by_time_laws(base, cycle, written, solved)
+            fitting += _by_time_laws(base, cycle, written, solved)
     between = common.cycle - sum(common.phases)
-    each = steps_within((cycle - between) / len(common.phases), step) * step
-    if common.cycle < cycle and each >= max(common.phases) - NEAR:
+    duration = steps_within((cycle - between) / len(common.phases), step) * step
+    if common.cycle < cycle and duration >= max(common.phases) - NEAR:
         with suppress(InputError, NoSolutionError):  # demanded feeds may leave no choice of the cycle
-            found.append(solved(Law.COMMON_SPEED, {"motion.timing": {"cycle_s": round(each, 9)}}, "demand"))
-    found = [program for program in found if program.cycle <= cycle + NEAR]
-    return MetDemand(per_hour=per_hour, allowed=allowed, program=min(found, key=lambda program: program.load))
+            fitting.append(solved(Law.COMMON_SPEED, {"motion.timing": {"cycle_s": round(duration, 9)}}, "demand"))
+    fitting = [program for program in fitting if program.cycle <= cycle + NEAR]
+    return MetDemand(per_hour=per_hour, allowed=allowed, program=min(fitting, key=lambda program: program.load))
 
 
 def _by_time_laws(base: Cell, cycle: float, written: TimedProgram, solved: SolvedAt) -> list[TimedProgram]:
@@ -114,10 +114,10 @@ def _by_time_laws(base: Cell, cycle: float, written: TimedProgram, solved: Solve
     for _ in range(MOST_TRIALS):
         if duration is not None:
             factor = steps_within(factor * duration, step) * step / duration
-        found = solved(Law.TIME_LAWS, scaled_values(base, factor), "demand")
-        if found.cycle <= cycle + NEAR:
-            return [found]
-        factor *= (cycle - 0.5 * step) / found.cycle
+        program = solved(Law.TIME_LAWS, scaled_values(base, factor), "demand")
+        if program.cycle <= cycle + NEAR:
+            return [program]
+        factor *= (cycle - 0.5 * step) / program.cycle
     return []
 
 

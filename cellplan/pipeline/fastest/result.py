@@ -70,17 +70,17 @@ NARROW: Final = 4.6  # [inch] of a plot: readable on a telephone too
 # The record: fastest.json
 
 
-def fastest_record(found: ShortestCycles) -> dict[str, Any]:
+def fastest_record(cycles: ShortestCycles) -> dict[str, Any]:
     """The shortest cycles in printed units: content of ``fastest.json``."""
-    cell, written = found.by_time_laws.solution.cell, found.as_written.cycle
+    cell, written = cycles.by_time_laws.solution.cell, cycles.as_written.cycle
     return {
         "schema": SCHEMA,
         "cell": cell.name,
-        "status": "passed" if found.passed else "failed",
+        "status": "passed" if cycles.passed else "failed",
         "written_s": number(written),
-        "as_written": found.as_written.figures.record(LOAD),
-        "cycles": {name: _program(program, written) for name, program in found.programs.items() if name != "demand"},
-        "remark": found.remark,
+        "as_written": cycles.as_written.figures.record(LOAD),
+        "cycles": {name: _program(program, written) for name, program in cycles.programs.items() if name != "demand"},
+        "remark": cycles.remark,
         "curve": [
             {
                 "law": str(point.law),
@@ -88,9 +88,9 @@ def fastest_record(found: ShortestCycles) -> dict[str, Any]:
                 "figures": dict(point.figures),
                 "reason": point.reason,
             }
-            for point in found.curve
+            for point in cycles.curve
         ],
-        "demand": None if found.demand is None else _demand(found, found.demand),
+        "demand": None if cycles.demand is None else _demand(cycles, cycles.demand),
         "inputs": dict(cell.inputs),
         "versions": versions(),
     }
@@ -108,15 +108,15 @@ def _program(program: TimedProgram, written: float) -> dict[str, Any]:
         "options": [f"{address}={flow_text(value)}" for address, value in settings.items()],
         "binding": [
             {
-                "phase": each.phase,
-                "robot": each.robot,
-                "joint": each.joint,
-                "limit": each.kind,
-                "percent": number(100.0 * each.share),
-                "time_percent": number(100.0 * each.time_share),
-                "text": each.text,
+                "phase": binding.phase,
+                "robot": binding.robot,
+                "joint": binding.joint,
+                "limit": binding.kind,
+                "percent": number(100.0 * binding.share),
+                "time_percent": number(100.0 * binding.time_share),
+                "text": binding.text,
             }
-            for each in program.bindings
+            for binding in program.bindings
         ],
         "figures": figures.record(LOAD),
         "status": "failed" if failed else "passed",
@@ -131,28 +131,31 @@ def _program(program: TimedProgram, written: float) -> dict[str, Any]:
 def _robots(figures: Figures) -> dict[str, dict[str, Any]]:
     """Speeds of each robot in the world: of its tool tip, and of the fastest point on an axis of a joint."""
     axes = figures.of("max_axis_speed_mm_s")
-    found = {}
+    robots = {}
     for robot, tip in figures.of("max_tool_speed_mm_s").items():
         fastest = max((axis for axis in axes if axis.startswith(f"{robot}/")), key=axes.__getitem__)
-        found[robot] = {
+        robots[robot] = {
             "tool_peak_mm_s": number(1e3 * tip),
             "share_above_250_mm_s": number(figures.of("share_above_250_mm_s")[robot]),
             "axis_peak_mm_s": number(1e3 * axes[fastest]),
             "axis": fastest.partition("/")[2],
         }
-    return found
+    return robots
 
 
-def _demand(found: ShortestCycles, demand: MetDemand) -> dict[str, Any]:
+def _demand(cycles: ShortestCycles, demand: MetDemand) -> dict[str, Any]:
     """The demand, its program and the shares that it saves of others."""
-    program, shortest = demand.program, min(found.by_time_laws, found.by_common_speed, key=lambda each: each.cycle)
+    program, shortest = (
+        demand.program,
+        min(cycles.by_time_laws, cycles.by_common_speed, key=lambda program: program.cycle),
+    )
     return {
         "parts_per_h": number(demand.per_hour),
         "allowed_cycle_s": number(demand.allowed),
         "idle_s": number(max(0.0, round(demand.allowed - program.cycle, 9))),
-        "program": _program(program, found.as_written.cycle),
+        "program": _program(program, cycles.as_written.cycle),
         "saving_against_shortest": _savings(program.figures, shortest.figures),
-        "saving_against_written": _savings(program.figures, found.as_written.figures),
+        "saving_against_written": _savings(program.figures, cycles.as_written.figures),
     }
 
 
@@ -169,25 +172,25 @@ def _savings(figures: Figures, other: Figures) -> dict[str, Number]:
 
 def _curves(record: Record) -> dict[str, list[Record]]:
     """Figures of the points of the production curve that have a program, by law."""
-    found: dict[str, list[Record]] = {}
+    curves: dict[str, list[Record]] = {}
     for point in record["curve"]:
         if point["figures"]:
-            found.setdefault(point["law"], []).append(point["figures"])
-    return found
+            curves.setdefault(point["law"], []).append(point["figures"])
+    return curves
 
 
-def _beside(record: Record, *, is_drawn: bool = False) -> dict[str, Record]:
+def _marked(record: Record, *, is_drawn: bool = False) -> dict[str, Record]:
     """Figures of the programs beside the curve: as written, at reduced speed, and that of the demand.
 
     A plot leaves one at reduced speed out that is the one of another law.
     """
-    found = {"as_written": record["as_written"]}
+    marked = {"as_written": record["as_written"]}
     reduced = record["cycles"].get("reduced_speed")
     if reduced and (reduced["law"] == "reduced_speed" or not is_drawn):
-        found["reduced_speed"] = record["cycles"]["reduced_speed"]["figures"]
+        marked["reduced_speed"] = record["cycles"]["reduced_speed"]["figures"]
     if record["demand"]:
-        found["demand"] = record["demand"]["program"]["figures"]
-    return found
+        marked["demand"] = record["demand"]["program"]["figures"]
+    return marked
 
 
 def _saving_text(record: Record) -> str:
@@ -199,8 +202,8 @@ def _saving_text(record: Record) -> str:
 def _binding_lines(program: Record) -> list[str]:
     """What binds each phase of a program or comes nearest to it, or how near its joints come where nothing does."""
     binding, figures = program["binding"], program["figures"]
-    if max(each["percent"] for each in binding) >= 100.0 * BINDS:
-        return [each["text"] if len(binding) == 1 else f"phase {each['phase']}: {each['text']}" for each in binding]
+    if max(joint["percent"] for joint in binding) >= 100.0 * BINDS:
+        return [joint["text"] if len(binding) == 1 else f"phase {joint['phase']}: {joint['text']}" for joint in binding]
     shares = ((figures[f"max_{it}_ratio"], figures[f"max_{it}_joint"], it) for it in ("velocity", "acceleration"))
     reached = [f"{100.0 * share:.3g} % of a limit of {kind} ({joint})" for share, joint, kind in shares if share]
     return [f"nothing binds: joints reach {', '.join(reached)}"]
@@ -214,7 +217,7 @@ def fastest_lines(record: Record) -> list[str]:
     lines = [f"{record['cell']}: {record['status']}", f"  as written: {record['written_s']:g} s"]
     for name, program in record["cycles"].items():
         lines += _program_lines(TITLES[name], program)
-        if name == "time_laws" and max(each["percent"] for each in program["binding"]) < 100.0 * BINDS:
+        if name == "time_laws" and max(joint["percent"] for joint in program["binding"]) < 100.0 * BINDS:
             lines.append(
                 "    none is shorter: a step less (motion.step_s) breaks a limit, or leaves a task too few steps"
             )
@@ -254,7 +257,7 @@ def _demand_lines(demand: Record) -> Iterator[str]:
         yield (
             f"    the robots wait for {demand['idle_s']:g} s of each cycle: a longer motion would save next to nothing"
         )
-    options = " ".join(f"--set '{each}'" for each in program["options"])
+    options = " ".join(f"--set '{option}'" for option in program["options"])
     yield f"    gives it: cellplan solve {options}"
     yield f"    against the shortest cycle: {_saving_text(demand['saving_against_shortest'])}"
     yield f"    against the program as written: {_saving_text(demand['saving_against_written'])}"
@@ -267,9 +270,9 @@ def _curve_lines(record: Record) -> Iterator[str]:
         return
     for law in laws:
         yield f"  production curve {TITLES[law]}"
-        own = [point for point in points if point["law"] == law]
-        yield from terminal_table(ON_TERMINAL, (point["figures"] for point in own if point["figures"]), "    ")
-        yield from (f"    {point['reason']}" for point in own if point["reason"])
+        listed = [point for point in points if point["law"] == law]
+        yield from terminal_table(ON_TERMINAL, (point["figures"] for point in listed if point["figures"]), "    ")
+        yield from (f"    {point['reason']}" for point in listed if point["reason"])
 
 
 # Plots and page
@@ -277,30 +280,30 @@ def _curve_lines(record: Record) -> Iterator[str]:
 
 def curve_figures(record: Record) -> dict[str, Figure]:
     """A plot over the cycle time for each quantity; none where there is no calmer cycle."""
-    curves, beside = _curves(record), _beside(record, is_drawn=True)
+    curves, marked = _curves(record), _marked(record, is_drawn=True)
     if max(map(len, curves.values()), default=0) < 2:
         return {}
     cycles = [point["cycle_time_s"] for points in curves.values() for point in points]
-    if "demand" in beside:
-        cycles.append(beside["demand"]["cycle_time_s"])
+    if "demand" in marked:
+        cycles.append(marked["demand"]["cycle_time_s"])
     x = Axis(low=min(cycles), high=max(cycles), label="cycle time in s", unit="s")
-    seen = {name: one for name, one in beside.items() if x.low <= one["cycle_time_s"] <= x.high}
+    seen = {name: one for name, one in marked.items() if x.low <= one["cycle_time_s"] <= x.high}
     panels = {key: _panel(key, curves, seen) for key in PLOTTED}
     return {key: Figure(title="", x=x, panels=[it], width=NARROW) for key, it in panels.items() if it is not None}
 
 
-def _panel(key: str, curves: Mapping[str, list[Record]], beside: Mapping[str, Record]) -> Panel | None:
+def _panel(key: str, curves: Mapping[str, list[Record]], marked: Mapping[str, Record]) -> Panel | None:
     """Limit, curves and single programs of one quantity; None where no program has it."""
     shown = SHOWN[key]
     items: list[Item] = [] if shown.limit is None else [Limit(shown.limit, shown.limit_name, is_shaded=False)]
     values = []
-    for law, points in [*curves.items(), *((law, [point]) for law, point in beside.items())]:
-        found = [(point["cycle_time_s"], shown.percent * point[key]) for point in points if point[key] is not None]
-        if law in curves and found:
-            at_s, heights = np.array(found).T
+    for law, points in [*curves.items(), *((law, [point]) for law, point in marked.items())]:
+        pairs = [(point["cycle_time_s"], shown.percent * point[key]) for point in points if point[key] is not None]
+        if law in curves and pairs:
+            at_s, heights = np.array(pairs).T
             items.append(Curve(law, at_s, heights, COLOURS[law]))
-        items += [Mark(at_one, value, COLOURS[law]) for at_one, value in found]
-        values += [value for _, value in found]
+        items += [Mark(at_one, value, COLOURS[law]) for at_one, value in pairs]
+        values += [value for _, value in pairs]
     if not values:
         return None
     axis = value_axis(min(0.0, *values), max(*values, shown.limit or 0.0), is_floored=True)
@@ -320,7 +323,7 @@ def fastest_page(record: Record) -> str:
         titles=TITLES,
         colours=COLOURS,
         plots=[(SHOWN[key].plot, inline_svg(svg_text(one))) for key, one in drawn.items()],
-        legend=[*_curves(record), *_beside(record, is_drawn=True)] if drawn else [],
+        legend=[*_curves(record), *_marked(record, is_drawn=True)] if drawn else [],
         saving=_saving_text,
         binding=_binding_lines,
         headings=page_headings(ON_PAGE),
@@ -349,13 +352,13 @@ def fastest_tables(record: Record) -> Tables:
 
 def curve_table(record: Record) -> str:
     """The production curve as CSV: a row for each cycle, those as written, at reduced speed and of the demand too."""
-    beside = _beside(record)
-    rows = [("as_written", beside.pop("as_written"))]
+    marked = _marked(record)
+    rows = [("as_written", marked.pop("as_written"))]
     rows += [(law, figures) for law, points in _curves(record).items() for figures in points]
-    return csv_text([["law", *LOAD], *([law, *map(figures.get, LOAD)] for law, figures in [*rows, *beside.items()])])
+    return csv_text([["law", *LOAD], *([law, *map(figures.get, LOAD)] for law, figures in [*rows, *marked.items()])])
 
 
-def write_fastest(found: ShortestCycles, folder: Path, *, progress: Progress = silent) -> Record:
+def write_fastest(cycles: ShortestCycles, folder: Path, *, progress: Progress = silent) -> Record:
     """Write the shortest cycles into a folder, which appears whole or not at all.
 
     It holds ``fastest.json``, ``fastest.html``, ``curve.csv``, a run folder for every program by its name, and for a
@@ -373,14 +376,14 @@ def write_fastest(found: ShortestCycles, folder: Path, *, progress: Progress = s
     Raises:
         InputError: The folder cannot be written, or holds something that cellplan did not write.
     """
-    record = fastest_record(found)
+    record = fastest_record(cycles)
     with RunFolder(folder) as target:
         target.write_text("fastest.json", as_json(record))
         target.write_text("fastest.html", fastest_page(record))
         target.write_text("curve.csv", curve_table(record))
-        if found.demand is not None:
-            target.write_text("demand.yaml", render_cell(found.demand.program.solution.cell))
-        for name, program in found.programs.items():
+        if cycles.demand is not None:
+            target.write_text("demand.yaml", render_cell(cycles.demand.program.solution.cell))
+        for name, program in cycles.programs.items():
             write_run(program.solution, target.within(name), progress=progress)
     return record
 

@@ -46,12 +46,12 @@ class ShortestCycles(Presented):
     @property
     def programs(self) -> dict[str, TimedProgram]:
         """The programs that were solved and verified in full, by name."""
-        found = {"time_laws": self.by_time_laws, "common_speed": self.by_common_speed}
+        programs = {"time_laws": self.by_time_laws, "common_speed": self.by_common_speed}
         if self.at_reduced_speed is not None:
-            found["reduced_speed"] = self.at_reduced_speed
+            programs["reduced_speed"] = self.at_reduced_speed
         if self.demand is not None:
-            found["demand"] = self.demand.program
-        return found
+            programs["demand"] = self.demand.program
+        return programs
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -104,7 +104,7 @@ def fastest(
     common = solved(Law.COMMON_SPEED, {"motion.timing": "fastest"}, "common speed")
     processes = workers if 2 * points * (perf_counter() - begun) > PAYS else 1
     if demand is not None:
-        refuse_unless_possible(demand, min(laws, common, key=lambda each: each.cycle), cell.motion.step)
+        refuse_unless_possible(demand, min(laws, common, key=lambda program: program.cycle), cell.motion.step)
     laws = laws.certified(_within(progress, "time laws"))
     common = common.certified(_within(progress, "common speed"))
     reduced, remark = _at_reduced_speed(common, solved, progress)
@@ -130,10 +130,10 @@ def _at_reduced_speed(common: TimedProgram, solved: SolvedAt, progress: Progress
         return common, ""
     values = {"motion.timing": "fastest", "checks.tool_speed_mm_s": MM * REDUCED_SPEED}
     try:
-        found = solved(Law.REDUCED_SPEED, values, "reduced speed")
+        program = solved(Law.REDUCED_SPEED, values, "reduced speed")
     except (InputError, NoSolutionError) as error:
         return None, str(error).splitlines()[0]
-    return found.certified(_within(progress, "reduced speed")), ""
+    return program.certified(_within(progress, "reduced speed")), ""
 
 
 def _within(progress: Progress, title: str) -> Progress:

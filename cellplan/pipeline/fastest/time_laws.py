@@ -76,7 +76,7 @@ def from_both_sides(
     number: int,
     first: TimedProgram,
     at: Callable[[int], TimedProgram],
-    asked: Callable[[TimedProgram], float],
+    demanded_share: Callable[[TimedProgram], float],
 ) -> TimedProgram | None:
     """The program that keeps all limits in so many steps while it would not in a step less; None where none does.
 
@@ -86,7 +86,7 @@ def from_both_sides(
         asked: How many times as long a program must last, at most 1 where it keeps its limits.
     """
     best, now, bracket = None, first, Bracket()
-    share = asked(first)
+    share = demanded_share(first)
     for trial in range(MOST_TRIALS):
         bracket.note(number, holds=share <= 1.0)
         best = now if share <= 1.0 else best
@@ -96,7 +96,7 @@ def from_both_sides(
         number = bracket.following(guess, trial=trial)
         try:
             now = at(number)
-            share = asked(now)
+            share = demanded_share(now)
         except TooFewStepsError:
             share = np.inf
     return best
@@ -108,7 +108,7 @@ def _no_time_law(base: Cell, solved: SolvedAt) -> NoSolutionError:
     slow = solved(Law.TIME_LAWS, values, "time laws")
     left = [task for task in base.tasks if task.process is not None]
     while slow.load > 1.0 and left:
-        worst = max(slow.bindings, key=lambda each: each.time_share)
+        worst = max(slow.bindings, key=lambda binding: binding.time_share)
         left.sort(key=lambda task: task.robot != worst.robot)  # a positioner holds the feeds of all its operators
         task = left.pop(0)
         program = _at_greatest_feed(task, values, slow, worst.robot, solved)

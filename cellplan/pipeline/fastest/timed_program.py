@@ -178,21 +178,21 @@ def _binding(scene: Scene, run: Run, *, is_retimed: bool) -> Binding:
     """The limit that asks for most time in one phase; those of a task are limits of retimed programs."""
     limits, q = _rows(scene, run)
     shares = limits.shares(run.schedule.times, q)
-    asked = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
-    kind, column = np.unravel_index(int(asked.argmax()), asked.shape)
+    required = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
+    kind, column = np.unravel_index(int(required.argmax()), required.shape)
     robot, joint = joint_at(scene.cell, int(column))
-    found = [(float(asked.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
+    candidates = [(float(required.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
     for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if is_retimed else ():
-        found.append((feed, scene.cell.task(name).robot, name, "feed", feed))
+        candidates.append((feed, scene.cell.task(name).robot, name, "feed", feed))
     for errors in run.report.accuracy if is_retimed else ():
         share = _share_between(errors, scene.cell)
-        found.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
+        candidates.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
     limit = scene.cell.checks.tool_speed_mm_s
     if limit is not None:
         for name, speed in run.report.speeds.items():
             share = speed.tool_peak / limit.si
-            found.append((share, name, "", "tool speed", share))
-    most, robot, joint, name, share = max(found, key=lambda each: each[0])
+            candidates.append((share, name, "", "tool speed", share))
+    most, robot, joint, name, share = max(candidates, key=lambda candidate: candidate[0])
     return Binding(phase=run.phase.name, robot=robot, joint=joint, kind=name, share=share, time_share=most)
 
 

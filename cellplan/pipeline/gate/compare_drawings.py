@@ -24,8 +24,8 @@ ROUNDING: Final = (
 def drawings_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> CellDrawings:
     """The drawings of what was found, by the place of the run and by file name."""
     phases = [DrawnPhase(motion.cell, motion.schedule, motion.report) for motion in motions]
-    found = {motion.name or "": phase_drawings(phase) for motion, phase in zip(motions, phases, strict=True)}
-    return found if "" in found else {**found, "": program_drawings(cell, phases)}
+    drawings = {motion.name or "": phase_drawings(phase) for motion, phase in zip(motions, phases, strict=True)}
+    return drawings if "" in drawings else {**drawings, "": program_drawings(cell, phases)}
 
 
 def stored_drawings(stored: StoredRun, place: str, names: Iterable[str]) -> dict[str, str]:
@@ -39,9 +39,9 @@ def stored_drawings(stored: StoredRun, place: str, names: Iterable[str]) -> dict
 
 def foreign_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
     """Drawings that hold something that cellplan does not draw there: an element, an attribute, a word."""
-    for place, own in drawn.items():
-        on_disk = stored_drawings(stored, place, own)
-        for name, text in own.items():
+    for place, drawings in drawn.items():
+        on_disk = stored_drawings(stored, place, drawings)
+        for name, text in drawings.items():
             foreign = foreign_piece(on_disk[name], text)
             if foreign is not None:
                 file = stored.file(place, name)
@@ -50,9 +50,9 @@ def foreign_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
 
 def other_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
     """Drawings of the run that are not those drawn anew, apart from rounding."""
-    for place, own in drawn.items():
-        on_disk = stored_drawings(stored, place, own)
-        for name, text in own.items():
+    for place, drawings in drawn.items():
+        on_disk = stored_drawings(stored, place, drawings)
+        for name, text in drawings.items():
             if not is_same_drawing(on_disk[name], text):
                 yield f"{place}/{name}" if place else name
 

@@ -12,7 +12,7 @@ from cellplan.pipeline.gate.compare_drawings import CellDrawings, foreign_drawin
 from cellplan.pipeline.gate.compare_report import PLANNER_KEYS
 from cellplan.pipeline.gate.equal_text import first_difference
 from cellplan.pipeline.gate.picture_text import foreign_piece
-from cellplan.report.page.render import Beside, overview_page, report_page
+from cellplan.report.page.render import PageFiles, overview_page, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record
@@ -52,7 +52,7 @@ def page_findings(
         reports = {str(motion.name): motion.report for motion in motions}
         expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
         record = _of_the_run(stored, "", expected)
-        yield from _difference(stored, "", overview_page(record, cell=cell, **_beside(stored, "")))
+        yield from _difference(stored, "", overview_page(record, cell=cell, **_page_files(stored, "")))
 
 
 def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
@@ -60,8 +60,8 @@ def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
 
     That may be rounding: curves that show nothing but the noise of the arithmetic look different on each processor.
     """
-    for place, own in drawn.items():
-        for name, picture in own.items():
+    for place, texts in drawn.items():
+        for name, picture in texts.items():
             if stored.content(place, f"plots/{name}") != picture:
                 yield f"{place}/plots/{name}" if place else f"plots/{name}"
 
@@ -87,7 +87,7 @@ def _page_finding(
         return
     in_order = {name: drawings[name] for name in desired}
     try:
-        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, **_beside(stored, place))
+        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, **_page_files(stored, place))
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
         file = stored.file(place, "report.json")
         yield f"{file}: solver: expected the form that cellplan writes; solve the cell again"
@@ -95,10 +95,10 @@ def _page_finding(
     yield from _difference(stored, place, page)
 
 
-def _beside(stored: StoredRun, place: str) -> Beside:
+def _page_files(stored: StoredRun, place: str) -> PageFiles:
     """What lies beside a page of the run: its tables, and the drawings of the cell on disk."""
-    found = stored_drawings(stored, place, (STILL, FLOOR_PLAN))
-    return {"still": found[STILL], "floor_plan": found[FLOOR_PLAN], "files": tuple(stored.manifest.files)}
+    drawings = stored_drawings(stored, place, (STILL, FLOOR_PLAN))
+    return {"still": drawings[STILL], "floor_plan": drawings[FLOOR_PLAN], "files": tuple(stored.manifest.files)}
 
 
 def _difference(stored: StoredRun, place: str, page: str) -> Iterator[str]:

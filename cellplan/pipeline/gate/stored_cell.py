@@ -52,9 +52,9 @@ def load_stored_cell(stored: StoredRun, *, cell: Path | None, allow_dirs: Sequen
     _refuse_stale(stored, now, where=f"'{cell}'", cell=cell)
     resolved = _resolved(stored, folder=cell.parent, allow_dirs=allow_dirs)
     written, copied = written_document(original), written_document(resolved)
-    foreign = [each for each in _differences(written, copied) if not _may_differ(*each)]
+    foreign = [difference for difference in _differences(written, copied) if not _may_differ(*difference)]
     if foreign:
-        raise InvalidFileError([_foreign(stored, cell, each) for each in foreign])
+        raise InvalidFileError([_foreign(stored, cell, difference) for difference in foreign])
     remarks = tuple(f"{_change(address, value)} when the cell was solved" for address, value in changes.items())
     return StoredCell(cell=resolved, compared=tuple(now), remarks=remarks)
 
@@ -119,8 +119,8 @@ def _resolved(stored: StoredRun, *, folder: Path, allow_dirs: Sequence[Path]) ->
     digests = dict(cell.inputs)
     if digests.pop(CELL) != manifest.files[CELL].digest:
         raise InputError(f"{stored.folder / CELL}: changed while it was read")
-    own = {name: digest for name, digest in manifest.cell_inputs.items() if name != manifest.cell_file}
-    if digests != own:
+    resolved = {name: digest for name, digest in manifest.cell_inputs.items() if name != manifest.cell_file}
+    if digests != resolved:
         raise InputError(f"{stored.folder / CELL}: refers to other files than the cell file; solve the cell again")
     if cell.name != manifest.cell:
         raise InputError(f"{stored.folder / CELL}: name: expected '{manifest.cell}', got '{cell.name}'")

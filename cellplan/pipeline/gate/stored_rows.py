@@ -51,9 +51,9 @@ class StoredRows:
         Raises:
             InputError: With file and line.
         """
-        for phase, own in zip(self.clock.plan.program, self.program.cells, strict=False):
+        for phase, phase_cell in zip(self.clock.plan.program, self.program.cells, strict=False):
             first = rows_of(phase, self.clock.sigma).start
-            for robot in own.robots if phase.tasks else ():
+            for robot in phase_cell.robots if phase.tasks else ():
                 if robot.start is not None and robot.name not in phase.idle:
                     self._refuse_other(robot, first, robot.start, "start posture")
         if self.program.stages:
@@ -71,7 +71,7 @@ class StoredRows:
         for place in range(count if self.program.cycles > 1 else 0):
             rows = [rows_of(phase, self.clock.sigma) for phase in phases[place::count]]
             for robot in cell.robots:
-                other = others_than_first_cycle([self.tables[robot.name].q[each] for each in rows])
+                other = others_than_first_cycle([self.tables[robot.name].q[end_rows] for end_rows in rows])
                 if other is not None:
                     at = self.place(robot.name, rows[other[0]].start + other[1])
                     raise InputError(f"{at}: expected the same row as in the first cycle, got another one")
@@ -161,21 +161,21 @@ def _joint_tables(stored: StoredRun, cell: Cell, phases: tuple[Phase, ...], prog
         digests={"cell": manifest.inputs[manifest.cell_file], "program": program},
         remark=left_out_of_program(cell, phases),
     )
-    found = {}
+    tables = {}
     for name in names:
         text, file = stored.tables[name], stored.file("", f"tables/{name}.csv")
-        found[name] = parse_table(text, file)
+        tables[name] = parse_table(text, file)
         _refuse_other_header(parse_header(text, file), expected, file)
-        if found[name].robot != name:
-            raise InputError(f"{file}: robot: expected '{name}', got '{found[name].robot}'")
-        if found[name].joints != cell.robot(name).model.joint_names:
+        if tables[name].robot != name:
+            raise InputError(f"{file}: robot: expected '{name}', got '{tables[name].robot}'")
+        if tables[name].joints != cell.robot(name).model.joint_names:
             joints = listed(cell.robot(name).model.joint_names)
-            raise InputError(f"{file}: expected the joints {joints} in this order, got {listed(found[name].joints)}")
+            raise InputError(f"{file}: expected the joints {joints} in this order, got {listed(tables[name].joints)}")
     for place, record in {"": stored.record, **stored.records}.items():
         if record.get("digests") != {"program": program}:
             file = stored.file(place, "report.json")
             raise InputError(f"{file}: digests.program: differs from that of the tables of the run")
-    return found
+    return tables
 
 
 def _refuse_other_header(header: TableHeader, expected: TableHeader, file: str) -> None:
@@ -235,7 +235,7 @@ def _columns(
         ("time_s", table.times, demanded.times),
         ("sigma_s", table.sigma, demanded.sigma),
         ("phase", np.array(table.phases), np.array(demanded.phases)),
-        *((f"{task}_process", 1 * table.process[task], 1 * each) for task, each in demanded.process.items()),
+        *((f"{task}_process", 1 * table.process[task], 1 * process) for task, process in demanded.process.items()),
     ]
     for name, got, desired in plain:
         yield name, got.tolist(), desired.tolist(), got != desired

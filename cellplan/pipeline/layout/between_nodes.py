@@ -22,28 +22,28 @@ def exceeded_at(program: TimedProgram, cycle: float, span: float) -> tuple[float
         cycle: Shortest cycle at the nodes in [s].
         span: Time in [s] from the first node to the last.
     """
-    found = list[float]()
+    times = list[float]()
     for run in program.solution.runs:
-        asked = program.cycle * _loads(program, run)
-        beyond = np.flatnonzero(asked > (1.0 + EXCEEDS) * cycle)
+        loads = program.cycle * _loads(program, run)
+        beyond = np.flatnonzero(loads > (1.0 + EXCEEDS) * cycle)
         pieces = np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1) if len(beyond) else []
-        peaks = [run.motion.times[piece[asked[piece].argmax()]] for piece in pieces]
-        found += _at_nodes(run, peaks, span)
-    return tuple(found)
+        peaks = [run.motion.times[piece[loads[piece].argmax()]] for piece in pieces]
+        times += _at_nodes(run, peaks, span)
+    return tuple(times)
 
 
 def margins_missed_at(program: TimedProgram, margin: float, span: float) -> tuple[float, ...]:
     """Times at which turning joints are nearest to their limits and nearer than ``margin`` in [rad]."""
-    found = list[float]()
+    times = list[float]()
     for run in program.solution.runs:
         missed = [use.margin_at_s for use in run.report.joints if use.is_revolute and use.margin < margin]
-        found += _at_nodes(run, missed, span)
-    return tuple(found)
+        times += _at_nodes(run, missed, span)
+    return tuple(times)
 
 
 def distances_missed_at(program: TimedProgram, span: float, *, is_own: bool) -> tuple[float, ...]:
     """Times at which bodies are nearest and nearer than the cell demands, of a robot's own bodies or of all others."""
-    required, found = program.solution.cell.checks.clearance_mm.si, list[float]()
+    required, times = program.solution.cell.checks.clearance_mm.si, list[float]()
     for run in program.solution.runs:
         missed = [
             least.at_s
@@ -53,8 +53,8 @@ def distances_missed_at(program: TimedProgram, span: float, *, is_own: bool) -> 
             and least.at_s is not None
             and least.minimum < required
         ]
-        found += _at_nodes(run, missed, span)
-    return tuple(found)
+        times += _at_nodes(run, missed, span)
+    return tuple(times)
 
 
 def _loads(program: TimedProgram, run: Run) -> Array:
@@ -62,11 +62,11 @@ def _loads(program: TimedProgram, run: Run) -> Array:
     scene, times = run.scene or program.scene, run.motion.times
     bounds, loads = row_limits(scene, run.schedule).bounds, np.zeros(len(times))
     for robot in scene.cell.robots:
-        own, columns = run.report.q[robot.name], scene.cell.columns(robot.name)
-        if not own.shape[1]:
+        positions, columns = run.report.q[robot.name], scene.cell.columns(robot.name)
+        if not positions.shape[1]:
             continue
-        speeds = np.abs(np.gradient(own, times, axis=0)) / bounds.velocity[columns]
-        accelerations = joint_accelerations(times, own, cycle=robot.controller_cycle).values
+        speeds = np.abs(np.gradient(positions, times, axis=0)) / bounds.velocity[columns]
+        accelerations = joint_accelerations(times, positions, cycle=robot.controller_cycle).values
         rates = np.sqrt(accelerations / bounds.acceleration[columns])
         loads = np.maximum(loads, np.maximum(speeds, rates).max(axis=1))
     return loads

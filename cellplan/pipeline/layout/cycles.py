@@ -45,11 +45,11 @@ def shortest(ready: Prepared, cell: Cell, program: TimedProgram, progress: Progr
     def at(steps: int) -> TimedProgram:
         return scaled(cell, steps * step / ready.duration, progress)
 
-    def asked(found: TimedProgram) -> float:
-        load, more = load_of(found), time_asked(found)
+    def required(program: TimedProgram) -> float:
+        load, more = load_of(program), required_time(program)
         return max(load, more) if more > 1.0 else load
 
-    best = from_both_sides(round(program.cycle / step), program, at, asked)
+    best = from_both_sides(round(program.cycle / step), program, at, required)
     return program if best is None else best
 
 
@@ -70,7 +70,7 @@ def time_of(program: TimedProgram) -> float:
     return program.cycle * load_of(program)
 
 
-def time_asked(program: TimedProgram) -> float:
+def required_time(program: TimedProgram) -> float:
     """How many times as long the motion must last for failed checks that a slower one passes."""
     checks = [check for run in program.solution.runs for check in run.report.checks if not check.passed]
     return max((check.kind.more_time(check.value, check.limit) for check in checks), default=1.0)

@@ -17,7 +17,7 @@ from cellplan.model.progress import silent
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
-from cellplan.pipeline.layout.cycles import load_of, time_asked
+from cellplan.pipeline.layout.cycles import load_of, required_time
 from cellplan.pipeline.layout.finish import margin_of, rejection_of
 from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, prepared
 from cellplan.pipeline.layout.request import LayoutRequest
@@ -81,7 +81,7 @@ def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
     except (InputError, NoSolutionError) as error:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     figures = {
-        "load": max(load_of(program), time_asked(program)),
+        "load": max(load_of(program), required_time(program)),
         "margin_deg": margin_of(program),
         "is_apart": is_apart,
     }
@@ -101,10 +101,10 @@ def _job(ready: Prepared) -> Job:
 
 def _is_apart(program: TimedProgram) -> bool:
     """Whether all distances are proved to be kept, and mounted bodies are mounted as they should be."""
-    for each in program.solution.runs:
-        scene = scene_of_run(each.scene or program.scene, [it.task.name for it in each.schedule.tasks])
-        q = stacked(scene.cell, each.report.q)
-        if not all(check.passed for check in check_mounting(scene, q, each.schedule.times)):
+    for one in program.solution.runs:
+        scene = scene_of_run(one.scene or program.scene, [it.task.name for it in one.schedule.tasks])
+        q = stacked(scene.cell, one.report.q)
+        if not all(check.passed for check in check_mounting(scene, q, one.schedule.times)):
             return False
         if not certify(scene, q, with_minimum=False).is_kept:
             return False

@@ -28,7 +28,7 @@ from cellplan.pipeline.layout.proposals import choice_of
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
 from cellplan.search.variables.variables import Variables
 from cellplan.study.trial import Trial
 from cellplan.study.workers import Workers
@@ -90,13 +90,13 @@ class Certified:
 
 
 @dataclass(slots=True)
-class _Room:
+class _Reserves:
     """What is asked for beyond the demands, as verified motions have shown to be needed."""
 
-    angle: float = Room().margin
-    length: float = Room().distance
-    own: float = Room().own
-    time: float = Room().time
+    angle: float = Reserve().margin
+    length: float = Reserve().distance
+    within_robot: float = Reserve().within_robot
+    time: float = Reserve().time
     nodes: int = NODES
     keys: int = KEYS
     denser: tuple[float, ...] = ()
@@ -112,8 +112,8 @@ class _Room:
     @property
     def effort(self) -> Effort:
         """As the local optimisation is asked."""
-        room = Room(margin=self.angle, distance=self.length, own=self.own, time=self.time)
-        return Effort(iterations=ITERATIONS, keys=self.keys, also_at=self.also_at, room=room, trust=0.2)
+        reserve = Reserve(margin=self.angle, distance=self.length, within_robot=self.within_robot, time=self.time)
+        return Effort(iterations=ITERATIONS, keys=self.keys, also_at=self.also_at, reserve=reserve, trust=0.2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -152,9 +152,9 @@ class Finish:
     def certified(self, trial: Trial) -> Certified:
         """A layout of the search, certified or with the reason why not."""
         x, start = self._layout(trial)
-        room, is_first, before = _Room(), True, self.solves
+        reserves, is_first, before = _Reserves(), True, self.solves
         while True:
-            timed = self._refined(x, start, room, is_first=is_first)
+            timed = self._refined(x, start, reserves, is_first=is_first)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
             self.solves += 1
             if program is not None:
@@ -162,7 +162,7 @@ class Finish:
                 reason = rejection_of(program, self.ready.variables) or too_singular(
                     self.ready, timed.standing, program
                 )
-            found = Certified(
+            result = Certified(
                 trial=trial.number,
                 x=x,
                 start=start,
@@ -171,8 +171,8 @@ class Finish:
                 standing=timed.standing,
                 solves=self.solves - before,
             )
-            if found.passed or program is None or found.solves >= ROUNDS or not _enlarged(room, timed, program):
-                return found
+            if result.passed or program is None or result.solves >= ROUNDS or not _enlarged(reserves, timed, program):
+                return result
             is_first = False
 
     def _layout(self, trial: Trial) -> tuple[Array, Array]:
@@ -181,35 +181,35 @@ class Finish:
         self.ready = prepared(self.ready.request, self.choice)
         return np.array(trial.figures["x"], dtype=float), np.array(trial.figures["start"], dtype=float)
 
-    def _refined(self, x: Array, start: Array, room: _Room, *, is_first: bool) -> _Timed:
+    def _refined(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
         """The layout and its motion, improved again with more nodes where it asks for more time than the others do."""
-        best = self._drafted(x, start, room, is_first=is_first)
+        best = self._drafted(x, start, reserves, is_first=is_first)
         for _ in range(REFINED if is_scaled(self.ready) else 0):
             if best.program is None:
                 return best
             problem, measures = best.standing.problem, best.standing.measures
             peaks = exceeded_at(best.program, measures.cycle, measures.span)
-            if not isinstance(problem, LayoutProblem) or not room.add_nodes(peaks, measures.span):
+            if not isinstance(problem, LayoutProblem) or not reserves.add_nodes(peaks, measures.span):
                 break
-            found = self._drafted(best.x, best.start, room, is_first=False)
-            if found.program is None or time_of(found.program) > (1.0 - GAIN) * time_of(best.program):
+            refined = self._drafted(best.x, best.start, reserves, is_first=False)
+            if refined.program is None or time_of(refined.program) > (1.0 - GAIN) * time_of(best.program):
                 break
-            best = found
+            best = refined
         return self._shortest(best)
 
-    def _drafted(self, x: Array, start: Array, room: _Room, *, is_first: bool) -> _Timed:
+    def _drafted(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
         """The layout improved at more nodes, with its motion in the cycle that it has there."""
-        x, start, standing, demands = self._improved(x, start, room, is_first=is_first)
+        x, start, standing, demands = self._improved(x, start, reserves, is_first=is_first)
         is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
         helping = self.workers if isinstance(self.workers, Workers) else None
         early = EarlyClearance(helping.begin if is_once and helping is not None else None)
-        found = _Timed(x=x, start=start, standing=standing, demands=demands, early=early)
+        timed = _Timed(x=x, start=start, standing=standing, demands=demands, early=early)
         try:
             cell = self._cell(x, start)
             program = draft(self.ready, cell, standing.measures.cycle, self.progress, early)
-            return replace(found, program=program)
+            return replace(timed, program=program)
         except (InputError, NoSolutionError) as error:
-            return replace(found, reason=str(error).splitlines()[0])
+            return replace(timed, reason=str(error).splitlines()[0])
 
     def _shortest(self, timed: _Timed) -> _Timed:
         """The layout with its motion in the shortest cycle that its limits allow."""
@@ -229,23 +229,23 @@ class Finish:
         return cell
 
     def _improved(
-        self, x: Array, start: Array, room: _Room, *, is_first: bool
+        self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool
     ) -> tuple[Array, Array, Standing, Demands]:
         """The layout improved at more nodes; one that only has to conform is taken as it is at first."""
-        demands, problem = self._demands(x, start), self._problem(room.nodes, room.denser)
+        demands, problem = self._demands(x, start), self._problem(reserves.nodes, reserves.denser)
         if is_first and demands.objective is Objective.CONFORMING:
             problem, effort = self.ready.coarse, Effort()
             point = problem.evaluate(x, start)
             if point is not None:
                 return x, start, standing_of(problem, point, demands, effort), demands
-        found = improve(problem, x, start, demands, room.effort)
-        if found is None:
+        improved = improve(problem, x, start, demands, reserves.effort)
+        if improved is None:
             problem = self.ready.coarse
             point = problem.evaluate(x, start)
             if point is None:
                 raise NoSolutionError(NOT_FOLLOWED)
-            return x, start, standing_of(problem, point, demands, room.effort), demands
-        return found.x, found.start, standing_of(problem, found.point, demands, room.effort), demands
+            return x, start, standing_of(problem, point, demands, reserves.effort), demands
+        return improved.x, improved.start, standing_of(problem, improved.point, demands, reserves.effort), demands
 
     def _demands(self, x: Array, start: Array) -> Demands:
         """What is demanded of a layout of the search."""
@@ -282,65 +282,65 @@ def too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> 
     for run in program.solution.runs:
         values = {} if run.report.conditioning is None else run.report.conditioning.robots
         for name, least in zip(arms.names, demanded.tolist(), strict=True):
-            found = values.get(name, np.zeros(0))
-            if found.max(initial=0.0) > 0.0 and found.min() < least:
-                return f"smallest singular value {found.min():.4g} of {name}, {least:.4g} demanded"
+            singular = values.get(name, np.zeros(0))
+            if singular.max(initial=0.0) > 0.0 and singular.min() < least:
+                return f"smallest singular value {singular.min():.4g} of {name}, {least:.4g} demanded"
     return ""
 
 
-def certified_cell(found: Certified) -> Cell:
+def certified_cell(result: Certified) -> Cell:
     """The cell file's cell of a certified layout: what ``solve`` read.
 
     Raises:
         ValueError: The layout has no program.
     """
-    if found.program is None:
+    if result.program is None:
         raise ValueError("expected a layout with a program, got one without")
-    return found.program.solution.cell
+    return result.program.solution.cell
 
 
-def _enlarged(room: _Room, timed: _Timed, program: TimedProgram) -> bool:
+def _enlarged(reserves: _Reserves, timed: _Timed, program: TimedProgram) -> bool:
     """Ask for what the verified motion missed, with nodes and keys there; False where it missed nothing of the kind."""
     problem, span, times = timed.standing.problem, timed.standing.measures.span, list[float]()
     demanded = float(timed.demands.margin.max(initial=0.0))
     margin, load = margin_of(program), load_of(program)
     missed_margin = margin is not None and margin < DEG * demanded
     if margin is not None and missed_margin:
-        room.angle += demanded - np.radians(margin) + MORE_ANGLE
+        reserves.angle += demanded - np.radians(margin) + MORE_ANGLE
         times += margins_missed_at(program, demanded, span)
     required = program.solution.cell.checks.clearance_mm
-    others, own = (clearance_of(program, is_own=each) for each in (False, True))
+    others, own_clearance = (clearance_of(program, is_own=is_own) for is_own in (False, True))
     keys = list[float]()
     if others is not None and others < required:
-        room.length += (required - others) / MM + MORE_LENGTH
+        reserves.length += (required - others) / MM + MORE_LENGTH
         keys += distances_missed_at(program, span, is_own=False)
-    if own is not None and own < required:
-        room.own += (required - own) / MM + MORE_OWN
+    if own_clearance is not None and own_clearance < required:
+        reserves.within_robot += (required - own_clearance) / MM + MORE_OWN
         keys += distances_missed_at(program, span, is_own=True)
     if load > 1.0:
-        room.time += load - 1.0 + MORE_TIME
+        reserves.time += load - 1.0 + MORE_TIME
         times += exceeded_at(program, program.cycle, span)
     if not (missed_margin or keys or load > 1.0):
         return False
-    room.also_at = (*room.also_at, *keys)
-    if not isinstance(problem, LayoutProblem) or not room.add_nodes([*times, *keys], span):
-        room.nodes = 2 * room.nodes - 1
-        room.keys = 2 * room.keys - 1 if keys else room.keys
+    reserves.also_at = (*reserves.also_at, *keys)
+    if not isinstance(problem, LayoutProblem) or not reserves.add_nodes([*times, *keys], span):
+        reserves.nodes = 2 * reserves.nodes - 1
+        reserves.keys = 2 * reserves.keys - 1 if keys else reserves.keys
     return True
 
 
 def margin_of(program: TimedProgram) -> float | None:
     """Smallest distance of a turning joint from its limits in [deg]; None without one."""
-    found = [use.margin for run in program.solution.runs for use in run.report.joints if use.is_revolute]
-    return DEG * min(found) if found else None
+    margins = [use.margin for run in program.solution.runs for use in run.report.joints if use.is_revolute]
+    return DEG * min(margins) if margins else None
 
 
 def clearance_of(program: TimedProgram, *, is_own: bool | None = None) -> float | None:
     """Smallest certified distance in [mm], of a robot's own bodies or of others only if asked; None without pairs."""
-    found = [
+    distances = [
         minimum.minimum
         for run in program.solution.runs
         for kind, minimum in run.report.clearance.minima.items()
         if minimum.minimum is not None and is_own in {None, kind is ClearanceClass.SELF}
     ]
-    return MM * min(found) if found else None
+    return MM * min(distances) if distances else None

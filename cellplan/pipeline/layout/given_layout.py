@@ -103,11 +103,11 @@ def given_record(ready: Prepared) -> GivenRecord:
 
 def _violations(ready: Prepared, standing: Standing | None, rejected: str) -> list[LimitRecord]:
     """What a rejected layout breaks, the worst first: at the nodes of the search, else why it is rejected."""
-    found = list[LimitRecord]()
+    limits = list[LimitRecord]()
     if standing is not None:
         demands = ready.demands(objective="conforming", duration=ready.duration)
-        found = standing_of(standing.problem, standing.measures.point, demands, EFFORT).violations()
-    return found or [{"kind": "check", "subject": "", "text": rejected}]
+        limits = standing_of(standing.problem, standing.measures.point, demands, EFFORT).violations()
+    return limits or [{"kind": "check", "subject": "", "text": rejected}]
 
 
 def _rounded(value: float | None) -> Number:

@@ -28,36 +28,36 @@ class PathSearch:
         unled: What varies where the motion is that by the pseudo-inverse, the start posture of the positioner with it.
     """
 
-    own: Variables  # what varies beside the path
+    layout_variables: Variables  # what varies beside the path
     unled: Variables
     schedule: Schedule  # the tasks on the common clock
     start: Array  # start posture of the given layout in [rad] or [m], shape (nq,)
 
     @property
-    def asked(self) -> PathRange:
+    def settings(self) -> PathRange:
         """The path that may change."""
-        return self.own.settings.paths[0]
+        return self.layout_variables.settings.paths[0]
 
     @property
     def is_given(self) -> bool:
         """Whether the cell itself gives a path."""
-        return self.own.base.robot(self.asked.robot).path is not None
+        return self.layout_variables.base.robot(self.settings.robot).path is not None
 
     @cached_property
     def given(self) -> JointSpline:
         """The path of the cell, else that of its motion by the pseudo-inverse, else the positioner at its start."""
-        given = self.own.base.robot(self.asked.robot).path
+        given = self.layout_variables.base.robot(self.settings.robot).path
         if given is not None:
-            return self.like_asked(given)
-        found = self.fitted(self.unled.given, self.start)
-        if found is not None:
-            return found[0]
-        still = self.start[self.own.base.columns(self.asked.robot)]
-        return JointSpline(coefficients=np.tile(still, (self.asked.coefficients, 1)), degree=self.asked.degree)
+            return self.resampled(given)
+        fitted = self.fitted(self.unled.given, self.start)
+        if fitted is not None:
+            return fitted[0]
+        still = self.start[self.layout_variables.base.columns(self.settings.robot)]
+        return JointSpline(coefficients=np.tile(still, (self.settings.coefficients, 1)), degree=self.settings.degree)
 
-    def like_asked(self, path: JointSpline) -> JointSpline:
+    def resampled(self, path: JointSpline) -> JointSpline:
         """A path with as many coefficients as are asked for."""
-        return with_count(path, self.asked.coefficients, self.asked.degree)
+        return with_count(path, self.settings.coefficients, self.settings.degree)
 
     def fitted(self, x: Array, start: Array) -> tuple[JointSpline, Array] | None:
         """The path nearest to a motion by the pseudo-inverse, and the start posture; None where a tool is lost.
@@ -66,17 +66,17 @@ class PathSearch:
             x: Variables of the layout without the path, shape (n,).
             start: Start posture near the right one in [rad] or [m], shape (nq,).
         """
-        base, layouts, asked = self.unled.base, self.unled.layouts(x[None], start[None]), self.asked
-        return first_path(base, self.schedule, layouts, count=asked.coefficients, degree=asked.degree)
+        base, layouts, settings = self.unled.base, self.unled.layouts(x[None], start[None]), self.settings
+        return first_path(base, self.schedule, layouts, count=settings.coefficients, degree=settings.degree)
 
     def variables(self, path: JointSpline, others: Array) -> Array:
         """Variables of the path problem: coefficients, then what varies besides, shape (n,)."""
         return np.concatenate([path.coefficients.ravel(), others])
 
-    def beside(self, x: Array) -> Array:
+    def layout_values(self, x: Array) -> Array:
         """What varies beside the path, as in a layout without one."""
         place = {name: column for column, name in enumerate(self.unled.names)}
-        return np.array([x[place[name]] for name in self.own.names])
+        return np.array([x[place[name]] for name in self.layout_variables.names])
 
     def departures(self, x: Array) -> Array:
         """How far each joint leaves the given path at most in [rad] or [m], shape (n,), at variables of the problem."""
@@ -92,12 +92,12 @@ class PathSearch:
             nodes: The number.
             acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], shape (nq,).
         """
-        base, asked = self.own.base, self.asked
-        count, degree = asked.coefficients, asked.degree
+        base, settings = self.layout_variables.base, self.settings
+        count, degree = settings.coefficients, settings.degree
         return PathProblem(
             nodes=PathNodes.of(base, self.schedule, count=count, degree=degree, nodes=nodes),
-            path=PathVariables.of(base, asked.robot, self.given),
-            layout=self.own,
+            path=PathVariables.of(base, settings.robot, self.given),
+            layout=self.layout_variables,
             bodies=bodies,
             acceleration=acceleration,
         )
@@ -126,9 +126,9 @@ def resolving(cell: Cell) -> frozenset[str]:
     """Addresses of what decides how redundancy is resolved, and so nothing beside a given joint path."""
     if cell.layout is None:
         return frozenset()
-    names = {each.robot for each in cell.layout.paths}
+    names = {path.robot for path in cell.layout.paths}
     return frozenset(
-        each.address
-        for each in cell.layout.ranges
-        if each.kind is VariableKind.WEIGHT or (each.kind is VariableKind.START and each.name in names)
+        variable.address
+        for variable in cell.layout.ranges
+        if variable.kind is VariableKind.WEIGHT or (variable.kind is VariableKind.START and variable.name in names)
     )

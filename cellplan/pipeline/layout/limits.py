@@ -65,9 +65,9 @@ class Standing:
 
     def _smallest(self, *, with_own: bool) -> float | None:
         """Smallest distance of pairs that are to be apart, not only in touch; None where none are near."""
-        found = self.measures.distances
-        kept = found.demands >= min(TOUCHING, float(found.demands.max(initial=0.0)))
-        values = found.values[kept & (with_own | ~found.is_own)]
+        distances = self.measures.distances
+        is_demanded = distances.demands >= min(TOUCHING, float(distances.demands.max(initial=0.0)))
+        values = distances.values[is_demanded & (with_own | ~distances.is_own)]
         return MM * float(values.min()) if len(values) else None
 
     @property
@@ -77,21 +77,21 @@ class Standing:
 
     def violations(self) -> list[LimitRecord]:
         """What it breaks, the worst first."""
-        found = [*self._margins(0.0, 0.0), *self._distances(0.0), *_singular(self, 0.0)]
+        limits = [*self._margins(0.0, 0.0), *self._distances(0.0), *_singular(self, 0.0)]
         if self.demands.duration is not None:
-            found += self._loads(self._whole)
-        return [record for _, record in sorted(found, key=lambda each: -each[0])]
+            limits += self._loads(self._whole)
+        return [record for _, record in sorted(limits, key=lambda entry: -entry[0])]
 
     def binding(self) -> list[LimitRecord]:
         """What holds it back: loads on the clock, margins, distances, bounds of variables."""
         loads = self._loads(self._whole, least=BINDS) if self._whole > 0.0 else iter(())
-        found = [
+        limits = [
             *loads,
             *self._margins(NEAR_ANGLE, NEAR_LENGTH),
             *self._distances(NEAR_LENGTH),
             *_singular(self, NEAR_SHARE),
         ]
-        return [record for _, record in found] + list(self._bounds())
+        return [record for _, record in limits] + list(self._bounds())
 
     @property
     def _whole(self) -> float:
@@ -128,19 +128,19 @@ class Standing:
             more = f", {demand:.4g} {unit} demanded" if demand > 0.0 else ""
             yield scale * float(beyond[column]), {"kind": "position", "subject": name, "text": f"{name} {what}{more}"}
 
-    def _distances(self, room: float) -> Iterator[tuple[float, LimitRecord]]:
+    def _distances(self, tolerance: float) -> Iterator[tuple[float, LimitRecord]]:
         """Pairs nearer to each other than demanded and a little more, each once."""
-        found, lacks = self.measures.distances, self.measures.lacks
+        distances, lacks = self.measures.distances, self.measures.lacks
         seen = set[int]()
         for row in np.argsort(-lacks, kind="stable").tolist():
-            pair = int(found.pairs[row])
-            if not lacks[row] > -room:
+            pair = int(distances.pairs[row])
+            if not lacks[row] > -tolerance:
                 return
-            is_shallow = found.demands[row] < 0.0 and lacks[row] < 0.5 * found.demands[row]
+            is_shallow = distances.demands[row] < 0.0 and lacks[row] < 0.5 * distances.demands[row]
             if pair in seen or is_shallow:  # what may be in each other, as a grip, is not near its demand there
                 continue
             seen.add(pair)
-            distance, demand = MM * float(found.values[row]), MM * float(found.demands[row])
+            distance, demand = MM * float(distances.values[row]), MM * float(distances.demands[row])
             names = " and ".join(self.problem.pair_names(pair))
             how = f"{distance:.3g} mm apart" if distance >= 0.0 else f"{-distance:.3g} mm into each other"
             text = f"{names} {how}, {demand:.3g} mm demanded"
@@ -156,13 +156,13 @@ class Standing:
                     yield {"kind": "bound", "subject": name, "text": f"{name} at its {side} bound"}
 
 
-def _singular(standing: Standing, room: float) -> Iterator[tuple[float, LimitRecord]]:
+def _singular(standing: Standing, tolerance: float) -> Iterator[tuple[float, LimitRecord]]:
     """Arms nearer to singular configurations than demanded and a little more."""
     arms, demanded = standing.measures.arms, standing.demands.singular
     if arms is None or demanded is None:
         return
     lacks = standing.measures.singular.value.max(axis=0)
-    for place in np.flatnonzero(lacks > -room).tolist():
+    for place in np.flatnonzero(lacks > -tolerance).tolist():
         name, value = arms.names[place], (1.0 - float(lacks[place])) * float(demanded[place])
         text = f"{name} at a smallest singular value of {value:.3g}, {demanded[place]:.3g} demanded"
         yield 100.0 * float(lacks[place]), {"kind": "singular", "subject": name, "text": text}
@@ -205,14 +205,14 @@ def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
     """Derivatives of the load of the joint that decides the clock; of all that decide it where it is retimed."""
     problem, measures = standing.problem, standing.measures
     if measures.pace is not None:
-        asked = replace(standing.demands, objective=Objective.CYCLE, duration=None)
-        optimum = explain(problem, measures.point, asked, Effort())
+        demands = replace(standing.demands, objective=Objective.CYCLE, duration=None)
+        optimum = explain(problem, measures.point, demands, Effort())
         span = float(problem.times[-1] - problem.times[0])
         return np.full(by.q.shape[-1], np.nan) if optimum is None else optimum.by_variable / span
     rates = np.sqrt(measures.accelerations.value)
     if by.qdd is not None and rates.max() > measures.speeds.value.max():
-        found = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)
-        return found / (2.0 * float(rates.max()))
+        highest = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)
+        return highest / (2.0 * float(rates.max()))
     return _highest(measures.speeds, by.qd, problem.limits.velocity, measures.speeds.value)
 
 
@@ -230,11 +230,11 @@ def _of_margin(standing: Standing, by: PointDerivatives) -> Array:
 
 def _of_distance(standing: Standing, by: PointDerivatives) -> Array:
     """Derivatives of the smallest distance of bodies that do not belong to one robot."""
-    found = standing.measures.distances
-    if not len(found.values) or found.is_own.all():
+    distances = standing.measures.distances
+    if not len(distances.values) or distances.is_own.all():
         return np.full(by.q.shape[-1], np.nan)
-    values = np.where(found.is_own, np.inf, found.values - found.demands)
-    derivatives: Array = standing.problem.distance_derivatives(standing.measures.point, found, by)
+    values = np.where(distances.is_own, np.inf, distances.values - distances.demands)
+    derivatives: Array = standing.problem.distance_derivatives(standing.measures.point, distances, by)
     return derivatives[int(values.argmin())]
 
 

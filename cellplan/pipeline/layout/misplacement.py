@@ -18,7 +18,7 @@ from cellplan.model.units import DEG, MM
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import whole_steps
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
-from cellplan.pipeline.layout.cycles import load_of, scaled, time_asked
+from cellplan.pipeline.layout.cycles import load_of, required_time, scaled
 from cellplan.pipeline.layout.displaced import DisplacedLayout, verified
 from cellplan.pipeline.layout.finish import (
     KEYS,
@@ -94,10 +94,10 @@ class MisplacedFinish(Finish):
 
         def rank(trial: Trial) -> tuple[int, float]:
             robust = self._begun[trial.number][1]
-            return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.kept, robust.cycle)
+            return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.passing, robust.cycle)
 
         first = sorted(listed, key=rank)
-        return [*first, *(trial for trial in trials if all(trial is not each for each in first))]
+        return [*first, *(trial for trial in trials if all(trial is not leading for leading in first))]
 
     def certified(self, trial: Trial) -> Certified:
         """A layout of the search with all its corners; see ``Finish``.
@@ -115,16 +115,16 @@ class MisplacedFinish(Finish):
         before, effort = self.solves, MANY
         search = search.finer(GuardedProblem.like(self._problem(NODES)), robust, effort)
         for _ in range(ATTEMPTS):
-            x, start = robust.found.x, robust.found.start
+            x, start = robust.improved.x, robust.improved.start
             robust = robust_layout(search, (x, start), signs=self._signs(search)) or robust
-            found, missing = self._result(trial.number, robust, effort, before)
-            if found.passed or missing is None:
+            result, missing = self._result(trial.number, robust, effort, before)
+            if result.passed or missing is None:
                 break
-            room = effort.room
-            more = replace(room, margin=room.margin + missing[0], distance=room.distance + missing[1])
-            effort = replace(effort, room=more, keys=2 * effort.keys - 1)
+            reserve = effort.reserve
+            more = replace(reserve, margin=reserve.margin + missing[0], distance=reserve.distance + missing[1])
+            effort = replace(effort, reserve=more, keys=2 * effort.keys - 1)
             search.effort = effort
-        return found
+        return result
 
     def _begin(self, trial: Trial) -> None:
         """Improve a layout with displaced bases at few nodes."""
@@ -147,8 +147,8 @@ class MisplacedFinish(Finish):
         self, trial: int, robust: Robust, effort: Effort, before: int
     ) -> tuple[Certified, tuple[float, float] | None]:
         """The layout solved and all its corners verified, and the margin and distance to ask for where one failed."""
-        x, start, demands = robust.found.x, robust.found.start, self.ready.demands()
-        standing = standing_of(self._problem(NODES), robust.found.point, demands, effort)
+        x, start, demands = robust.improved.x, robust.improved.start, self.ready.demands()
+        standing = standing_of(self._problem(NODES), robust.improved.point, demands, effort)
         program, solved, reason, verdicts = None, list[CornerRecord](), "", list[_Verdict]()
         missing = None
         try:
@@ -156,7 +156,7 @@ class MisplacedFinish(Finish):
             reason = reason or too_singular(self.ready, standing, program)
         except (InputError, NoSolutionError) as error:
             reason = str(error).splitlines()[0]
-        failed = [each for each in verdicts if each.reason]
+        failed = [verdict for verdict in verdicts if verdict.reason]
         if program is not None:
             if not reason and failed:
                 reason = f"with displaced bases: {failed[0].reason}"
@@ -164,7 +164,7 @@ class MisplacedFinish(Finish):
             if not reason:
                 limits = self._tolerances(robust, program, effort)
                 self.records[trial] = self._record(robust, program.cycle, verdicts, solved, limits)
-        found = Certified(
+        result = Certified(
             trial=trial,
             x=x,
             start=start,
@@ -173,7 +173,7 @@ class MisplacedFinish(Finish):
             standing=standing,
             solves=self.solves - before,
         )
-        return found, missing
+        return result, missing
 
     def _in_one_cycle(self, robust: Robust) -> tuple[TimedProgram, list[CornerRecord], str, list[_Verdict]]:
         """The layout and its worst corners solved in one cycle, and the verdicts on all corners in it.
@@ -182,7 +182,7 @@ class MisplacedFinish(Finish):
             The program of the layout, its worst corners, why one of them failed, and the verdicts.
         """
         of, listed = robust.displacements, list(_chosen(robust))
-        cells = [self.ready.variables.cell(robust.found.x, robust.found.start)]
+        cells = [self.ready.variables.cell(robust.improved.x, robust.improved.start)]
         cells += [of.cell(corner.d, corner.start) for _, corner in listed]
         factor = None
         if self.ready.request.objective is Objective.CYCLE:
@@ -190,9 +190,9 @@ class MisplacedFinish(Finish):
         for _ in range(DURATIONS):
             programs, factor = self._solved_together(cells, factor)
             verdicts = self._verdicts(
-                robust, [(each.d, each.start) for each in robust.corners], factor, is_first_enough=True
+                robust, [(corner.d, corner.start) for corner in robust.corners], factor, is_first_enough=True
             )
-            most = max((each.load for each in verdicts), default=0.0)
+            most = max((verdict.load for verdict in verdicts), default=0.0)
             if factor is None or most <= 1.0:
                 break
             factor = whole_steps(cells[0], factor * most, longer_than=factor)
@@ -202,7 +202,7 @@ class MisplacedFinish(Finish):
             _corner(what, of.names, corner.d, (program, reason))
             for (what, corner), program, reason in zip(listed, programs[1:], reasons[1:], strict=True)
         ]
-        return programs[0], corners, next((each for each in reasons if each), ""), verdicts
+        return programs[0], corners, next((reason for reason in reasons if reason), ""), verdicts
 
     def _solved_together(self, cells: Sequence[Cell], factor: float | None) -> tuple[list[TimedProgram], float | None]:
         """Programs of cells in the shortest common cycle that all of them keep, from a given one on, and its factor."""
@@ -211,12 +211,12 @@ class MisplacedFinish(Finish):
             solved = partial(TimedProgram.solved, law=Law.AS_WRITTEN, values={}, task=None, progress=self.progress)
             return [solved(cell) for cell in cells], None
         for _ in range(DURATIONS):
-            found = [scaled(cell, factor, self.progress) for cell in cells]
-            asked = max(max(load_of(program), time_asked(program)) for program in found)
-            if asked <= 1.0:
+            programs = [scaled(cell, factor, self.progress) for cell in cells]
+            required = max(max(load_of(program), required_time(program)) for program in programs)
+            if required <= 1.0:
                 break
-            factor = whole_steps(cells[0], factor * asked, longer_than=factor)
-        return found, factor
+            factor = whole_steps(cells[0], factor * required, longer_than=factor)
+        return programs, factor
 
     def _verdicts(
         self, robust: Robust, placed: Sequence[Placed], factor: float | None, *, is_first_enough: bool = False
@@ -225,7 +225,7 @@ class MisplacedFinish(Finish):
 
         One that only asks for more time is none of these.
         """
-        of, x = robust.displacements, robust.found.x
+        of, x = robust.displacements, robust.improved.x
         layout = DisplacedLayout(
             request=self.ready.request.anywhere,
             choice=self.choice,
@@ -265,15 +265,20 @@ class MisplacedFinish(Finish):
         factor = None
         if self.ready.request.objective is Objective.CYCLE:
             factor = program.cycle / self.ready.duration
-        asked, demands, start = replace(effort, within=WITHIN), self.ready.demands(), robust.found.start
-        found = list(tolerances(robust.problem, start, demands, asked, max(program.cycle, robust.cycle)))
+        finer, demands, start = replace(effort, within=WITHIN), self.ready.demands(), robust.improved.start
+        measured = list(tolerances(robust.problem, start, demands, finer, max(program.cycle, robust.cycle)))
         of = robust.displacements
         ends = np.tile(of.amounts, 2)  # verified already, as far as the nodes do not say otherwise
-        lower = np.array([float(end) if each.kept >= end else 0.0 for each, end in zip(found, ends, strict=True)])
-        upper, first = np.array([each.kept for each in found]), [each.first for each in found]
-        at, open_ones = upper.copy(), [place for place, each in enumerate(found) if each.kept > 0.0]
+        lower = np.array(
+            [float(end) if tolerance.extent >= end else 0.0 for tolerance, end in zip(measured, ends, strict=True)]
+        )
+        upper, first = (
+            np.array([tolerance.extent for tolerance in measured]),
+            [tolerance.first for tolerance in measured],
+        )
+        at, open_ones = upper.copy(), [place for place, verdict in enumerate(measured) if verdict.extent > 0.0]
         for _ in range(NARROWER):
-            placed = [(at[place] * found[place].unit, found[place].start) for place in open_ones]
+            placed = [(at[place] * measured[place].unit, measured[place].start) for place in open_ones]
             verdicts = self._verdicts(robust, placed, factor) if placed else []
             for place, verdict in zip(open_ones, verdicts, strict=True):
                 if verdict.reason:
@@ -283,7 +288,8 @@ class MisplacedFinish(Finish):
             open_ones = [place for place in open_ones if lower[place] < upper[place]]
             at = 0.5 * (lower + upper)
         return [
-            replace(each, kept=kept, first=why) for each, kept, why in zip(found, lower.tolist(), first, strict=True)
+            replace(tolerance, extent=end, first=why)
+            for tolerance, end, why in zip(measured, lower.tolist(), first, strict=True)
         ]
 
     def _record(
@@ -297,18 +303,18 @@ class MisplacedFinish(Finish):
         """All of it in printed units."""
         ends = robust.worst_ones + robust.ends
         groups = (verdicts[: robust.worst_ones], verdicts[robust.worst_ones : ends], verdicts[ends:])
-        kept = [sum(not each.reason for each in group) for group in groups]
+        passing = [sum(not corner.reason for corner in group) for group in groups]
         return {
             "position_mm": number(self.misplacement.position_mm),
             "orientation_deg": number(self.misplacement.orientation_deg),
             "cycle_s": number(round(cycle, 6)),
             "nominal_cycle_s": number(round(robust.nominal, 6)),
             "seeded": len(groups[2]),
-            "seeded_kept": kept[2],
+            "seeded_kept": passing[2],
             "by_derivatives": len(groups[0]),
-            "by_derivatives_kept": kept[0],
+            "by_derivatives_kept": passing[0],
             "ends": len(groups[1]),
-            "ends_kept": kept[1],
+            "ends_kept": passing[1],
             "solved": solved,
             "tolerances": list(_tolerances(limits)),
         }
@@ -326,7 +332,7 @@ def _chosen(robust: Robust) -> Iterator[tuple[str, Corner]]:
     orders = {
         "longest cycle": [-corner.cycle for corner in corners],
         "smallest margin": [float(corner.margins.min()) for corner in corners],
-        "least room between bodies": [corner.room for corner in corners],
+        "least room between bodies": [corner.spare_distance for corner in corners],
     }
     seen = set[int]()
     for what, order in orders.items():
@@ -334,14 +340,16 @@ def _chosen(robust: Robust) -> Iterator[tuple[str, Corner]]:
         if place not in seen:
             seen.add(place)
             yield what, corners[place]
-    end = robust.worst_ones + int(np.argmin([corner.room for corner in corners[robust.worst_ones :][: robust.ends]]))
+    end = robust.worst_ones + int(
+        np.argmin([corner.spare_distance for corner in corners[robust.worst_ones :][: robust.ends]])
+    )
     if end not in seen:
         yield "one base in one direction, least room between bodies", corners[end]
 
 
-def _corner(what: str, names: Sequence[str], d: Array, found: tuple[TimedProgram, str]) -> CornerRecord:
+def _corner(what: str, names: Sequence[str], d: Array, judged: tuple[TimedProgram, str]) -> CornerRecord:
     """A corner that was solved, with why it failed."""
-    program, reason = found
+    program, reason = judged
     margin, clearance = margin_of(program), clearance_of(program)
     scale = [DEG if name.endswith("_deg") else MM for name in names]
     values = (round(by * unit, FINE) for by, unit in zip(d.tolist(), scale, strict=True))
@@ -365,8 +373,8 @@ def _tolerances(limits: Sequence[Tolerance]) -> Iterator[ToleranceRecord]:
             "robot": robot,
             "direction": direction,
             "unit": unit,
-            "minus": number(round(scale * minus.kept, FINE)),
-            "plus": number(round(scale * plus.kept, FINE)),
+            "minus": number(round(scale * minus.extent, FINE)),
+            "plus": number(round(scale * plus.extent, FINE)),
             "first_minus": minus.first,
             "first_plus": plus.first,
         }

@@ -80,7 +80,7 @@ class Prepared:
         scene = Scene.from_cell(variables.base)
         paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
         phase = plan_phases(variables.base).program[0]
-        found = cls(
+        prepared = cls(
             request=request,
             cell=cell,
             variables=variables,
@@ -90,8 +90,10 @@ class Prepared:
             moving=tuple(phase.moving),
             unled=None if unled is None else cls.of(request, unled),
         )
-        is_found = any(each.kind is VariableKind.START and each.given is None for each in variables.tied.ranges)
-        return _with_found_start(found) if is_found else found
+        is_found = any(
+            variable.kind is VariableKind.START and variable.given is None for variable in variables.tied.ranges
+        )
+        return _with_found_start(prepared) if is_found else prepared
 
     def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
@@ -133,7 +135,9 @@ class Prepared:
             start = self.given_start
         except NoSolutionError:
             start = np.concatenate([0.5 * np.add(*finite_limits(robot.model)) for robot in self.variables.base.robots])
-        return PathSearch(own=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start)
+        return PathSearch(
+            layout_variables=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start
+        )
 
     @property
     def given_start(self) -> Array:
@@ -142,10 +146,10 @@ class Prepared:
         Raises:
             NoSolutionError: There is none.
         """
-        found = self._given_start
-        if isinstance(found, NoSolutionError):
-            raise found
-        return found
+        start = self._given_start
+        if isinstance(start, NoSolutionError):
+            raise start
+        return start
 
     @cached_property
     def _given_start(self) -> Array | NoSolutionError:
@@ -238,7 +242,7 @@ def _with_found_start(ready: Prepared) -> Prepared:
     except NoSolutionError:
         return ready
     base, variables = ready.variables.base, ready.variables
-    robots = [replace(each, start=start[base.columns(each.name)]) for each in base.robots]
+    robots = [replace(robot, start=start[base.columns(robot.name)]) for robot in base.robots]
     given = variables.read_from(replace(base, robots=tuple(robots)))
     return replace(ready, variables=replace(variables, given=given), found_start=start)
 

@@ -60,14 +60,14 @@ class Proposals:
             self._fourth(best, number, is_conforming=bool(following)),
         ]
         lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
-        for place, each in enumerate(proposed):
-            is_far = each["kind"] == "sampled" or (each["kind"] == "perturbed" and each["of"] is None)
-            if is_far and each["choice"] in lost:
-                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": each["choice"]}
+        for place, trial in enumerate(proposed):
+            is_far = trial["kind"] == "sampled" or (trial["kind"] == "perturbed" and trial["of"] is None)
+            if is_far and trial["choice"] in lost:
+                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": trial["choice"]}
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
         limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
-        return [each if "clearance_m" in each else each | {"give_up_above_s": limit} for each in proposed]
+        return [values if "clearance_m" in values else values | {"give_up_above_s": limit} for values in proposed]
 
     def _first(self) -> list[dict[str, Any]]:
         """The given layout and those of the user with all choices, then perturbations of the given one and samples."""
@@ -77,8 +77,8 @@ class Proposals:
         ]
         if self.request.seed and self.request.objective is Objective.CONFORMING:
             listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
-        options: list[dict[str, Any]] = [{**each, "choice": choice} for choice in self.choices for each in listed]
-        options += [{"kind": "branch", **each, "choice": self.choices[0]} for each in self.branches]
+        options: list[dict[str, Any]] = [{**options, "choice": choice} for choice in self.choices for options in listed]
+        options += [{"kind": "branch", **branch, "choice": self.choices[0]} for branch in self.branches]
         options += [self._sampled(0, number) for number in range(1, len(self.choices))]
         rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
@@ -87,13 +87,13 @@ class Proposals:
         """Trials that conform, best first, of equal ones the first."""
         best = BESTS[self.request.objective]
         sign = -1.0 if best.is_largest else 1.0
-        found = [
+        ranked = [
             (sign * value, trial)
             for trial in finished
             if (value := best.value(trial)) is not None and trial.variant.number not in self.rejected
         ]
         last: float | None = None
-        for value, trial in sorted(found, key=lambda each: (each[0], each[1].variant.number)):
+        for value, trial in sorted(ranked, key=lambda entry: (entry[0], entry[1].variant.number)):
             if last is None or abs(value - last) > SAME * abs(last):
                 last = value
                 yield trial
@@ -150,7 +150,7 @@ def _branches(ready: Prepared) -> list[dict[str, list[float]]]:
         x, start = ready.starts.branches(robots, ready.given_start)
     except NoSolutionError:
         return []
-    return [{"x": each.tolist(), "start": own.tolist()} for each, own in zip(x, start, strict=True)]
+    return [{"x": values.tolist(), "start": posture.tolist()} for values, posture in zip(x, start, strict=True)]
 
 
 def _leads_nowhere(trial: Trial) -> bool:

@@ -41,10 +41,10 @@ def read_misplacement(option: str, text: str) -> tuple[float, float]:
     length, comma, angle = text.partition(",")
     if not comma:
         raise InputError(f"{option}: expected a length and an angle such as 10mm,1deg, got {shown(text)}")
-    found = read_length(option, length), read_angle(option, angle)
-    if not min(found) > 0.0:
+    misplacement = read_length(option, length), read_angle(option, angle)
+    if not min(misplacement) > 0.0:
         raise InputError(f"{option}: expected a length and an angle above 0 such as 10mm,1deg, got {shown(text)}")
-    return found
+    return misplacement
 
 
 def read_time(option: str, text: str) -> float:
@@ -53,10 +53,10 @@ def read_time(option: str, text: str) -> float:
     Raises:
         InputError: The text is no time above 0.
     """
-    found = _read(option, text, TIMES, "a time such as 60s or 10min")
-    if not found > 0.0:
+    seconds = _read(option, text, TIMES, "a time such as 60s or 10min")
+    if not seconds > 0.0:
         raise InputError(f"{option}: expected a time above 0 such as 60s or 10min, got {shown(text)}")
-    return found
+    return seconds
 
 
 def _read(option: str, text: str, units: Mapping[str, float], expected: str) -> float:

@@ -168,7 +168,7 @@ def layout_record(
         "rounds": -(-len(finished.trials) // SIZE),
         "solves": solves,
         "given": given.record,
-        "best": next((each for each in listed if best and each["trial"] == best.trial), None),
+        "best": next((candidate for candidate in listed if best and candidate["trial"] == best.trial), None),
         "velocity_only_s": _velocity_only(best) if best and has_accelerations else None,
         "top": listed[:TOP],
         "front": _front(listed),
@@ -208,15 +208,15 @@ def _candidates(ready: Prepared, finished: Finished, tried: Mapping[int, Certifi
     figure = {"cycle_s": "cycle_s", "apart_mm": "clearance_mm", "change": "change"}.get(best.figure, "cycle_s")
     ranks = {"certified": 0, "conforming": 1, "rejected": 2, "violating": 3}
 
-    def rank(each: CandidateRecord) -> tuple[int, float, int]:
-        value: Any = each[figure]  # type: ignore[literal-required]
-        return ranks[each["status"]], sign * (np.inf * sign if value is None else float(value)), each["trial"]
+    def rank(candidate: CandidateRecord) -> tuple[int, float, int]:
+        value: Any = candidate[figure]  # type: ignore[literal-required]
+        return ranks[candidate["status"]], sign * (np.inf * sign if value is None else float(value)), candidate["trial"]
 
     last: CandidateRecord | None = None
-    for each in sorted(listed, key=rank):
-        if last is None or not _is_same(each, last):
-            last = each
-            yield each
+    for candidate in sorted(listed, key=rank):
+        if last is None or not _is_same(candidate, last):
+            last = candidate
+            yield candidate
 
 
 def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
@@ -261,25 +261,25 @@ def _candidate(ready: Prepared, trial: Trial, certified: Certified | None) -> Ca
 
 def _front(listed: list[CandidateRecord]) -> list[CandidateRecord]:
     """Layouts that no other one beats in both cycle and clearance, the shortest cycle first."""
-    found: list[CandidateRecord] = []
+    front: list[CandidateRecord] = []
     widest = -np.inf
-    usable = [each for each in listed if each["status"] in {"certified", "conforming"}]
-    for each in sorted(usable, key=lambda one: (one["cycle_s"] or np.inf, -(one["clearance_mm"] or 0.0))):
-        if each["clearance_mm"] is not None and each["clearance_mm"] > widest:
-            widest = each["clearance_mm"]
-            found.append(each)
-    return found
+    usable = [candidate for candidate in listed if candidate["status"] in {"certified", "conforming"}]
+    for candidate in sorted(usable, key=lambda one: (one["cycle_s"] or np.inf, -(one["clearance_mm"] or 0.0))):
+        if candidate["clearance_mm"] is not None and candidate["clearance_mm"] > widest:
+            widest = candidate["clearance_mm"]
+            front.append(candidate)
+    return front
 
 
 def _convergence(finished: Finished) -> list[ProgressRecord]:
     """The cycle of every trial and the best so far, in the order of the trials."""
     best: float | None = None
-    found: list[ProgressRecord] = []
+    progress: list[ProgressRecord] = []
     for trial in finished.trials:
         cycle = round(trial.figures["cycle_s"], FINE) if is_candidate(trial) else None
         best = cycle if best is None else min(best, cycle) if cycle is not None else best
-        found.append({"trial": trial.number, "cycle_s": cycle, "best_s": best})
-    return found
+        progress.append({"trial": trial.number, "cycle_s": cycle, "best_s": best})
+    return progress
 
 
 def _dropped(trials: Iterable[Trial]) -> list[DroppedRecord]:
@@ -287,7 +287,7 @@ def _dropped(trials: Iterable[Trial]) -> list[DroppedRecord]:
     lost = [trial for trial in trials if not trial.passed]
     counts = Counter(trial.outcome.reason for trial in lost)
     first = {reason: min(trial.number for trial in lost if trial.outcome.reason == reason) for reason in counts}
-    ordered = sorted(counts.items(), key=lambda each: (-each[1], first[each[0]]))
+    ordered = sorted(counts.items(), key=lambda entry: (-entry[1], first[entry[0]]))
     return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
 
 
@@ -296,15 +296,17 @@ def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]
     combinations = list(Choices.of(ready.cell).values())
     if len(combinations) == 1:
         return []
-    found: list[ChoiceRecord] = []
+    choices: list[ChoiceRecord] = []
     for choice in combinations:
         trials = [trial for trial in finished.trials if choice_of(trial) == choice]
         solved = [tried[trial.number] for trial in trials if trial.number in tried]
         passed = [trial.figures["cycle_s"] for trial in trials if trial.passed]
-        reasons = [each.reason for each in solved if each.reason] or [each["reason"] for each in _dropped(trials)]
-        is_certified = any(each.passed for each in solved)
+        reasons = [candidate.reason for candidate in solved if candidate.reason] or [
+            reason["reason"] for reason in _dropped(trials)
+        ]
+        is_certified = any(candidate.passed for candidate in solved)
         status = "certified" if is_certified else "conforming" if passed else "dropped" if trials else "not_tried"
-        found.append(
+        choices.append(
             {
                 "choice": choice_text(choice) or "as given",
                 "status": status,
@@ -314,7 +316,7 @@ def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]
                 "reason": reasons[0] if reasons and not is_certified else "",
             }
         )
-    return found
+    return choices
 
 
 def _prepared_of(ready: Prepared, trial: Trial) -> Prepared:

@@ -47,7 +47,7 @@ class LayoutRequest:
     @property
     def anywhere(self) -> "LayoutRequest":
         """The same request for processes that run in other folders."""
-        attempts, folders = (tuple(path.absolute() for path in each) for each in (self.attempts, self.allow_dirs))
+        attempts, folders = (tuple(path.absolute() for path in paths) for paths in (self.attempts, self.allow_dirs))
         return replace(self, cell=self.cell.absolute(), attempts=attempts, allow_dirs=folders)
 
     @property

@@ -49,18 +49,18 @@ CYCLE: Final = "shortest cycle in s"
 def layout_lines(record: Record, folder: Path) -> list[str]:
     """All lines about a layout search."""
     lines = [f"{record['cell']}: {verdict_line(record)}", f"  {_given(record)}"]
-    lines += [f"    {each['text']}" for each in record["given"]["violations"][:MOST]]
+    lines += [f"    {violation['text']}" for violation in record["given"]["violations"][:MOST]]
     if record["best"] is not None:
         changes = list(_changes(record))
         lines.append("  what changed" if changes else "  nothing changed")
         lines += [f"    {line}" for line in changes]
         if record["binding"]:
             lines.append("  what holds it back")
-            lines += [f"    {each['text']}" for each in record["binding"][:MOST]]
+            lines += [f"    {binding['text']}" for binding in record["binding"][:MOST]]
     else:
-        rejected = [each for each in record["top"] if each["status"] == "rejected"]
-        lines += [f"  rejected by solve: {each['reason']}" for each in rejected[:MOST]]
-        lines += [f"  {each['reason']} ({_trials(each['count'])})" for each in record["dropped"][:MOST]]
+        rejected = [candidate for candidate in record["top"] if candidate["status"] == "rejected"]
+        lines += [f"  rejected by solve: {candidate['reason']}" for candidate in rejected[:MOST]]
+        lines += [f"  {reason['reason']} ({_trials(reason['count'])})" for reason in record["dropped"][:MOST]]
     lines += [f"  {line}" for line in map(_choice, record["choices"])]
     lines += [f"  {line}" for line in _misplaced(record)]
     lines += [f"  {remark}" for remark in record["remarks"]]
@@ -100,22 +100,22 @@ def figures_text(cycle: float, margin: float | None, clearance: float | None) ->
 def changed_variables(record: Record) -> Entries:
     """Variables whose value in the best layout is another one than in the given one."""
     return [
-        dict(each)
-        for each in record["variables"]
-        if None not in (each["given"], each["best"]) and abs(each["best"] - each["given"]) > SAME
+        dict(variable)
+        for variable in record["variables"]
+        if None not in (variable["given"], variable["best"]) and abs(variable["best"] - variable["given"]) > SAME
     ]
 
 
 def _misplaced(record: Record) -> Iterator[str]:
     """What was sampled with displaced bases."""
-    found = record["misplacement"]
-    if found is None:
+    record_ = record["misplacement"]
+    if record_ is None:
         return
-    by = f"{found['position_mm']:g} mm and {found['orientation_deg']:g} deg"
+    by = f"{record_['position_mm']:g} mm and {record_['orientation_deg']:g} deg"
     yield f"with every base off by {by}, sampled, motion planned anew, in this one cycle:"
     yield (
-        f"  {found['seeded_kept']} of {found['seeded']} seeded corners, {found['by_derivatives_kept']} of "
-        f"{found['by_derivatives']} worst corners by derivatives, {found['ends_kept']} of {found['ends']} single "
+        f"  {record_['seeded_kept']} of {record_['seeded']} seeded corners, {record_['by_derivatives_kept']} of "
+        f"{record_['by_derivatives']} worst corners by derivatives, {record_['ends_kept']} of {record_['ends']} single "
         f"displacements passed every check"
     )
 
@@ -142,11 +142,11 @@ def _given(record: Record) -> str:
 def _changes(record: Record) -> Iterator[str]:
     """Changed variables, those of one entry of the cell file on one line."""
     groups: dict[str, list[str]] = {}
-    for each in changed_variables(record):
-        entry, _, name = each["name"].removeprefix("robots.").rpartition(".")
-        unit = f" {each['unit']}" if each["unit"] else ""
+    for variable in changed_variables(record):
+        entry, _, name = variable["name"].removeprefix("robots.").rpartition(".")
+        unit = f" {variable['unit']}" if variable["unit"] else ""
         groups.setdefault(entry, []).append(
-            f"{name.removesuffix('_mm').removesuffix('_deg')} {each['given']:.5g} -> {each['best']:.5g}{unit}"
+            f"{name.removesuffix('_mm').removesuffix('_deg')} {variable['given']:.5g} -> {variable['best']:.5g}{unit}"
         )
     yield from (f"{entry}: {', '.join(texts)}" for entry, texts in groups.items())
     if record["path"] is not None:
@@ -164,11 +164,13 @@ def path_text(path: Record) -> str:
     )
 
 
-def _choice(each: Record) -> str:
+def _choice(variable: Record) -> str:
     """A combination of discrete choices in one line."""
-    cycle = "" if each["cycle_s"] is None else f", cycle {seconds(each['cycle_s'])} s"
-    reason = f": {each['reason']}" if each["reason"] else ""
-    return f"{each['choice']}: {each['status'].replace('_', ' ')} ({_trials(each['trials'])}{cycle}){reason}"
+    cycle = "" if variable["cycle_s"] is None else f", cycle {seconds(variable['cycle_s'])} s"
+    reason = f": {variable['reason']}" if variable["reason"] else ""
+    return (
+        f"{variable['choice']}: {variable['status'].replace('_', ' ')} ({_trials(variable['trials'])}{cycle}){reason}"
+    )
 
 
 def _trials(count: int) -> str:
@@ -201,21 +203,25 @@ def floor_plan(record: Record) -> Figure | None:
 
 def front_figure(record: Record) -> Figure | None:
     """Cycle against clearance of all conforming layouts, those that no other one beats joined; None without any."""
-    found = [each for each in _shown(record) if each["cycle_s"] is not None and each["clearance_mm"] is not None]
-    if not found:
+    candidates = [
+        candidate
+        for candidate in _shown(record)
+        if candidate["cycle_s"] is not None and candidate["clearance_mm"] is not None
+    ]
+    if not candidates:
         return None
     demanded = float(record["required_clearance_mm"] or 0.0)
-    clearances = [demanded, *(float(each["clearance_mm"]) for each in found)]
+    clearances = [demanded, *(float(candidate["clearance_mm"]) for candidate in candidates)]
     spread = max(clearances) - min(clearances) or 1.0
     low, high = min(clearances) - 0.08 * spread, max(clearances) + 0.08 * spread
     items: list[Item] = [Limit(demanded, "demanded", is_vertical=True)]
-    front = sorted((float(each["clearance_mm"]), float(each["cycle_s"])) for each in record["front"])
+    front = sorted((float(candidate["clearance_mm"]), float(candidate["cycle_s"])) for candidate in record["front"])
     if len(front) > 1:
         items.append(line(front, colour=ROBOTS[0], width=1.2))
-    for each in found:
-        colour = {"certified": ROBOTS[2], "rejected": LIMIT}.get(each["status"], GREY)
-        items.append(Mark(float(each["clearance_mm"]), float(each["cycle_s"]), colour))
-    axis = _cycle_axis([float(each["cycle_s"]) for each in found])
+    for candidate in candidates:
+        colour = {"certified": ROBOTS[2], "rejected": LIMIT}.get(candidate["status"], GREY)
+        items.append(Mark(float(candidate["clearance_mm"]), float(candidate["cycle_s"]), colour))
+    axis = _cycle_axis([float(candidate["cycle_s"]) for candidate in candidates])
     return Figure(
         title="cycle against clearance",
         x=Axis(low=low, high=high, label="clearance in mm", unit="mm"),
@@ -227,15 +233,15 @@ def front_figure(record: Record) -> Figure | None:
 
 def convergence_figure(record: Record) -> Figure | None:
     """Cycle of every conforming trial and the best so far, trial after trial; None without any."""
-    steps = [each for each in record["convergence"] if each["best_s"] is not None]
+    steps = [step for step in record["convergence"] if step["best_s"] is not None]
     if not steps:
         return None
-    last = max(each["trial"] for each in record["convergence"])
-    shown = [float(each[key]) for each in steps for key in ("cycle_s", "best_s") if each[key] is not None]
-    tried = [each for each in steps if each["cycle_s"] is not None]
-    items: list[Item] = [Mark(float(each["trial"]), float(each["cycle_s"]), GREY) for each in tried]
-    at = np.array([value for each in steps for value in (each["trial"] - 0.5, each["trial"] + 0.5)], dtype=float)
-    items.append(Curve("best so far", at, np.repeat([float(each["best_s"]) for each in steps], 2), ROBOTS[0]))
+    last = max(step["trial"] for step in record["convergence"])
+    shown = [float(step[key]) for step in steps for key in ("cycle_s", "best_s") if step[key] is not None]
+    tried = [step for step in steps if step["cycle_s"] is not None]
+    items: list[Item] = [Mark(float(trial["trial"]), float(trial["cycle_s"]), GREY) for trial in tried]
+    at = np.array([value for step in steps for value in (step["trial"] - 0.5, step["trial"] + 0.5)], dtype=float)
+    items.append(Curve("best so far", at, np.repeat([float(step["best_s"]) for step in steps], 2), ROBOTS[0]))
     return Figure(
         title="each trial (dots) and the best so far (line)",
         x=Axis(low=-0.5, high=max(last, 1) + 0.5, label="trial"),
@@ -255,21 +261,21 @@ def _cycle_axis(cycles: list[float]) -> Axis:
 def _shown(record: Record) -> Entries:
     """Layouts of the figure, each once."""
     listed: dict[int, Any] = {}
-    for each in (*record["front"], *record["top"]):
-        listed.setdefault(each["trial"], each)
-    return [each for each in listed.values() if each["status"] != "violating"]
+    for candidate in (*record["front"], *record["top"]):
+        listed.setdefault(candidate["trial"], candidate)
+    return [candidate for candidate in listed.values() if candidate["status"] != "violating"]
 
 
 def _extent(drawn: Record) -> tuple[Any, Any]:
     """Lowest and highest corner of the plan in [mm]."""
     points = [
-        point for each in (*drawn["given"]["outlines"], *drawn["best"]["outlines"]) for point in each["outline_mm"]
+        point for item in (*drawn["given"]["outlines"], *drawn["best"]["outlines"]) for point in item["outline_mm"]
     ]
-    points += [[each["x_mm"], each["y_mm"]] for each in (*drawn["given"]["robots"], *drawn["best"]["robots"])]
+    points += [[robot["x_mm"], robot["y_mm"]] for robot in (*drawn["given"]["robots"], *drawn["best"]["robots"])]
     swept = drawn["swept"]
     points += [[x, row[0]] for rows in swept["robots"].values() for row in rows for x in (row[1], row[2])]
-    found = np.array(points, dtype=float)
-    return found.min(axis=0) - BORDER, found.max(axis=0) + BORDER
+    corners = np.array(points, dtype=float)
+    return corners.min(axis=0) - BORDER, corners.max(axis=0) + BORDER
 
 
 def _sweep(drawn: Record) -> Iterator[Item]:
@@ -282,9 +288,9 @@ def _sweep(drawn: Record) -> Iterator[Item]:
 
 def _reach(drawn: Record) -> Iterator[Item]:
     """The reach of each robot from its new base."""
-    for index, each in enumerate(drawn["best"]["robots"]):
-        reach = drawn["reach_mm"][each["name"]]
-        circle = np.stack([each["x_mm"] + reach * np.cos(CIRCLE), each["y_mm"] + reach * np.sin(CIRCLE)], axis=1)
+    for index, robot in enumerate(drawn["best"]["robots"]):
+        reach = drawn["reach_mm"][robot["name"]]
+        circle = np.stack([robot["x_mm"] + reach * np.cos(CIRCLE), robot["y_mm"] + reach * np.sin(CIRCLE)], axis=1)
         yield line(circle, colour=_colour(index), width=0.6, is_dashed=True)
 
 
@@ -295,32 +301,32 @@ def _outlines(drawn: Record) -> Iterator[Item]:
         yield outline(box, colour=LIMIT, width=0.8, is_dashed=True)
         x, y = np.mean(box, axis=0).tolist()
         yield Note(x, y, name, LIMIT, size=7.0)
-    for each in drawn["given"]["outlines"]:
-        if each["is_at_rest"] and each["robot"]:
-            yield outline(each["outline_mm"], colour=GREY, width=0.9, is_dashed=True)
-    for each in drawn["best"]["outlines"]:
-        colour = _colour(names.index(each["robot"])) if each["robot"] in names else INK
-        width = 1.1 if each["is_at_rest"] or each["kind"] == "part" else 0.5
-        yield outline(each["outline_mm"], colour=colour, width=width)
-    for each in drawn["best"]["paths"]:
-        yield line(each["points_mm"], colour=LIMIT, width=1.2)
+    for item in drawn["given"]["outlines"]:
+        if item["is_at_rest"] and item["robot"]:
+            yield outline(item["outline_mm"], colour=GREY, width=0.9, is_dashed=True)
+    for item in drawn["best"]["outlines"]:
+        colour = _colour(names.index(item["robot"])) if item["robot"] in names else INK
+        width = 1.1 if item["is_at_rest"] or item["kind"] == "part" else 0.5
+        yield outline(item["outline_mm"], colour=colour, width=width)
+    for path in drawn["best"]["paths"]:
+        yield line(path["points_mm"], colour=LIMIT, width=1.2)
 
 
 def _bases(drawn: Record) -> Iterator[Item]:
     """Old and new bases with the move between them."""
-    old = {each["name"]: each for each in drawn["given"]["robots"]}
-    for index, each in enumerate(drawn["best"]["robots"]):
-        colour, x, y, was = _colour(index), each["x_mm"], each["y_mm"], old[each["name"]]
+    old = {robot["name"]: robot for robot in drawn["given"]["robots"]}
+    for index, robot in enumerate(drawn["best"]["robots"]):
+        colour, x, y, was = _colour(index), robot["x_mm"], robot["y_mm"], old[robot["name"]]
         yield line([[was["x_mm"], was["y_mm"]], [x, y]], colour=colour, width=1.4)
         yield Mark(was["x_mm"], was["y_mm"], PAPER, size=6.5, edge=colour)
         yield Mark(x, y, colour, size=6.5, edge=colour)
-        yield Note(x, y, each["name"], colour, size=8.5, is_bold=True, anchor="start", moved=(6.5, 9.0))
+        yield Note(x, y, robot["name"], colour, size=8.5, is_bold=True, anchor="start", moved=(6.5, 9.0))
 
 
 def _legend(drawn: Record) -> Iterator[Key]:
     """What the colours and lines mean."""
-    for index, each in enumerate(drawn["best"]["robots"]):
-        yield Key(each["name"], _colour(index))
+    for index, robot in enumerate(drawn["best"]["robots"]):
+        yield Key(robot["name"], _colour(index))
     for text in (
         "filled dot: base of the best layout",
         "open dot: base as given",

@@ -220,12 +220,12 @@ def _written(search: _Search, finished: Finished, best: Certified | None) -> Lay
     record = layout_record(search.ready, finished, given, tried=search.tried, best=best, solves=search.finish.solves)
     if best is not None:
         record["misplacement"] = search.finish.records.get(best.trial)
-    beside: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)
-        beside = result_files(certified_cell(best), search.request.cell, search.folder, head=head)
-        record["files"] = file_records(beside)  # type: ignore[typeddict-item]
-    write_results(search.folder, {**layout_files(record), **beside})
+        files = result_files(certified_cell(best), search.request.cell, search.folder, head=head)
+        record["files"] = file_records(files)  # type: ignore[typeddict-item]
+    write_results(search.folder, {**layout_files(record), **files})
     return LayoutResult(record=record, best=best)
 
 

@@ -44,10 +44,10 @@ def searched_cell(request: LayoutRequest) -> Cell:
     elif request.vary or request.fixed:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
-    paths = () if changed.layout is None else [each.robot for each in changed.layout.paths]
+    paths = () if changed.layout is None else [path.robot for path in changed.layout.paths]
     refuse_other_jobs(changed, "a layout search", paths=paths)
     if paths:
-        _refuse_open_tasks(changed, asked="--free path" if request.free else "layout.vary: a joint path")
+        _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
     return changed
@@ -68,7 +68,7 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
         raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
 
 
-def _refuse_open_tasks(cell: Cell, *, asked: str) -> None:
+def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
     """Refuse tasks that leave their robot a choice where a joint path of the positioner is searched.
 
     Raises:
@@ -76,7 +76,7 @@ def _refuse_open_tasks(cell: Cell, *, asked: str) -> None:
     """
     for task in cell.tasks:
         robot = cell.robot(task.robot)
-        why = f"for {asked}: the joints of '{robot.name}' would not follow from the path of the positioner"
+        why = f"for {purpose}: the joints of '{robot.name}' would not follow from the path of the positioner"
         if task.is_spin_free:
             raise InputError(f"{task.where('free')}: expected no free spin {why}, got [spin]; leave free or path out")
         if len(task.axes) < 6:
@@ -101,11 +101,11 @@ def _refuse_margins(cell: Cell) -> None:
     for robot in cell.robots:
         for joint in robot.model.joints:
             margin = cell.layout.margin if joint.is_revolute else cell.layout.margin_sliding
-            room = 0.5 * (joint.upper - joint.lower)
-            if margin >= room > 0.0:
+            half = 0.5 * (joint.upper - joint.lower)
+            if margin >= half > 0.0:
                 key, scale = ("margin_deg", DEG) if joint.is_revolute else ("margin_mm", MM)
                 raise InputError(
-                    f"{cell.origin.at(f'layout.{key}')}: expected less than {scale * room:.6g}, half of the range of "
+                    f"{cell.origin.at(f'layout.{key}')}: expected less than {scale * half:.6g}, half of the range of "
                     f"{joint.name} of '{robot.name}', got {scale * margin:.6g}"
                 )
 
@@ -117,12 +117,14 @@ def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
         InputError: One cannot be read or has other robots.
     """
     names = [robot.name for robot in cell.robots]
-    found = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
-    for path, other in zip(request.attempts, found, strict=True):
-        own = [robot.name for robot in other.robots]
-        if own != names or other.joint_count != cell.joint_count:
-            raise InputError(f"--try {path}: expected the robots of the cell ({listed(names)}), got {listed(own)}")
-    return found
+    layouts = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
+    for path, other in zip(request.attempts, layouts, strict=True):
+        robot_names = [robot.name for robot in other.robots]
+        if robot_names != names or other.joint_count != cell.joint_count:
+            raise InputError(
+                f"--try {path}: expected the robots of the cell ({listed(names)}), got {listed(robot_names)}"
+            )
+    return layouts
 
 
 def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
@@ -164,13 +166,13 @@ def _written_layout(cell: Cell) -> Mapping[str, Any]:
 def _by_default(cell: Cell) -> Mapping[str, Any]:
     """What may change of a cell that says nothing of it, as the file would say it."""
     vary: dict[str, Any] = {}
-    for each in () if cell.layout is None else cell.layout.ranges:
-        entry, _, component = each.address.rpartition(".")
+    for variable in () if cell.layout is None else cell.layout.ranges:
+        entry, _, component = variable.address.rpartition(".")
         if component in COMPONENTS:
-            scale = DEG if each.is_angle else MM
-            vary.setdefault(entry, {})[component] = [round(scale * each.lower, 9), round(scale * each.upper, 9)]
+            scale = DEG if variable.is_angle else MM
+            vary.setdefault(entry, {})[component] = [round(scale * variable.lower, 9), round(scale * variable.upper, 9)]
         else:
-            vary[each.address.partition("[")[0]] = True
+            vary[variable.address.partition("[")[0]] = True
     return vary
 
 

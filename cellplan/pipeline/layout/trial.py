@@ -76,30 +76,30 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
     limit = values.get("give_up_above_s")
     effort = EFFORT if ready.unled is None else PATH
     effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
-    found = None if begin is None else _improved(ready, begin, demands, effort)
-    if begin is None or found is None:
+    improved = None if begin is None else _improved(ready, begin, demands, effort)
+    if begin is None or improved is None:
         return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
-    outcome = _outcome(ready, found, begin.unled)
+    outcome = _outcome(ready, improved, begin.unled)
     return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, values) else outcome
 
 
 def _improved(ready: Prepared, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
     """The local optimum from a start: once more without the usual singular values where they cannot be kept."""
-    found = improve(ready.coarse, begin.x, begin.start, demands, effort)
-    if found is None or found.is_conforming:
-        return found
-    kept = kept_demands(ready, found.point, clearance=demands.clearance)
-    if kept.singular is not None or demands.singular is None:
-        return found
-    return improve(ready.coarse, found.x, found.start, kept, effort)
+    improved = improve(ready.coarse, begin.x, begin.start, demands, effort)
+    if improved is None or improved.is_conforming:
+        return improved
+    demands_met = kept_demands(ready, improved.point, clearance=demands.clearance)
+    if demands_met.singular is not None or demands.singular is None:
+        return improved
+    return improve(ready.coarse, improved.x, improved.start, demands_met, effort)
 
 
 def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin | None:
     """Where a trial begins; None where the tools cannot follow their paths."""
     if ready.unled is not None:
         return _path(ready, ready.unled, values, number)
-    found = _layout(ready, values, number)
-    return None if found is None else _Begin(*found)
+    layout = _layout(ready, values, number)
+    return None if layout is None else _Begin(*layout)
 
 
 def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: int) -> _Begin | None:
@@ -113,10 +113,10 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
         return _Begin(ready.coarse.given, ready.given_start)
     if values["kind"] == "attempt":
         cell = _attempted(ready, int(values["index"]))
-        path = cell.robot(search.asked.robot).path
+        path = cell.robot(search.settings.robot).path
         if path is not None:
-            others = search.own.read_from(cell)
-            return _Begin(search.variables(search.like_asked(path), others), ready.start_of(cell))
+            others = search.layout_variables.read_from(cell)
+            return _Begin(search.variables(search.resampled(path), others), ready.start_of(cell))
     if values.get("of") is not None and (values["kind"] == "improved" or number % 2 or known is None):
         x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
         if values["kind"] == "improved" or not isinstance(ready.coarse, PathProblem):
@@ -141,40 +141,40 @@ def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
         if better is None:
             break
         begins.append((better.x, better.start))
-    paths = (_path_of(ready, each) for each in reversed(begins[1:]))
+    paths = (_path_of(ready, begin) for begin in reversed(begins[1:]))
     last, first = next(filter(None, paths), None), _path_of(ready, begin)
     halfway = None if first is None or len(begins) == 1 else _halfway(ready, first, begins[-1])
-    found = [each for each in (last, first, halfway) if each is not None]
-    if len(found) <= 1:
-        return next(iter(found), None)
+    layouts = [layout for layout in (last, first, halfway) if layout is not None]
+    if len(layouts) <= 1:
+        return next(iter(layouts), None)
     ranks = []
-    for place, each in enumerate(found):
-        probed = improve(ready.coarse, each.x, each.start, ready.demands(), PROBE)
+    for place, verdict in enumerate(layouts):
+        probed = improve(ready.coarse, verdict.x, verdict.start, ready.demands(), PROBE)
         if probed is not None:
             ranks.append((probed.violation, probed.objective, place))
-            found[place] = replace(each, x=probed.x, start=probed.start)
-    return found[min(ranks, default=(0.0, 0.0, 0))[2]]
+            layouts[place] = replace(verdict, x=probed.x, start=probed.start)
+    return layouts[min(ranks, default=(0.0, 0.0, 0))[2]]
 
 
 def _halfway(ready: Prepared, first: _Begin, last: Begin) -> _Begin | None:
     """The mean of a path and of that nearest to another motion; None where a tool cannot follow."""
     search = ready.path_search
-    found = search.fitted(*last)
-    if found is None:
+    fitted = search.fitted(*last)
+    if fitted is None:
         return None
-    x = 0.5 * (first.x + search.variables(found[0], search.beside(last[0])))
-    start = 0.5 * (first.start + found[1])
+    x = 0.5 * (first.x + search.variables(fitted[0], search.layout_values(last[0])))
+    start = 0.5 * (first.start + fitted[1])
     return None if ready.coarse.evaluate(x, start) is None else _Begin(x, start, unled=last)
 
 
 def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:
     """The path nearest to a motion by the pseudo-inverse; None where a tool cannot follow."""
     search = ready.path_search
-    found = search.fitted(*begin)
-    if found is None:
+    fitted = search.fitted(*begin)
+    if fitted is None:
         return None
-    x = search.variables(found[0], search.beside(begin[0]))
-    return None if ready.coarse.evaluate(x, found[1]) is None else _Begin(x, found[1], unled=begin)
+    x = search.variables(fitted[0], search.layout_values(begin[0]))
+    return None if ready.coarse.evaluate(x, fitted[1]) is None else _Begin(x, fitted[1], unled=begin)
 
 
 def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
@@ -259,23 +259,23 @@ def change_of(ready: Prepared, x: Array) -> float:
     return float((np.abs(x - ready.coarse.given) * ready.coarse.cost).sum())
 
 
-def _outcome(ready: Prepared, found: Improved, unled: Begin | None) -> Outcome:
+def _outcome(ready: Prepared, improved: Improved, unled: Begin | None) -> Outcome:
     """Figures of a local optimum."""
-    standing = standing_of(ready.coarse, found.point, kept_demands(ready, found.point), EFFORT)
+    standing = standing_of(ready.coarse, improved.point, kept_demands(ready, improved.point), EFFORT)
     figures: dict[str, Any] = {
-        "x": found.x.tolist(),
-        "start": found.start.tolist(),
-        "cycle_s": found.cycle,
-        "violation": found.violation,
+        "x": improved.x.tolist(),
+        "start": improved.start.tolist(),
+        "cycle_s": improved.cycle,
+        "violation": improved.violation,
         "margin_deg": standing.margin,
         "clearance_mm": standing.clearance,
         "apart_mm": standing.apart,
-        "change": change_of(ready, found.x),
-        "programs": len(found.history),
+        "change": change_of(ready, improved.x),
+        "programs": len(improved.history),
     }
     if unled is not None:
         figures["unled"] = {"x": unled[0].tolist(), "start": unled[1].tolist()}
-    if found.is_conforming:
+    if improved.is_conforming:
         return Outcome(status=TrialStatus.PASSED, figures=figures)
     violations = standing.violations()
     why = reason(violations[0]) if violations else "less room than the search asks for beyond the demands"

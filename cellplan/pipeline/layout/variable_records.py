@@ -73,13 +73,13 @@ def variable_records(ready: Prepared, standing: Standing | None, best: Certified
 def path_record(ready: Prepared, x: Array) -> PathRecord:
     """The joint path at variables of shape (n,), beside the given motion."""
     search = ready.path_search
-    model, departures = ready.variables.base.robot(search.asked.robot).model, search.departures(x)
+    model, departures = ready.variables.base.robot(search.settings.robot).model, search.departures(x)
     turning = np.array([joint.is_revolute for joint in model.joints])
-    in_deg, in_mm = (departures[kept].max(initial=-1.0) for kept in (turning, ~turning))
+    in_deg, in_mm = (departures[is_selected].max(initial=-1.0) for is_selected in (turning, ~turning))
     return {
-        "robot": search.asked.robot,
-        "coefficients": search.asked.coefficients,
-        "degree": search.asked.degree,
+        "robot": search.settings.robot,
+        "coefficients": search.settings.coefficients,
+        "degree": search.settings.degree,
         "is_given": search.is_given,
         "departure_deg": number(round(DEG * in_deg, FINE)) if in_deg >= 0.0 else None,
         "departure_mm": number(round(MM * in_mm, FINE)) if in_mm >= 0.0 else None,

@@ -74,7 +74,7 @@ def find_homes(
             return homes
 
 
-def with_homes(cell: Cell, found: Mapping[str, Array], *, given: Cell) -> Cell:
+def with_homes(cell: Cell, homes: Mapping[str, Array], *, given: Cell) -> Cell:
     """The cell with the homes that its idle robots stand at.
 
     Args:
@@ -85,7 +85,7 @@ def with_homes(cell: Cell, found: Mapping[str, Array], *, given: Cell) -> Cell:
     never_at_work = idle_robots(cell, [task.name for task in cell.tasks])
     robots = []
     for robot in cell.robots:
-        home = found.get(robot.name, robot.home)
+        home = homes.get(robot.name, robot.home)
         starts_there = home is not None and robot.name in never_at_work and given.robot(robot.name).start is None
         robots.append(replace(robot, home=home, start=home if starts_there else robot.start))
     return replace(cell, robots=tuple(robots))
@@ -196,8 +196,8 @@ def _is_within(robot: Robot, q: Array) -> bool:
 
 def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
     """One run as the robot has to stand it out; those whose homes are not known yet are not there."""
-    own = scene if run.scene is None else replace(run.scene, cell=with_homes_of(run.scene.cell, scene.cell))
-    of_run = scene_of_run(own, run.phase.tasks)
+    run_scene = scene if run.scene is None else replace(run.scene, cell=with_homes_of(run.scene.cell, scene.cell))
+    of_run = scene_of_run(run_scene, run.phase.tasks)
     away = {row for name in homeless(scene.cell, run.phase) - {robot} for row in rows_moved_by(of_run, name)}
     rows = [row for row in rows_moved_by(of_run, robot) if row not in away]
     return _IdleRun(run=run, scene=scene_of_rows(of_run, rows), q=standing(scene.cell, run.phase, run.motion.q))

@@ -75,7 +75,7 @@ def _require_fit(stored: StoredRun, cell: Cell) -> None:
                 f"{cell.origin.at(f'robots.{robot.name}.model')}: expected the joints {listed(joints[robot.name])} "
                 f"{where}, got {listed(robot.model.joint_names)}: name a run of this robot"
             )
-    done = {name: each["robot"] for name, each in stored.record["tasks"].items()}
+    done = {name: task_record["robot"] for name, task_record in stored.record["tasks"].items()}
     if not any(done.get(task.name) == task.robot for task in cell.tasks):
         raise InputError(
             f"{cell.origin.at('tasks')}: expected a task of the same name and robot {where}, got none: there are "

@@ -19,8 +19,8 @@ def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check
     Args:
         toolpaths: The path of each task by its name.
     """
-    found = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
-    checks = check_depths(cell, [depth for depth in found if depth is not None])
+    depths = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
+    checks = check_depths(cell, [depth for depth in depths if depth is not None])
     tips = [
         standoff_on(cell, cell.task(name), path.spread(POSES))
         for name, path in toolpaths.items()

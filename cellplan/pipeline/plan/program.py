@@ -50,9 +50,9 @@ class ProgramClock:
             schedules: Desired tool poses of each phase of the program.
         """
         steps = [len(schedule.times) - 1 for schedule in schedules]
-        first = np.cumsum([0, *(own + gap for own, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
+        first = np.cumsum([0, *(count + gap for count, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
         times = np.round(np.arange(first[-1] + 1) * cell.motion.step, TIME_DECIMALS)
-        ends = [(float(times[row]), float(times[row + own])) for row, own in zip(first[:-1], steps, strict=True)]
+        ends = [(float(times[row]), float(times[row + count])) for row, count in zip(first[:-1], steps, strict=True)]
         placed = [replace(phase, begin=b, end=e) for phase, (b, e) in zip(plan.program, ends, strict=True)]
         return cls(plan=_placed(plan, placed, schedules), times=times, sigma=times, schedules=tuple(schedules))
 
@@ -107,7 +107,7 @@ class ProgramClock:
             rows: Values in the rows of each phase of the program, shape (n, ...) each.
         """
         shared = [False, *(gap == 0 for gap in _gap_steps(self.plan)[:-1])]
-        return np.concatenate([own[1:] if skip else own for own, skip in zip(rows, shared, strict=True)])
+        return np.concatenate([stacked[1:] if skip else stacked for stacked, skip in zip(rows, shared, strict=True)])
 
     def table(self, tasks: Sequence[str]) -> ClockTable:
         """What happens at each row.
@@ -120,7 +120,7 @@ class ProgramClock:
         for phase, schedule in zip(self.plan.program, self.schedules, strict=True):
             rows = rows_of(phase, self.sigma)
             names[rows] = [phase.name] * (rows.stop - rows.start)
-            for scheduled in (each for each in schedule.tasks if each.task.name in lengths):
+            for scheduled in (task for task in schedule.tasks if task.task.name in lengths):
                 lengths[scheduled.task.name][rows] = scheduled.travelled
                 lengths[scheduled.task.name][rows.stop :] = scheduled.travelled[-1]
         process = {task: _within(self.sigma, self.plan.process[task]) for task in tasks}
@@ -198,8 +198,8 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
         begin = phase.begin
         for scheduled in schedule.tasks:
             task = scheduled.task
-            own = (begin + task.start, begin + scheduled.end + task.off_delay)
-            process[task.name] = (*process.get(task.name, ()), own)
+            working = (begin + task.start, begin + scheduled.end + task.off_delay)
+            process[task.name] = (*process.get(task.name, ()), working)
             stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
         rests = (rest for path in schedule.paths for rest in kept_rests(path.task, path.corners))
         dwells |= {(begin + first, begin + last) for first, last in rests}

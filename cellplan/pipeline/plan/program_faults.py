@@ -130,10 +130,10 @@ def refuse_crowded_homes(scene: Scene, home: Array) -> None:
     Raises:
         HomeNotFoundError: With the bodies and their distance.
     """
-    at_rest, cell, own = home[None].repeat(2, axis=0), scene.cell, scene_of_run(scene, ())
-    if certify(own, at_rest, with_minimum=False).is_kept:
+    at_rest, cell, alone = home[None].repeat(2, axis=0), scene.cell, scene_of_run(scene, ())
+    if certify(alone, at_rest, with_minimum=False).is_kept:
         return
-    words, bodies = nearest_words(own, at_rest)
+    words, bodies = nearest_words(alone, at_rest)
     robot = next(
         (robot for name in bodies for robot in cell.robots if name.startswith(f"{robot.name}/")), cell.robots[0]
     )

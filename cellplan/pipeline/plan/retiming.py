@@ -22,7 +22,7 @@ from cellplan.model.settings.units import si_or_none
 from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.plan.step_errors import StepErrors
-from cellplan.planning.timing.kept_rates import KeptRate
+from cellplan.planning.timing.fixed_rates import FixedRate
 from cellplan.planning.timing.retime import JointBounds, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.scene.scene import Scene
@@ -55,12 +55,12 @@ def retimed(
     paths = [joint_path(motion) if phase.tasks else None for phase, motion in zip(phases, motions, strict=True)]
     retimed_phases = _Retimed(scenes, clock, motions, paths)
     if cell.program is None:
-        own = retimed_phases.nominal([cell.motion.cycle] * len(motions), progress)
+        clocks = retimed_phases.nominal([cell.motion.cycle] * len(motions), progress)
     else:
-        own = retimed_phases.nominal([None] * len(motions), progress)
+        clocks = retimed_phases.nominal([None] * len(motions), progress)
         if cell.motion.cycle is not None:
-            own = retimed_phases.nominal(retimed_phases.cycles(own), progress)
-    nominal = [phase.begin + sigma for phase, sigma in zip(phases, own, strict=True)]
+            clocks = retimed_phases.nominal(retimed_phases.cycles(clocks), progress)
+    nominal = [phase.begin + sigma for phase, sigma in zip(phases, clocks, strict=True)]
     for phase, sigma in zip(phases, nominal, strict=True):
         np.round(sigma, TIME_DECIMALS, out=sigma)
         sigma[0], sigma[-1] = phase.begin, phase.end
@@ -79,14 +79,14 @@ class _Retimed:
 
     def nominal(self, cycles: Sequence[float | None], progress: Progress) -> list[Array]:
         """Nominal times of the rows of each phase in [s] from its begin, as fast as possible or in given times."""
-        found: dict[tuple[int, float | None], Array] = {}  # all cycles of a program have the same motions
+        curves: dict[tuple[int, float | None], Array] = {}  # all cycles of a program have the same motions
         for place, (motion, path, cycle) in enumerate(zip(self.motions, self.paths, cycles, strict=True)):
             progress("retiming", place / len(cycles))
-            if (key := (id(motion), cycle)) not in found:
+            if (key := (id(motion), cycle)) not in curves:
                 schedule = self.clock.schedules[place]
                 scene = self.scenes[place]
-                found[key] = motion.times if path is None else _nominal_times(scene, schedule, path, cycle)
-        return [found[id(motion), cycle].copy() for motion, cycle in zip(self.motions, cycles, strict=True)]
+                curves[key] = motion.times if path is None else _nominal_times(scene, schedule, path, cycle)
+        return [curves[id(motion), cycle].copy() for motion, cycle in zip(self.motions, cycles, strict=True)]
 
     def cycles(self, fastest: Sequence[Array]) -> list[float | None]:
         """Times in [s] of the phases in the demanded cycle of a program from home to home, all slower alike."""
@@ -103,16 +103,18 @@ class _Retimed:
                 "fastest"
             )
         ends = np.round(np.cumsum(steps * is_open) * (left / max(1, int(steps[is_open].sum())))).astype(int)
-        own = np.diff(ends, prepend=0)
-        return [float(each * motion.step) if free else None for each, free in zip(own, is_open, strict=True)] * count
+        counts = np.diff(ends, prepend=0)
+        return [
+            float(cycle * motion.step) if free else None for cycle, free in zip(counts, is_open, strict=True)
+        ] * count
 
     def motions_at(self, clock: ProgramClock, nominal: Sequence[Array]) -> list[Motion]:
         """The motion of each phase in the rows of another clock."""
         made: list[Motion] = []
         for place, (phase, path, motion) in enumerate(zip(clock.plan.program, self.paths, self.motions, strict=True)):
-            own, times = nominal[place] - phase.begin, clock.schedules[place].times
-            q = motion.q if path is None else path.at(own)
-            made.append(replace(motion, times=times, sigma=own, q=q, iterations=None, slack=None))
+            nominal_times, times = nominal[place] - phase.begin, clock.schedules[place].times
+            q = motion.q if path is None else path.at(nominal_times)
+            made.append(replace(motion, times=times, sigma=nominal_times, q=q, iterations=None, slack=None))
         return made
 
 
@@ -121,7 +123,7 @@ def joint_path(motion: Motion) -> JointPath:
     if motion.path is None:
         return JointPath.through(motion.times, motion.q)
     stands = np.all(motion.q == motion.q[0], axis=0)
-    nodes = [np.where(stands[:, None], motion.q[0][:, None], each) for each in motion.path.nodes]
+    nodes = [np.where(stands[:, None], motion.q[0][:, None], node) for node in motion.path.nodes]
     return replace(motion.path, start=motion.q[0], nodes=nodes)
 
 
@@ -154,18 +156,18 @@ class RowLimits:
 
     def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
         """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
-        cell, found = self.scene.cell, []
+        cell, loads = self.scene.cell, []
         for robot in cell.robots:
-            own, cycle = q[:, cell.columns(robot.name)], robot.controller_cycle
-            signed = point_accelerations(times, own)[..., None]
-            found.append(
+            positions, cycle = q[:, cell.columns(robot.name)], robot.controller_cycle
+            signed = point_accelerations(times, positions)[..., None]
+            loads.append(
                 (
-                    [use.peak_velocity for use in joint_uses(robot, times, own)],
-                    joint_accelerations(times, own, cycle=cycle).values.max(axis=0),
+                    [use.peak_velocity for use in joint_uses(robot, times, positions)],
+                    joint_accelerations(times, positions, cycle=cycle).values.max(axis=0),
                     jerks(times, signed, window=cycle).max(axis=0),
                 )
             )
-        velocity, acceleration, jerk = (np.concatenate(each) for each in zip(*found, strict=True))
+        velocity, acceleration, jerk = (np.concatenate(ratios) for ratios in zip(*loads, strict=True))
         return velocity / self.bounds.velocity, acceleration / self.bounds.acceleration, jerk / self.bounds.jerk
 
     def slower(self, sigma: Array, q: Array) -> float:
@@ -252,15 +254,15 @@ def transfer_retimer(scene: Scene) -> Retimer:
     return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)
 
 
-def kept_rates(paths: Sequence[ClockedPath]) -> tuple[KeptRate, ...]:
+def fixed_rates(paths: Sequence[ClockedPath]) -> tuple[FixedRate, ...]:
     """Where the rate of the nominal time is demanded: while a process is on, and in dwells."""
-    found = []
+    rates = []
     for path in paths:
         process = path.task.process
         if process is not None:
-            found.append(KeptRate(begin=path.start, end=path.end, tolerance=process.tolerance))
-        found += [KeptRate(begin=begin, end=end) for begin, end in kept_rests(path.task, path.corners)]
-    return tuple(found)
+            rates.append(FixedRate(begin=path.start, end=path.end, tolerance=process.tolerance))
+        rates += [FixedRate(begin=begin, end=end) for begin, end in kept_rests(path.task, path.corners)]
+    return tuple(rates)
 
 
 def _largest_feed(task: Task) -> float:
@@ -277,7 +279,7 @@ def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath, cycle: flo
         step=motion.step,
         feed_share=limits.feed_share,
         slower=limits.slower,
-        kept=kept_rates(schedule.paths),
+        fixed_rates=fixed_rates(schedule.paths),
         errors=errors,
     )
     fastest = retimer.fastest(path)

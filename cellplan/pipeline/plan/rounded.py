@@ -32,7 +32,7 @@ def with_start(cell: Cell, start: Array) -> Cell:
     """The cell with every start posture filled in; what is not as given is rounded to what is written of it."""
     robots = []
     for robot in cell.robots:
-        found = start[cell.columns(robot.name)]
-        is_given = robot.start is not None and np.array_equal(robot.start, found)
-        robots.append(robot if is_given else replace(robot, start=rounded(robot, found)))
+        posture = start[cell.columns(robot.name)]
+        is_given = robot.start is not None and np.array_equal(robot.start, posture)
+        robots.append(robot if is_given else replace(robot, start=rounded(robot, posture)))
     return replace(cell, robots=tuple(robots))

@@ -48,8 +48,8 @@ def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, prog
     Raises:
         NoSolutionError: A tool lost its path.
     """
-    own = [paths[name] for name in phase.tasks]
-    schedule = schedule_paths(cell, own)
+    paths_of_run = [paths[name] for name in phase.tasks]
+    schedule = schedule_paths(cell, paths_of_run)
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     at = standing(cell, phase, start)
     finer = cell.motion.finer
@@ -58,6 +58,6 @@ def plan_run(cell: Cell, paths: Mapping[str, ClockedPath], phase: Phase, *, prog
         return PlannedRun(phase=phase, schedule=schedule, motion=motion)
     clock = replace(cell.motion, step=finer, duration=float(schedule.times[-1]))
     solved = replace(cell, motion=clock)
-    task = MotionTask(solved, schedule_paths(solved, own), phase.moving, at)
+    task = MotionTask(solved, schedule_paths(solved, paths_of_run), phase.moving, at)
     motion = on_grid(plan_within_accuracy(task, progress=progress), schedule.times)
     return PlannedRun(phase=phase, schedule=schedule, motion=motion)

@@ -94,8 +94,8 @@ def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress
     others = [run for run in runs if run.scene is not None]
     known = {} if near is None else near.homes
     all_runs = [*around_held, *others]
-    found = find_homes(replace(scenes.held, cell=started), all_runs, known=known, progress=progress)
-    solved = _with_all_homes(with_homes(started, found, given=cell))
+    homes = find_homes(replace(scenes.held, cell=started), all_runs, known=known, progress=progress)
+    solved = _with_all_homes(with_homes(started, homes, given=cell))
     if depends_on_homes(started, runs):
         runs = _Worked(solved, scenes, progress, near).runs()
     stages = _joined(solved, scenes, runs, progress=progress)
@@ -125,7 +125,7 @@ class _Worked:
         self.moved, self._near = dict[str, tuple[MovedStart, ...]](), near
         self.cell, self.remarks, self._given = cell, list[str](), cell
         self._scenes, self._progress, self._last = scenes, progress, dict[str, Array]()
-        self._kept = {*cell.positioners, *idle_robots(cell, [task.name for task in cell.tasks])}
+        self._standing = {*cell.positioners, *idle_robots(cell, [task.name for task in cell.tasks])}
 
     def runs(self) -> list[PlannedRun]:
         """The motions of all stages with tasks."""
@@ -135,12 +135,12 @@ class _Worked:
         """The motion of a stage; None of one without tasks."""
         if not stage.phase.tasks:
             return None
-        own = self._with_known_starts(stage)
-        scene = replace(self._scenes.of_stage(stage), cell=own)
-        toolpaths = {task.name: build_toolpath(task, own.part) for task in own.tasks}
-        paths = clock_paths(own, toolpaths.values())
-        own, moved = with_placed_starts(own, toolpaths, scene.chains, near=self._near)
-        scene = replace(scene, cell=own)
+        cell = self._with_known_starts(stage)
+        scene = replace(self._scenes.of_stage(stage), cell=cell)
+        toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
+        paths = clock_paths(cell, toolpaths.values())
+        cell, moved = with_placed_starts(cell, toolpaths, scene.chains, near=self._near)
+        scene = replace(scene, cell=cell)
         start = near_start(scene, paths, self._last) if self._last else None
         if start is None:
             with located(stage, self.cell, self._given):
@@ -148,29 +148,29 @@ class _Worked:
             start = choice.start
             if choice.warning is not None:
                 self.remarks.append(f"{stage.phase.name}: {choice.warning}")
-        started, more = with_chosen_start(own, start, toolpaths)
+        started, more = with_chosen_start(cell, start, toolpaths)
         self._record(stage, started)
         self.moved[stage.phase.name] = (*moved, *more)
         with located(stage, self.cell, self._given):
             planned = plan_run(started, paths, stage.phase, progress=self._progress)
         at_work = set(stage.phase.roles) - set(stage.phase.idle)
-        self._last |= {name: planned.motion.q[-1, own.columns(name)] for name in sorted(at_work)}
+        self._last |= {name: planned.motion.q[-1, cell.columns(name)] for name in sorted(at_work)}
         return planned if stage.move is None else replace(planned, scene=scene)
 
     def _with_known_starts(self, stage: Stage) -> Cell:
         """The cell of a stage with starts that earlier stages found or lead to."""
-        own = stage.cell
+        cell = stage.cell
         is_continued = stage.move in (PartMove.LIFT, PartMove.RELEASE)
         robots = []
-        for robot in own.robots:
+        for robot in cell.robots:
             known = self.cell.robot(robot.name)
             start = robot.start
             if is_continued and robot.name in self.cell.positioners[:1]:
                 start = self._last[robot.name]
-            elif start is None and robot.name in self._kept and stage.move is None:
+            elif start is None and robot.name in self._standing and stage.move is None:
                 start = known.start
             robots.append(replace(robot, start=start))
-        return replace(own, robots=tuple(robots))
+        return replace(cell, robots=tuple(robots))
 
     def _record(self, stage: Stage, started: Cell) -> None:
         """Keep the starts of a block: of holders and robots without tasks, of each task, of each robot in its first."""
@@ -179,7 +179,7 @@ class _Worked:
         at_work = {task.robot: task.name for task in started.tasks}
         robots = []
         for robot in self.cell.robots:
-            is_new = robot.start is None and (robot.name in at_work or robot.name in self._kept)
+            is_new = robot.start is None and (robot.name in at_work or robot.name in self._standing)
             robots.append(replace(robot, start=started.robot(robot.name).start) if is_new else robot)
         tasks = [_with_posture(task, started) if task.name in at_work.values() else task for task in self.cell.tasks]
         self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
@@ -193,11 +193,14 @@ def _with_posture(task: Task, started: Cell) -> Task:
 def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:
     """A moment in which all operators are at their homes and the holders where they begin."""
     robots = (replace(robot, start=robot.home if robot.start is None else robot.start) for robot in cell.robots)
-    own = replace(cell, robots=tuple(robots), tasks=())
+    cell_at_home = replace(cell, robots=tuple(robots), tasks=())
     roles = {robot.name: Hold(at_home=robot.name not in cell.positioners) for robot in cell.robots}
     times = np.array([0.0, cell.motion.step])
     start = np.concatenate(
-        [run.motion.q[0, cell.columns(robot.name)] if robot.start is None else robot.start for robot in own.robots]
+        [
+            run.motion.q[0, cell.columns(robot.name)] if robot.start is None else robot.start
+            for robot in cell_at_home.robots
+        ]
     )
     motion = Motion(times=times, q=np.stack([start, start]))
     return PlannedRun(phase=Phase(name="home", roles=roles), schedule=Schedule(times=times, tasks=()), motion=motion)
@@ -268,13 +271,13 @@ def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress
                 "the other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of "
                 "theirs"
             )
-    found = plan_transfer(
+    transfer = plan_transfer(
         scene_of_run(scene, ()), start, goal, retimer=transfer_retimer(scene), seed=cell.solver.seed, progress=progress
     )
     return PlannedStage(
         stage=stage,
         scene=scene,
-        schedule=Schedule(times=found.times, tasks=()),
-        motion=Motion(times=found.times, q=found.q),
-        rungs={robot: rung.words for robot, rung in found.rungs.items()},
+        schedule=Schedule(times=transfer.times, tasks=()),
+        motion=Motion(times=transfer.times, q=transfer.q),
+        rungs={robot: rung.words for robot, rung in transfer.rungs.items()},
     )

@@ -42,12 +42,12 @@ def _faults(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Iterator[str]:
     """What is wrong with a cell wherever its robots are, the deepest fault of each place in the cell file."""
     cell = scene.cell
     fixed = replace(scene, mounted=tuple(pair for pair in scene.mounted if _is_fixed(scene, pair)))
-    found: dict[str, list[Check]] = {}
+    faults: dict[str, list[Check]] = {}
     for check in check_mounting(fixed, np.zeros((1, cell.joint_count))):
         if not check.passed:
-            found.setdefault(_mounting_key(cell, check.name, check.subject.split(" - ")), []).append(check)
-    for key, checks in found.items():
-        deepest = max(checks, key=lambda each: each.value)
+            faults.setdefault(_mounting_key(cell, check.name, check.subject.split(" - ")), []).append(check)
+    for key, checks in faults.items():
+        deepest = max(checks, key=lambda check: check.value)
         more = f" (and {len(checks) - 1} more of that place)" if len(checks) > 1 else ""
         yield f"{cell.origin.at(key)}: {deepest.message}{more}"
     at_rest = [scene.bodies[pair.first].is_at_rest and scene.bodies[pair.second].is_at_rest for pair in scene.pairs]
@@ -89,6 +89,6 @@ def _mounting_key(cell: Cell, name: str, bodies: list[str]) -> str:
     if name == Mount.GRIP:
         return "part.held_by[0].at"
     robot = bodies[0].partition("/")[0]
-    if any(each.name == robot for each in cell.robots):
+    if any(other.name == robot for other in cell.robots):
         return f"robots.{robot}.base"
     return "part.at" if bodies[0] == "part" else f"environment.{bodies[0]}"

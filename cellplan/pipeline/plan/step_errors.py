@@ -45,17 +45,17 @@ class StepErrors:
             sigma: Nominal times in [s], shape (N,).
             step: Time between two rows in [s].
         """
-        found: Array = step * np.interp(sigma, self._at, self._root)
-        return found
+        root: Array = step * np.interp(sigma, self._at, self._root)
+        return root
 
     def largest(self, sigma: Array) -> Array:
         """Largest error in each step between nominal times in [s], as a share of what is allowed, shape (N - 1,)."""
-        q, found = self._path.at(sigma), np.zeros(len(sigma) - 1)
+        q, errors = self._path.at(sigma), np.zeros(len(sigma) - 1)
         for share in SHARES:
             between = (1.0 - share) * q[:-1] + share * q[1:]
             nominal = (1.0 - share) * sigma[:-1] + share * sigma[1:]
-            found = np.maximum(found, self._shares(nominal, between))
-        return found
+            errors = np.maximum(errors, self._shares(nominal, between))
+        return errors
 
     def tighten(self, sigma: Array) -> bool:
         """Make the motion slower from now on where steps miss a tolerance.
@@ -66,14 +66,14 @@ class StepErrors:
         Returns:
             Whether no step misses one.
         """
-        found = self.largest(sigma)
-        for k in np.flatnonzero(found > 1.0).tolist():
+        errors = self.largest(sigma)
+        for k in np.flatnonzero(errors > 1.0).tolist():
             ends = np.searchsorted(self._at, sigma[[max(0, k - 1), min(len(sigma) - 1, k + 2)]])
             around = slice(int(ends[0]), int(ends[1]) + 1)
-            factor = (SAFELY * found[k]) ** 0.5
+            factor = (SAFELY * errors[k]) ** 0.5
             self._tightened[around] = np.maximum(self._tightened[around], factor * self._root[around])
         self._root = self._tightened.copy()
-        return bool(found.max() <= 1.0)
+        return bool(errors.max() <= 1.0)
 
     def _shares(self, sigma: Array, q: Array) -> Array:
         """Largest error at each nominal time in [s] with these joints, as a share of what is allowed, shape (N,)."""

@@ -155,8 +155,8 @@ def _program_card(kind: str, cell: Cell, phases: Sequence[tuple[Report, Cell]]) 
 
 def _smallest_clearance(phase: tuple[Report, Cell]) -> float:
     """Smallest distance of a phase in [m]; infinite without pairs."""
-    found = [each.minimum for each in phase[0].clearance.minima.values() if each.minimum is not None]
-    return min(found, default=np.inf)
+    distances = [minimum.minimum for minimum in phase[0].clearance.minima.values() if minimum.minimum is not None]
+    return min(distances, default=np.inf)
 
 
 def _record_card(record: Record) -> Card:
@@ -185,8 +185,8 @@ def _record_card(record: Record) -> Card:
 
 def _grid(caption: str, columns: Mapping[str, Any], names: Sequence[str], table: str) -> Grid:
     """Some columns of a table, all of them without names."""
-    kept = {name: columns[name] for name in names if name in columns} if names else dict(columns)
-    shown = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in kept.items()}
+    selected = {name: columns[name] for name in names if name in columns} if names else dict(columns)
+    shown = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in selected.items()}
     return Grid(caption=caption, columns=shown, more=f'to_frame("{table}")')
 
 

@@ -41,13 +41,13 @@ def to_frame(result: object, table: str | None = None) -> "pd.DataFrame":
         InputError: It is no result that has tables, or has no such table, or its files cannot be read.
         MissingPackageError: pandas is not installed.
     """
-    found = tables_of(result)
-    name = next(iter(found)) if table is None else table
-    if name not in found:
-        hint = did_you_mean(name, found)
-        raise InputError(f"to_frame: expected one of the tables {listed(found)}, got '{name}'{hint}")
+    tables = tables_of(result)
+    name = next(iter(tables)) if table is None else table
+    if name not in tables:
+        hint = did_you_mean(name, tables)
+        raise InputError(f"to_frame: expected one of the tables {listed(tables)}, got '{name}'{hint}")
     pandas = _pandas()
-    return pandas.DataFrame({column: _tidy(values) for column, values in found[name]().items()})
+    return pandas.DataFrame({column: _tidy(values) for column, values in tables[name]().items()})
 
 
 def _pandas() -> Any:
@@ -70,7 +70,9 @@ def _tidy(values: Any) -> Any:
     if isinstance(values, np.ndarray):
         return values
     column: Sequence[Any] = list(values)
-    is_number = all(each is None or (isinstance(each, int | float) and not isinstance(each, bool)) for each in column)
-    if is_number and column and any(each is None for each in column):
-        return np.array([np.nan if each is None else float(each) for each in column])
+    is_number = all(
+        value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in column
+    )
+    if is_number and column and any(value is None for value in column):
+        return np.array([np.nan if value is None else float(value) for value in column])
     return column

@@ -139,10 +139,10 @@ def run_records(phases: Sequence[tuple[Report, Cell]]) -> list[Record]:
 
 def _joined(phases: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
     """The curves of all phases, one after the other, each on its own time."""
-    found = {name or ALL_TASKS: curve_columns(tree) for name, tree in phases.items()}
-    names = dict.fromkeys(name for columns in found.values() for name in columns)
+    curves = {name or ALL_TASKS: curve_columns(tree) for name, tree in phases.items()}
+    names = dict.fromkeys(name for columns in curves.values() for name in columns)
     joined: dict[str, Any] = {"phase": []} | {name: [] for name in names}
-    for phase, columns in found.items():
+    for phase, columns in curves.items():
         count = len(columns["time_s"])
         joined["phase"] += [phase] * count
         for name in names:
@@ -152,18 +152,20 @@ def _joined(phases: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:
 
 def _tool_errors(report: Report) -> dict[str, Row]:
     """Tool errors of each task, settling included; what is allowed is known to the cell alone."""
-    found = {}
-    for each in report.accuracy:
-        position, orientation = (np.linalg.norm(e, axis=1) for e in (each.position_error, each.orientation_error))
-        found[each.task] = {
-            "robot": each.robot,
+    errors = {}
+    for accuracy in report.accuracy:
+        position, orientation = (
+            np.linalg.norm(e, axis=1) for e in (accuracy.position_error, accuracy.orientation_error)
+        )
+        errors[accuracy.task] = {
+            "robot": accuracy.robot,
             "max_position_error_with_settling_mm": number(MM * float(position.max())),
             "max_orientation_error_with_settling_deg": number(DEG * float(orientation.max())),
-            "path_length_mm": number(MM * each.path_length),
-            "start_s": number(each.start_s),
-            "end_s": number(each.end_s),
+            "path_length_mm": number(MM * accuracy.path_length),
+            "start_s": number(accuracy.start_s),
+            "end_s": number(accuracy.end_s),
         }
-    return found
+    return errors
 
 
 def _distances(report: Report) -> dict[str, Any]:
@@ -173,39 +175,41 @@ def _distances(report: Report) -> dict[str, Any]:
     return {"time_s": clearance.curve_times, **curves}
 
 
-def _candidates(found: Screening) -> dict[str, Any]:
+def _candidates(screening: Screening) -> dict[str, Any]:
     """A row for each layout; the joint that leaves least of its range and the fastest one, as shares."""
     return {
-        "candidate": np.arange(len(found.start)),
-        "is_followed": found.is_followed,
-        "is_feasible": found.is_feasible,
-        "lost_at_s": np.where(np.isfinite(found.lost_at), found.lost_at, np.nan),
-        "reached_start": found.lost_at >= 0.0,
-        "error_m_or_rad": found.error,
-        "max_velocity_ratio": found.speed_ratios.max(axis=1, initial=0.0),
-        **_margins(found),
+        "candidate": np.arange(len(screening.start)),
+        "is_followed": screening.is_followed,
+        "is_feasible": screening.is_feasible,
+        "lost_at_s": np.where(np.isfinite(screening.lost_at), screening.lost_at, np.nan),
+        "reached_start": screening.lost_at >= 0.0,
+        "error_m_or_rad": screening.error,
+        "max_velocity_ratio": screening.speed_ratios.max(axis=1, initial=0.0),
+        **_margins(screening),
     }
 
 
-def _margins(found: Screening) -> dict[str, Any]:
+def _margins(screening: Screening) -> dict[str, Any]:
     """Smallest margin of the turning joints and of the sliding ones of each layout, where the cell is known."""
-    if found.cell is None:
+    if screening.cell is None:
         return {}
-    joints = [joint for robot in found.cell.robots for joint in robot.model.joints]
+    joints = [joint for robot in screening.cell.robots for joint in robot.model.joints]
     columns = {}
     for name, is_revolute in (("deg", True), ("mm", False)):
-        own = [index for index, joint in enumerate(joints) if joint.is_revolute == is_revolute]
-        if own:
-            columns[f"min_margin_{name}"] = joints[own[0]].display_unit.scale * found.margins[:, own].min(axis=1)
+        revolute = [index for index, joint in enumerate(joints) if joint.is_revolute == is_revolute]
+        if revolute:
+            columns[f"min_margin_{name}"] = joints[revolute[0]].display_unit.scale * screening.margins[:, revolute].min(
+                axis=1
+            )
     return columns
 
 
-def _candidate_joints(found: Screening) -> Iterator[Row]:
+def _candidate_joints(screening: Screening) -> Iterator[Row]:
     """A row for each joint of each layout, in the unit of the joint."""
-    if found.cell is None:
+    if screening.cell is None:
         return
-    joints = [(robot.name, joint) for robot in found.cell.robots for joint in robot.model.joints]
-    for candidate in range(len(found.start)):
+    joints = [(robot.name, joint) for robot in screening.cell.robots for joint in robot.model.joints]
+    for candidate in range(len(screening.start)):
         for index, (robot, joint) in enumerate(joints):
             unit, scale = joint.display_unit
             yield {
@@ -213,7 +217,7 @@ def _candidate_joints(found: Screening) -> Iterator[Row]:
                 "robot": robot,
                 "joint": joint.name,
                 "unit": unit,
-                "start": number(scale * float(found.start[candidate, index])),
-                "margin": number(scale * float(found.margins[candidate, index])),
-                "velocity_ratio": number(float(found.speed_ratios[candidate, index])),
+                "start": number(scale * float(screening.start[candidate, index])),
+                "margin": number(scale * float(screening.margins[candidate, index])),
+                "velocity_ratio": number(float(screening.speed_ratios[candidate, index])),
             }

@@ -89,8 +89,8 @@ class Judgement:
     @property
     def nearest(self) -> Nearest | None:
         """The smallest distance of all phases."""
-        found = [phase.nearest for phase in self.phases if phase.nearest is not None]
-        return min(found, key=lambda each: each.distance, default=None)
+        distances = [phase.nearest for phase in self.phases if phase.nearest is not None]
+        return min(distances, key=lambda distance: distance.distance, default=None)
 
 
 def judged(
@@ -117,7 +117,7 @@ def _judged(
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
     stopped = places.scene_while_stopped(state.lying)
     schedule = Schedule(times=times, tasks=())
-    moving = [name for name in state.times if name not in state.kept]
+    moving = [name for name in state.times if name not in state.standing]
     checks = list(verify_motion(stopped, schedule, tables, moving=moving, idle=()).checks)
     checks += check_mounting(stopped, q, times)
     checks.append(_begins(q, state))
@@ -127,12 +127,12 @@ def _judged(
     first = 0
     for group in _runs_of_retracts(phases):
         last = first + sum(len(phase.q) - 1 for phase in group)
-        rows, own = q[first : last + 1], times[first : last + 1]
-        bound, found = _proved(group[0], rows, own, places=places, state=state)
-        checks += [_coming_apart(pair, fault, at) for (pair, at), fault in found.items()]
-        apart += found
-        checks.append(_clearance(bound, own, f"{group[0].kind} from {own[0]:g} s"))
-        timed += _timed(group, times, first, _nearest(bound, own))
+        rows, times_of_run = q[first : last + 1], times[first : last + 1]
+        bound, separations = _proved(group[0], rows, times_of_run, places=places, state=state)
+        checks += [_coming_apart(pair, fault, at) for (pair, at), fault in separations.items()]
+        apart += separations
+        checks.append(_clearance(bound, times_of_run, f"{group[0].kind} from {times_of_run[0]:g} s"))
+        timed += _timed(group, times, first, _nearest(bound, times_of_run))
         first = last
     return Judgement(checks=tuple(checks), phases=tuple(timed), apart=tuple(apart))
 
@@ -146,15 +146,15 @@ def _proved(
     growth = certify_growth(places.scene_while_stopped(state.lying), rows, with_minimum=True)
     faults = dict(growth.faults)
     timed = [(pair, None if pair.row is None else float(times[pair.row])) for pair in growth.apart]
-    return growth.kept, {each: faults.get(each[0].names, "") for each in timed}
+    return growth.bound, {pair: faults.get(pair[0].names, "") for pair in timed}
 
 
 def _timed(group: Sequence[RecoveryPhase], times: Array, first: int, nearest: Nearest | None) -> list[TimedPhase]:
     """Phases that are judged together, on their clock."""
-    found = []
+    phases = []
     for phase in group:
         end = first + len(phase.q) - 1
-        found.append(
+        phases.append(
             TimedPhase(
                 kind=str(phase.kind),
                 robots=phase.robots,
@@ -166,18 +166,18 @@ def _timed(group: Sequence[RecoveryPhase], times: Array, first: int, nearest: Ne
             )
         )
         first = end
-    return found
+    return phases
 
 
 def _runs_of_retracts(phases: Sequence[RecoveryPhase]) -> list[list[RecoveryPhase]]:
     """The phases, retracts that follow one another together: pairs come apart over all of them."""
-    found: list[list[RecoveryPhase]] = []
+    runs: list[list[RecoveryPhase]] = []
     for phase in phases:
-        if found and phase.kind is RecoveryKind.RETRACT is found[-1][-1].kind:
-            found[-1].append(phase)
+        if runs and phase.kind is RecoveryKind.RETRACT is runs[-1][-1].kind:
+            runs[-1].append(phase)
         else:
-            found.append([phase])
-    return found
+            runs.append([phase])
+    return runs
 
 
 def _begins(q: Array, state: StoppedState) -> Check:
@@ -203,8 +203,8 @@ def _stand_still(q: Array, phases: Sequence[RecoveryPhase], places: RunPlaces) -
         rows = q[first : first + len(phase.q)]
         first += len(phase.q) - 1
         for robot in cell.robots:
-            own = rows[:, cell.columns(robot.name)]
-            moved = float(np.abs(own - own[0]).max())
+            positions = rows[:, cell.columns(robot.name)]
+            moved = float(np.abs(positions - positions[0]).max())
             if robot.name not in phase.robots and moved > STATE_TOL:
                 message = f"standing: {robot.name} moves by {moved:.1e} rad or m in '{phase.words}', where it stands"
                 checks.append(
@@ -245,10 +245,10 @@ def _coming_apart(pair: ComingApart, fault: str, at: float | None) -> Check:
 
 def _nearest(bound: Bound, times: Array) -> Nearest | None:
     """The smallest distance of the pairs that keep the clearance."""
-    kept = [pair for pair in bound.pairs if pair.keeps_clearance and np.isfinite(pair.proved)]
-    if not kept:
+    pairs = [pair for pair in bound.pairs if pair.keeps_clearance and np.isfinite(pair.proved)]
+    if not pairs:
         return None
-    worst = min(kept, key=lambda pair: pair.proved)
+    worst = min(pairs, key=lambda pair: pair.proved)
     return Nearest(distance=worst.proved, demand=worst.demand, pair=bound.names(worst), at_s=time_of(times, worst.at))
 
 

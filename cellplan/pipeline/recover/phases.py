@@ -50,7 +50,7 @@ def moving(cell: Cell, q: Array) -> tuple[str, ...]:
 
 def joints_of(cell: Cell, robots: Sequence[str]) -> Flags:
     """Which joints belong to some robots, shape (nq,)."""
-    found = np.zeros(cell.joint_count, dtype=bool)
+    is_moved = np.zeros(cell.joint_count, dtype=bool)
     for name in robots:
-        found[cell.columns(name)] = True
-    return found
+        is_moved[cell.columns(name)] = True
+    return is_moved

@@ -32,7 +32,7 @@ class RecoveryPlanner:
         self._retimer = transfer_retimer(self._scene)
         held = self._scene.cell.positioners
         self._group = held if len(held) > 1 else ()
-        self._fixed = {*state.kept, *(held if set(held) & set(state.kept) and self._group else ())}
+        self._fixed = {*state.standing, *(held if set(held) & set(state.standing) and self._group else ())}
         self._off_start: Array | None = None
         self.refused: list[str] = []
 
@@ -45,14 +45,14 @@ class RecoveryPlanner:
         for back in WaysBack(self._places, self._state, self._fixed, self.refused).ways():
             q = back[-1].q[-1] if back else self._state.q
             try:
-                found = (*back, *self._off_and_home(q))
+                phases = (*back, *self._off_and_home(q))
             except TransferNotFoundError as error:
                 where = f"from {back[-1].words.split(' to ')[-1]}: " if back else ""
                 self.refused.append(f"{where}{error}")
                 if not self._is_at_start(q):
                     continue
                 return back or (self._standing(q, "all robots are where the program begins, and leave it nowhere"),)
-            return found or (self._standing(q, "all robots are home"),)
+            return phases or (self._standing(q, "all robots are home"),)
         raise TransferNotFoundError("; then ".join(dict.fromkeys(self.refused)))
 
     def _standing(self, q: Array, words: str) -> RecoveryPhase:
@@ -139,10 +139,10 @@ class RecoveryPlanner:
             columns = self._cell.columns(name)
             end[columns] = goal[columns]
         seed = self._cell.solver.seed
-        found = plan_transfer(self._scene, start, end, retimer=self._retimer, seed=seed, progress=self._progress)
-        how = {rung.words for rung in found.rungs.values()}
+        transfer = plan_transfer(self._scene, start, end, retimer=self._retimer, seed=seed, progress=self._progress)
+        how = {rung.words for rung in transfer.rungs.values()}
         words = f"{', '.join(robots)} to the end of the recovery ({', '.join(sorted(how))})"
-        return [RecoveryPhase(kind=RecoveryKind.TRANSFER, robots=robots, words=words, q=found.q)]
+        return [RecoveryPhase(kind=RecoveryKind.TRANSFER, robots=robots, words=words, q=transfer.q)]
 
     def _with_holders(self, q: Array, goal: Array) -> list[RecoveryPhase]:
         """The holders of the part together back along the program, before or after the others go home.

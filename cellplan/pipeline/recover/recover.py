@@ -41,7 +41,7 @@ class Recovery:
     tried: tuple[str, ...]
 
     @property
-    def found(self) -> bool:
+    def succeeded(self) -> bool:
         """Whether there is a recovery."""
         return self.judgement is not None
 
@@ -52,7 +52,7 @@ class Recovery:
 
     def __repr__(self) -> str:
         """One line without arrays."""
-        what = f"{self.duration:g} s" if self.found else f"not found: {self.reason}"
+        what = f"{self.duration:g} s" if self.succeeded else f"not found: {self.reason}"
         return f"<Recovery of '{self.cell.name}' from {self.state.at:g} s, {what}>"
 
 
@@ -119,7 +119,7 @@ def _tables(cell: Cell, phases: tuple[RecoveryPhase, ...], state: StoppedState, 
         texts[robot.name] = render_table(robot, times, q[:, cell.columns(robot.name)], header=header)
     digests = {"run": run, "program": program_digest(texts)}
     for robot in cell.robots:
-        own = TableHeader(
+        table_header = TableHeader(
             cell=cell.name,
             mode=str(cell.motion.mode),
             verdict="passed",
@@ -127,5 +127,5 @@ def _tables(cell: Cell, phases: tuple[RecoveryPhase, ...], state: StoppedState, 
             remark=remark,
             zero=zero_text(robot.model),
         )
-        texts[robot.name] = replace_header(texts[robot.name], header=own)
+        texts[robot.name] = replace_header(texts[robot.name], header=table_header)
     return texts

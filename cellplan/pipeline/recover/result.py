@@ -35,7 +35,7 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
     """What ``recovery.json`` says, in deg, mm and s."""
     record: dict[str, Any] = {
         "schema": SCHEMA,
-        "status": "found" if recovery.found else "not_found",
+        "status": "found" if recovery.succeeded else "not_found",
         "cell": recovery.cell.name,
         "run": recovery.run,
         "versions": versions(),
@@ -43,15 +43,15 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
     }
     if recovery.judgement is None:
         return record | {"reason": recovery.reason, "files": {}, "caution": CAUTION}
-    found = recovery.judgement
+    judgement = recovery.judgement
     record["duration_s"] = recovery.duration
-    record["phases"] = [_phase(phase) for phase in found.phases]
-    record["clearance"] = _nearest(found.nearest)
-    record["begins_too_near"] = [_apart(pair, kept_from) for pair, kept_from in found.apart]
+    record["phases"] = [_phase(phase) for phase in judgement.phases]
+    record["clearance"] = _nearest(judgement.nearest)
+    record["begins_too_near"] = [_apart(pair, kept_from) for pair, kept_from in judgement.apart]
     record["not_taken"] = list(recovery.tried)
     record["checks"] = [
         {"name": check.name, "subject": check.subject, "passed": check.passed, "message": check.message}
-        for check in found.checks
+        for check in judgement.checks
     ]
     files = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in _files(recovery).items()}
     return record | {"files": files, "caution": CAUTION}
@@ -63,7 +63,7 @@ def _state(recovery: Recovery) -> dict[str, Any]:
     robots = {
         robot.name: {
             "at_s": state.times[robot.name],
-            "keeps": robot.name in state.kept,
+            "keeps": robot.name in state.standing,
             "joints": _joints(robot, state.q[cell.columns(robot.name)]),
         }
         for robot in cell.robots
@@ -93,7 +93,7 @@ def _apart(pair: ComingApart, kept_from: float | None) -> dict[str, Any]:
         "depth_mm": max(0.0, -MM * pair.begin),
         "demand_mm": MM * pair.demand,
         "kept_from_s": kept_from,
-        "may_fall_back_mm": MM * pair.room,
+        "may_fall_back_mm": MM * pair.slack,
     }
 
 
@@ -153,8 +153,8 @@ def _state_lines(record: Mapping[str, Any]) -> Iterator[str]:
     for pair in record["begins_too_near"]:
         first, second = pair["pair"]
         held = f"{pair['depth_mm']:.2f} mm deep in" if pair["depth_mm"] > 0.0 else f"{pair['distance_mm']:.2f} mm from"
-        kept = f"from {pair['kept_from_s']:.3f} s on {pair['demand_mm']:g} mm apart"
-        yield f"  begins with {first} {held} {second}; {kept}"
+        distance = f"from {pair['kept_from_s']:.3f} s on {pair['demand_mm']:g} mm apart"
+        yield f"  begins with {first} {held} {second}; {distance}"
 
 
 # Files
@@ -204,7 +204,7 @@ def clock_text(recovery: Recovery) -> str:
 
 def _files(recovery: Recovery) -> dict[str, str]:
     """Text of every file beside the record, by its path; none where no recovery was found."""
-    if not recovery.found:
+    if not recovery.succeeded:
         return {}
     tables = {f"tables/{name}.csv": text for name, text in recovery.tables.items()}
     return {CLOCK: clock_text(recovery), **tables}

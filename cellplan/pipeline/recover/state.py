@@ -97,7 +97,7 @@ class StoppedState:
     Attributes:
         at: Time of the program in [s].
         times: Time of the program at which each robot stands, by its name.
-        kept: Names of the robots that are to stand still.
+        standing: Names of the robots that are to stand still.
         q: Stacked joint positions in [rad] or [m], shape (nq,).
         place: Place of the phase of ``at``.
         lying: Where the part lies; None while it is held, or fixed anyway.
@@ -105,7 +105,7 @@ class StoppedState:
 
     at: float
     times: Mapping[str, float]
-    kept: tuple[str, ...]
+    standing: tuple[str, ...]
     q: Array
     place: int
     lying: PartPlaceEntry | None
@@ -140,10 +140,10 @@ def _tips_and_part(scene: Scene) -> Scene:
             bodies[place] = replace(bodies[place], name=f"{robot.name}{ball}")
     tips = {index for index, body in enumerate(bodies) if body.name.endswith(ball)}
     ends = [(pair.first, pair.second) for pair in scene.pairs]
-    kept = [
+    free = [
         row for row, both in enumerate(ends) if not tips & set(both) or Kind.PART in {kinds[index] for index in both}
     ]
-    return replace(scene_of_rows(scene, kept), bodies=tuple(bodies))
+    return replace(scene_of_rows(scene, free), bodies=tuple(bodies))
 
 
 def stopped_state(
@@ -168,7 +168,7 @@ def stopped_state(
     return StoppedState(
         at=float(at),
         times=times,
-        kept=tuple(name for name in times if name in set(keep)),
+        standing=tuple(name for name in times if name in set(keep)),
         q=q,
         place=places.at(at),
         lying=places.lying_at(places.at(held_at)),

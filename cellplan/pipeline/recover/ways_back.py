@@ -71,10 +71,10 @@ class WaysBack:
         if path is None:
             return None
         robots = moving(self._places.cell, path.q)
-        kept = sorted(set(robots) & self._fixed)
+        fixed = sorted(set(robots) & self._fixed)
         name = self._places.phases[place].name
-        if kept:
-            return f"the way back along '{name}' moves '{kept[0]}', which is to stand still"
+        if fixed:
+            return f"the way back along '{name}' moves '{fixed[0]}', which is to stand still"
         scene = self._places.scene_of_phase(place)
         q = timed_rows(path, transfer_retimer(scene))
         if not certify(scene, q, with_minimum=False).is_kept:
@@ -113,7 +113,7 @@ class HoldersBack:
         place = self._places.at(self._state.times[self._group[0]])
         first = self._places.motion.q[self._places.rows(place).start]
         path = self._path_of_group(place, q, first)
-        if path is None or set(self._state.kept) & set(self._group):
+        if path is None or set(self._state.standing) & set(self._group):
             raise TransferNotFoundError(f"{named} hold the part together and cannot be moved one by one")
         rows = timed_rows(path, transfer_retimer(self._scene))
         if not certify(self._scene, rows, with_minimum=False).is_kept:

@@ -156,8 +156,13 @@ class _Executions:
         )
         figures = Round(
             number=len(self.all),
-            position={each.task: largest(each.position_error, job.judged_from[each.task]) for each in accuracy},
-            orientation={each.task: largest(each.orientation_error, job.judged_from[each.task]) for each in accuracy},
+            position={
+                accuracy.task: largest(accuracy.position_error, job.judged_from[accuracy.task]) for accuracy in accuracy
+            },
+            orientation={
+                accuracy.task: largest(accuracy.orientation_error, job.judged_from[accuracy.task])
+                for accuracy in accuracy
+            },
             share=worst_share(job.cell, accuracy, job.judged_from),
             measured_share=worst_share(job.cell, measured_accuracy, job.judged_from),
         )
@@ -166,7 +171,7 @@ class _Executions:
 
 def _outcome(rounds: Sequence[Round], limit: int) -> Outcome | None:
     """How correcting ended; None while another round is worth its while."""
-    shares = [each.measured_share for each in rounds]
+    shares = [round_.measured_share for round_ in rounds]
     last = shares[-1]
     if last <= CONVERGED_FRACTION:
         return Outcome.CONVERGED

@@ -77,7 +77,7 @@ def _tasks_record(cell: Cell, run: RunRehearsal) -> Record:
 
 def _execution_record(run: RunRehearsal, place: int, pick: Pick) -> Record | None:
     """Largest, mean and root-mean-square errors over all samples and trials; None where there was no such execution."""
-    picked = [(index, found[place]) for index, trial in enumerate(run.trials) if (found := pick(trial)) is not None]
+    picked = [(index, record[place]) for index, trial in enumerate(run.trials) if (record := pick(trial)) is not None]
     if not picked:
         return None
     numbers = [index for index, _ in picked]

@@ -118,11 +118,11 @@ def _without_tool_errors(report: Report) -> Report:
 
 def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErrors) -> None:
     """Refuse more trials than fit into memory."""
-    kept = sum(len(schedule.times) * len(schedule.tasks) for schedule in schedules)
-    most = MAX_ERRORS // kept
+    samples = sum(len(schedule.times) * len(schedule.tasks) for schedule in schedules)
+    most = MAX_ERRORS // samples
     if trials > max(most, 1):
         raise InputError(
-            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({kept} samples of its tasks), "
+            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({samples} samples of its tasks), "
             f"got {trials}; reduce trials or increase motion.step_s"
         )
 
@@ -192,8 +192,8 @@ def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> Cor
     scene = Scene.from_cell(cell)
     report = verify_motion(scene, references, tables, moving=job.moving, progress=progress)
     report = _without_tool_errors(with_clearance(report, scene, references, is_reported=False, progress=progress))
-    kept = trial.correction.best
-    remark = f"corrected for measured errors, round {kept}: right for the measured cell, not for the written one"
+    best_round = trial.correction.best
+    remark = f"corrected for measured errors, round {best_round}: right for the measured cell, not for the written one"
     alone = replace(phase, begin=0.0, end=float(references.times[-1]))  # a program of its own
     return CorrectedProgram(program=with_verdict(cell, program, [alone], [report], remark=remark), report=report)
 

@@ -62,10 +62,10 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
 def _task_lines(record: Record) -> Iterator[str]:
     for name, task in record["tasks"].items():
         for key, title in ON_TERMINAL.items():
-            place, found = f"  task {name} ({task['robot']}), {title}", task[key]
-            if found is not None:
-                position, orientation = found["max_position_error_mm"], found["max_orientation_error_deg"]
-                lost = record["trials"] - found["trials"]
+            place, errors = f"  task {name} ({task['robot']}), {title}", task[key]
+            if errors is not None:
+                position, orientation = errors["max_position_error_mm"], errors["max_orientation_error_deg"]
+                lost = record["trials"] - errors["trials"]
                 yield f"{place}: true error {small(position)} mm, {small(orientation)} deg" + (
                     f", path lost in {lost} trials" if lost else ""
                 )
@@ -164,8 +164,8 @@ def _round_figures(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Figure
     if longest < 2:
         return {}
     tolerance = cell.task(task).tolerance
-    position = [np.array([1e3 * made.position[task] for made in each.rounds]) for each in corrections]
-    orientation = [np.degrees([made.orientation[task] for made in each.rounds]) for each in corrections]
+    position = [np.array([1e3 * made.position[task] for made in correction.rounds]) for correction in corrections]
+    orientation = [np.degrees([made.orientation[task] for made in correction.rounds]) for correction in corrections]
     figure = Figure(
         title=f"{task}: largest true error by correction round",
         x=Axis(low=0.0, high=longest - 1.0, label="round"),

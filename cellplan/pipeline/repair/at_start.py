@@ -37,11 +37,11 @@ def start_faults(ready: Prepared, point: Point) -> tuple[StartFault, ...]:
     problem, cell, margin = ready.coarse, ready.variables.base, ready.demands().margin
     holder = set(cell.positioners) or {PART}
     left = np.minimum(point.q[0] - problem.limits.lower, problem.limits.upper - point.q[0])
-    found = []
+    faults = []
     for column in np.flatnonzero(left - margin < -CLEARLY).tolist():
         robot, joint = problem.joint_names(column)
         text = f"joint {robot}/{joint} has too little room in the start posture, which this does not change"
-        found.append(StartFault(robots=frozenset({robot, *holder}), text=text))
+        faults.append(StartFault(robots=frozenset({robot, *holder}), text=text))
     near = problem.distances(point, FIRST, 0.0)
     lacks = near.demands - near.values
     for row in np.argsort(-lacks, kind="stable").tolist():
@@ -52,8 +52,8 @@ def start_faults(ready: Prepared, point: Point) -> tuple[StartFault, ...]:
                 f"{names[0]} and {names[1]} are {MM * float(lacks[row]):.3g} mm too near in the start posture, which "
                 "this does not change"
             )
-            found.append(StartFault(robots=robots | holder, text=text))
-    return tuple(found)
+            faults.append(StartFault(robots=robots | holder, text=text))
+    return tuple(faults)
 
 
 def _carriers(scene: Scene, name: str) -> set[str]:

@@ -101,11 +101,11 @@ def listed_names(names: Sequence[str]) -> str:
 
 def owners(cell: Cell, settings: LayoutSettings) -> dict[str, tuple[str, ...]]:
     """Addresses of what may change, by the robot that it belongs to, in the order of the cell."""
-    found: dict[str, list[str]] = {}
-    for each in settings.ranges:
-        found.setdefault(_owner(cell, each), []).append(each.address)
+    owners: dict[str, list[str]] = {}
+    for variable in settings.ranges:
+        owners.setdefault(_owner(cell, variable), []).append(variable.address)
     names = [*(robot.name for robot in cell.robots), PART]
-    return {name: tuple(found[name]) for name in names if name in found}
+    return {name: tuple(owners[name]) for name in names if name in owners}
 
 
 def of_layout(cell: Cell, settings: LayoutSettings, size: int) -> Iterator[Attempt]:
@@ -122,7 +122,7 @@ def of_layout(cell: Cell, settings: LayoutSettings, size: int) -> Iterator[Attem
 
 def of_tools(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:
     """Attempts with the rod or the spin of one tool at work that no layout search may change."""
-    known = {(each.kind, each.name) for each in settings.ranges}
+    known = {(variable.kind, variable.name) for variable in settings.ranges}
     for task in cell.tasks:
         rod, robots = cell.robot(task.robot).tool.rod, (task.robot,)
         is_alone = sum(other.robot == task.robot for other in cell.tasks) == 1
@@ -146,7 +146,7 @@ def of_branches(cell: Cell) -> Iterator[Attempt]:
 
 def of_weights(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:
     """Attempts with the joint weights of one robot at work that no layout search may change."""
-    known = {each.name for each in settings.ranges if each.kind is VariableKind.WEIGHT}
+    known = {variable.name for variable in settings.ranges if variable.kind is VariableKind.WEIGHT}
     working = {*cell.positioners, *(task.robot for task in cell.tasks)}
     for robot in cell.robots:
         if robot.name in working - known:
@@ -155,31 +155,31 @@ def of_weights(cell: Cell, settings: LayoutSettings) -> Iterator[Attempt]:
 
 def of_paths(cell: Cell) -> Iterator[Attempt]:
     """Attempts with the joint path of the positioner, where it may change."""
-    for each in () if cell.layout is None else cell.layout.paths:
-        vary = {f"{each.robot}.path": {"coefficients": each.coefficients, "degree": each.degree}}
-        yield Attempt(kind=RemedyKind.PATH, robots=(each.robot,), vary=vary)
+    for path in () if cell.layout is None else cell.layout.paths:
+        vary = {f"{path.robot}.path": {"coefficients": path.coefficients, "degree": path.degree}}
+        yield Attempt(kind=RemedyKind.PATH, robots=(path.robot,), vary=vary)
 
 
 def tied(settings: LayoutSettings) -> list[tuple[str, ...]]:
     """Groups of addresses that change together."""
-    bases = [each for each in settings.ranges if each.kind is VariableKind.BASE]
+    bases = [variable for variable in settings.ranges if variable.kind is VariableKind.BASE]
     mirrored = [
-        tuple(each.address for each in bases if each.name in pair.robots and each.index == index)
+        tuple(base.address for base in bases if base.name in pair.robots and base.index == index)
         for pair in settings.mirrored
         for index in range(6)
     ]
     return [*settings.equal, *(group for group in mirrored if len(group) > 1)]
 
 
-def _owner(cell: Cell, each: VaryRange) -> str:
+def _owner(cell: Cell, variable: VaryRange) -> str:
     """The robot that a number belongs to."""
-    match each.kind:
+    match variable.kind:
         case VariableKind.SPIN:
-            return cell.task(each.name).robot
+            return cell.task(variable.name).robot
         case VariableKind.PART:
             return PART
         case _:
-            return each.name
+            return variable.name
 
 
 def _rod_ranges(rod: Rod) -> dict[str, list[float]]:

@@ -17,15 +17,15 @@ from cellplan.pipeline.repair.neat import changed_values, neat
 from cellplan.pipeline.repair.solved import Solved, demanded_margin
 from cellplan.pipeline.solve import solve
 from cellplan.search.programs.improve import Improved, improve
-from cellplan.search.programs.measures import rooms
-from cellplan.search.programs.objective import Demands, Effort, Room
+from cellplan.search.programs.measures import reserves
+from cellplan.search.programs.objective import Demands, Effort, Reserve
 from cellplan.search.programs.problem import Problem
 
 SOLVES: Final = 4  # [-] times that a layout is corrected and solved before it is given up
 NODES: Final = 129  # [-] of a correction
 KEYS: Final = 33  # [-] configurations at which it asks for distances
 ITERATIONS: Final = 20
-KEPT: Final = 0.5  # [-] share of the room beyond a demanded distance that every node is to have
+SHARE_LEFT: Final = 0.5  # [-] share of the room beyond a demanded distance that every node is to have
 REFINEMENTS: Final = 4  # [-] local optimisations until no distance between the configurations is too small
 MORE_ANGLE: Final = float(np.radians(0.05))  # [rad] asked for beyond what is missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
@@ -55,10 +55,10 @@ def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
     effort = Effort(iterations=ITERATIONS, keys=KEYS, trust=0.2)
     done = Confirmed(values={}, cost=0.0, solved=None, reason=NOT_FOLLOWED, solves=0)
     for solves in range(1, SOLVES + 1):
-        found, effort = _refined(problem, (x, start), demands, effort)
-        if found is None or not (found.is_conforming or solves == 1):
+        improved, effort = _refined(problem, (x, start), demands, effort)
+        if improved is None or not (improved.is_conforming or solves == 1):
             break
-        x, start = neat(ready, found.x, found.start)
+        x, start = neat(ready, improved.x, improved.start)
         values, cost = changed_values(ready, x, start), float(np.abs(x - problem.given) @ problem.cost)
         solved, reason = solved_cell(ready.cell, values)
         done = Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=solves)
@@ -74,19 +74,19 @@ def _refined(
 ) -> tuple[Improved | None, Effort]:
     """A local optimum with a little more than the demanded distances at every node, and the effort that this takes."""
     x, start = begin
-    found: Improved | None = None
+    improved: Improved | None = None
     for _ in range(REFINEMENTS):
-        found = improve(problem, x, start, demands, effort)
-        if found is None:
+        improved = improve(problem, x, start, demands, effort)
+        if improved is None:
             break
-        near = problem.distances(found.point, np.arange(len(problem.times), dtype=np.intp), effort.room.distance)
-        lacks = near.demands + KEPT * rooms(near, effort.room) - near.values
+        near = problem.distances(improved.point, np.arange(len(problem.times), dtype=np.intp), effort.reserve.distance)
+        lacks = near.demands + SHARE_LEFT * reserves(near, effort.reserve) - near.values
         worst = {int(near.pairs[row]): int(near.nodes[row]) for row in np.argsort(lacks) if lacks[row] > 0.0}
         if not worst:
             break
         also_at = {*effort.also_at, *(float(problem.times[node]) for node in worst.values())}
-        effort, x, start = replace(effort, also_at=tuple(sorted(also_at))), found.x, found.start
-    return found, effort
+        effort, x, start = replace(effort, also_at=tuple(sorted(also_at))), improved.x, improved.start
+    return improved, effort
 
 
 def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None, str]:
@@ -109,10 +109,12 @@ def _tightened(solved: Solved, demands: Demands, effort: Effort) -> tuple[Demand
     lacks = solved.lacks
     margin = demands.margin + np.where(lacks > 0.0, lacks + MORE_ANGLE, 0.0)
     near = [check for check in failed if check.name in DISTANCES]
-    room = replace(effort.room, distance=effort.room.distance + _missing(near), time=effort.room.time + _late(failed))
+    reserve = replace(
+        effort.reserve, distance=effort.reserve.distance + _missing(near), time=effort.reserve.time + _late(failed)
+    )
     at = (check.at_s for check in near if check.at_s is not None)
     also_at = tuple(sorted({*effort.also_at, *at}))
-    return replace(demands, margin=margin), replace(effort, room=_most(room), also_at=also_at)
+    return replace(demands, margin=margin), replace(effort, reserve=_most(reserve), also_at=also_at)
 
 
 def _missing(near: Sequence[Check]) -> float:
@@ -127,6 +129,6 @@ def _late(failed: Sequence[Check]) -> float:
     return max(shares) + MORE_TIME if shares else 0.0
 
 
-def _most(room: Room) -> Room:
+def _most(reserve: Reserve) -> Reserve:
     """The room, within reason: what asks for more is not corrected any further."""
-    return replace(room, distance=min(room.distance, 0.05), time=min(room.time, 0.5))
+    return replace(reserve, distance=min(reserve.distance, 0.05), time=min(reserve.time, 0.5))

@@ -27,14 +27,14 @@ def neat(ready: Prepared, x: Array, start: Array) -> tuple[Array, Array]:
     variables = ready.variables
     if isinstance(ready.coarse, PathProblem):  # every coefficient changes, none is one that anyone would type
         return x, start
-    kinds = {each.address: each for each in variables.settings.ranges}
+    kinds = {variable.address: variable for variable in variables.settings.ranges}
     rounded = x.copy()
     for place, name in enumerate(variables.names):
-        each = kinds[name]
+        kind = kinds[name]
         if abs(x[place] - variables.given[place]) * variables.cost[place] < LEAST:
             rounded[place] = variables.given[place]
-        elif each.kind is not VariableKind.WEIGHT:
-            grid = ANGLE if each.is_angle else LENGTH
+        elif kind.kind is not VariableKind.WEIGHT:
+            grid = ANGLE if kind.is_angle else LENGTH
             rounded[place] = grid * round(float(x[place]) / grid)
     rounded = np.clip(rounded, variables.lower, variables.upper)
     point = ready.coarse.evaluate(rounded, start)

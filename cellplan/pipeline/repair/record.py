@@ -83,8 +83,8 @@ class Case:
     @property
     def failed(self) -> list[dict[str, Any]]:
         """Checks that fail as the cell is given."""
-        found: Any = self.given.figures.get("failed", ())
-        return list(found)
+        names: Any = self.given.figures.get("failed", ())
+        return list(names)
 
     @property
     def no_motion(self) -> str:
@@ -131,16 +131,16 @@ def advice_record(case: Case) -> AdviceRecord:
 
 def remedy_values(outcome: Outcome) -> dict[str, Any]:
     """What a remedy changes in the cell of the request, by address."""
-    found: Any = outcome.figures["values"]
-    return dict(found)
+    values: Any = outcome.figures["values"]
+    return dict(values)
 
 
 def _remedy(case: Case, attempt: Attempt, outcome: Outcome) -> RemedyRecord:
     """One remedy; its settings are those of the file: what the request sets, then the change."""
     figures: Mapping[str, Any] = outcome.figures
     cell, values = case.ready.cell, remedy_values(outcome)
-    asked = {key: value for key, value in cell.origin.changes.items() if key.partition(".")[0] != "layout"}
-    settings = {**asked, **values}
+    requested = {key: value for key, value in cell.origin.changes.items() if key.partition(".")[0] != "layout"}
+    settings = {**requested, **values}
     return {
         "kind": str(attempt.kind),
         "text": change_text(cell, attempt, values),

@@ -26,7 +26,7 @@ from cellplan.pipeline.repair.attempts import (
 )
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture
 from cellplan.pipeline.repair.record import AdviceRecord, Case, Tried, advice_record, remedy_values
-from cellplan.pipeline.repair.solved import step_asked, time_asked
+from cellplan.pipeline.repair.solved import required_step, required_time
 from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.search.programs.objective import Objective
 from cellplan.search.programs.problem import Point
@@ -55,8 +55,8 @@ class Repair(Presented):
     def __repr__(self) -> str:
         """One line without arrays."""
         remedies = self.record["remedies"]
-        found = f"; {remedies[0]['text']}" if remedies else ""
-        return f"<Repair of '{self.given.name}', {self.record['status'].replace('_', ' ')}{found}>"
+        cure = f"; {remedies[0]['text']}" if remedies else ""
+        return f"<Repair of '{self.given.name}', {self.record['status'].replace('_', ' ')}{cure}>"
 
 
 def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = silent) -> Repair:
@@ -125,13 +125,13 @@ class _Work:
     def _run(self, attempts: Sequence[Attempt | None]) -> None:
         """Make some attempts; None stands for the cell as it is given."""
         jobs: list[Attempt | None] = []
-        for each in attempts:
-            fault = None if each is None else next((it for it in self.faults if it.excludes(each)), None)
-            if each is None or fault is None:
-                jobs.append(each)
+        for job in attempts:
+            fault = None if job is None else next((it for it in self.faults if it.excludes(job)), None)
+            if job is None or fault is None:
+                jobs.append(job)
             else:
-                self.tried.append((each, Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
-        variants = [Variant(place, {"kind": GIVEN} if each is None else each.record) for place, each in enumerate(jobs)]
+                self.tried.append((job, Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
+        variants = [Variant(place, {"kind": GIVEN} if job is None else job.record) for place, job in enumerate(jobs)]
         workers = self.workers if len(jobs) > FEW else 1
         with outcomes(variants, partial(evaluate, self.request), workers) as every:
             for place, (attempt, outcome) in enumerate(zip(jobs, every, strict=True)):
@@ -145,48 +145,48 @@ class _Work:
     @property
     def remedies(self) -> list[Tried]:
         """Attempts that pass: changes of the layout by their number of robots and cost, then others by their cost."""
-        return sorted((each for each in self.tried if each[1].status is TrialStatus.PASSED), key=_size)
+        return sorted((tried for tried in self.tried if tried[1].status is TrialStatus.PASSED), key=_size)
 
     @property
     def failures(self) -> list[Tried]:
         """Attempts that do not pass."""
-        return [each for each in self.tried if each[1].status is not TrialStatus.PASSED]
+        return [tried for tried in self.tried if tried[1].status is not TrialStatus.PASSED]
 
 
 def _first(ready: Prepared) -> list[Attempt]:
     """Attempts that do not depend on what comes of others."""
     cell, settings = ready.cell, ready.variables.settings
     paths = of_paths(searched_cell(ready.request))
-    found = [*of_layout(cell, settings, 1), *of_tools(cell, settings), *of_branches(cell), *paths]
-    return sorted(found, key=lambda each: KINDS.index(each.kind))
+    attempts = [*of_layout(cell, settings, 1), *of_tools(cell, settings), *of_branches(cell), *paths]
+    return sorted(attempts, key=lambda attempt: KINDS.index(attempt.kind))
 
 
 def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
     """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
     checks, step = _failed(given), ready.cell.motion.step
     failed = {check["name"] for check in checks}
-    found: list[Attempt] = []
+    attempts: list[Attempt] = []
     if failed and failed <= JOINT_LIMITS:
-        found += of_weights(ready.cell, ready.variables.settings)
+        attempts += of_weights(ready.cell, ready.variables.settings)
         if ready.cell.solver.method != WITH_LIMITS:
-            found.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
+            attempts.append(Attempt(kind=RemedyKind.METHOD, robots=(), values={"solver.method": WITH_LIMITS}))
     if failed and failed <= PASSED_BY_STEP and ready.cell.motion.grid is None:
-        values = {"motion.step_s": step_asked(checks, step)}
-        found.append(Attempt(kind=RemedyKind.STEP, robots=(), values=values))
+        values = {"motion.step_s": required_step(checks, step)}
+        attempts.append(Attempt(kind=RemedyKind.STEP, robots=(), values=values))
     if failed and failed <= PASSED_BY_TIME:
-        found.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: time_asked(checks)}))
-    return found
+        attempts.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: required_time(checks)}))
+    return attempts
 
 
 def _failed(given: Outcome) -> list[dict[str, Any]]:
     """Failed checks of the cell as it is given."""
-    found: Any = given.figures.get("failed", ())
-    return list(found)
+    names: Any = given.figures.get("failed", ())
+    return list(names)
 
 
-def _size(each: Tried) -> tuple[bool, int, float, int]:
+def _size(tried: Tried) -> tuple[bool, int, float, int]:
     """The size of a remedy: changes of the layout first, then the number of robots, the cost and the kind."""
-    attempt, outcome = each
+    attempt, outcome = tried
     is_other = attempt.kind is not RemedyKind.LAYOUT
     robots = 0 if is_other else len(attempt.robots)
     return is_other, robots, float(str(outcome.figures["cost"])), KINDS.index(attempt.kind)

@@ -78,24 +78,24 @@ def remedy_figures(remedy: Record) -> str:
 
 def effects_text(remedy: Record) -> str:
     """What a remedy does to the failed checks, the first ones, in words."""
-    texts = [each["text"] for each in remedy["effects"]]
+    texts = [effect["text"] for effect in remedy["effects"]]
     more = len(texts) - MOST_EFFECTS
     return "; ".join([*texts[:MOST_EFFECTS], *([f"and {more} more"] if more > 0 else [])])
 
 
 def command_line(remedy: Record, cell: Path) -> str:
     """The line to type that gives the motion of a remedy."""
-    settings = [word for each in remedy["options"] for word in ("--set", each)]
+    settings = [word for option in remedy["options"] for word in ("--set", option)]
     return shlex.join(["cellplan", "solve", str(cell), *settings])
 
 
 def tried_groups(record: Record) -> list[tuple[str, str]]:
     """What was tried and why it is no remedy, those with one reason together, in the order of the first of each."""
-    order = {each["reason"]: place for place, each in reversed(list(enumerate(record["tried"])))}
-    listed = sorted(record["tried"], key=lambda each: order[each["reason"]])
+    order = {attempt["reason"]: place for place, attempt in reversed(list(enumerate(record["tried"])))}
+    listed = sorted(record["tried"], key=lambda attempt: order[attempt["reason"]])
     return [
-        ("; ".join(each["text"] for each in group), reason)
-        for reason, group in groupby(listed, key=lambda each: str(each["reason"]))
+        ("; ".join(attempt["text"] for attempt in group), reason)
+        for reason, group in groupby(listed, key=lambda attempt: str(attempt["reason"]))
     ]
 
 
@@ -109,7 +109,7 @@ def _given(record: Record) -> Iterator[str]:
         yield f"  {demands_text(record)}"
         return
     yield f"  as given ({demands_text(record)}): {len(failed)} {'check fails' if len(failed) == 1 else 'checks fail'}"
-    yield from (f"    {each['message']}" for each in failed[:MOST_FAILED])
+    yield from (f"    {check['message']}" for check in failed[:MOST_FAILED])
     if len(failed) > MOST_FAILED:
         yield f"    and {len(failed) - MOST_FAILED} more"
 
@@ -132,7 +132,7 @@ def advice_page(record: Record) -> str:
         r=record,
         verdict=verdict_line(record),
         demands=demands_text(record),
-        commands=[command_line(each, Path(record["file"])) for each in record["remedies"]],
+        commands=[command_line(remedy, Path(record["file"])) for remedy in record["remedies"]],
         tried=tried_groups(record),
         caution=CAUTION,
     )
@@ -153,7 +153,7 @@ def advice_tables(record: Record) -> Tables:
 
     def remedies() -> dict[str, Any]:
         return columns_of(
-            flat({key: value for key, value in each.items() if key != "effects"}) for each in record["remedies"]
+            flat({key: value for key, value in remedy.items() if key != "effects"}) for remedy in record["remedies"]
         )
 
     return {
@@ -164,7 +164,7 @@ def advice_tables(record: Record) -> Tables:
     }
 
 
-def write_repair(found: Repair, request: LayoutRequest, folder: Path) -> AdviceRecord:
+def write_repair(repair: Repair, request: LayoutRequest, folder: Path) -> AdviceRecord:
     """Write a repair into a folder, which appears whole or not at all.
 
     It holds ``advice.json``, ``advice.html`` and, with a remedy, ``best.yaml``: the given cell file with the values of
@@ -181,17 +181,17 @@ def write_repair(found: Repair, request: LayoutRequest, folder: Path) -> AdviceR
     Raises:
         InputError: The folder cannot be written, or holds something that cellplan did not write.
     """
-    record = found.record
+    record = repair.record
     with RunFolder(folder) as target:
-        if found.best is not None:
-            beside = result_files(found.best, request.cell, folder, head=_head(record))
-            record["files"] = {each["name"]: each["sha256"] for each in file_records(beside)}
-            for name, content in beside.items():
+        if repair.best is not None:
+            files = result_files(repair.best, request.cell, folder, head=_head(record))
+            record["files"] = {record["name"]: record["sha256"] for record in file_records(files)}
+            for name, content in files.items():
                 target.write_bytes(name, content)
         target.write_text(RECORD, as_json(record))
         target.write_text(PAGE, advice_page(record))
         passed = record["status"] in {"passes", "repaired"}
-        manifest = render_manifest(found.given, passed=passed, versions=versions(), files=target.written)
+        manifest = render_manifest(repair.given, passed=passed, versions=versions(), files=target.written)
         target.write_text(MANIFEST, manifest)
     return record
 

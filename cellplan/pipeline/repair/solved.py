@@ -36,9 +36,9 @@ class Solved:
     @property
     def failed(self) -> list[Check]:
         """Checks that failed; a margin only where its joint is within its limits."""
-        found = [check for check in self.checks if not check.passed]
-        beyond = {check.subject for check in found if check.name == "joint_position"}
-        return [check for check in found if check.name != MARGIN or check.subject not in beyond]
+        checks = [check for check in self.checks if not check.passed]
+        beyond = {check.subject for check in checks if check.name == "joint_position"}
+        return [check for check in checks if check.name != MARGIN or check.subject not in beyond]
 
     @property
     def lacks(self) -> Array:
@@ -73,8 +73,8 @@ class Solved:
     def _clearance(self) -> float | None:
         """Smallest certified distance in [mm]; None without pairs."""
         reports = [run.report for run in self.solution.runs]
-        found = [each.minimum for report in reports for each in report.clearance.minima.values()]
-        return number(MM * min((value for value in found if value is not None), default=np.inf))
+        distances = [minimum.minimum for report in reports for minimum in report.clearance.minima.values()]
+        return number(MM * min((value for value in distances if value is not None), default=np.inf))
 
     def _margin_checks(self) -> list[Check]:
         """One check for each joint with a demanded margin."""
@@ -109,13 +109,13 @@ def demanded_margin(cell: Cell) -> Array:
     return np.array([settings.margin if joint.is_revolute else settings.margin_sliding for joint in joints])
 
 
-def time_asked(failed: Iterable[Mapping[str, Any]]) -> float:
+def required_time(failed: Iterable[Mapping[str, Any]]) -> float:
     """How many times as long the motion must last for failed checks, as records, that a slower motion passes."""
-    asked = (CHECK_KINDS[each["name"]].more_time(each["value"], each["limit"]) for each in failed)
-    return max(asked, default=1.0)
+    factors = (CHECK_KINDS[check["name"]].more_time(check["value"], check["limit"]) for check in failed)
+    return max(factors, default=1.0)
 
 
-def step_asked(failed: Iterable[Mapping[str, Any]], step: float) -> float:
+def required_step(failed: Iterable[Mapping[str, Any]], step: float) -> float:
     """Time between rows in [s], halved until failed checks, as records, pass: an error grows with its square."""
-    asked = max((each["value"] / each["limit"] for each in failed if each["name"] in PASSED_BY_STEP), default=1.0)
-    return step / 2.0 ** math.ceil(0.5 * math.log2(max(1.0, MORE_ERROR * asked)))
+    ratio = max((check["value"] / check["limit"] for check in failed if check["name"] in PASSED_BY_STEP), default=1.0)
+    return step / 2.0 ** math.ceil(0.5 * math.log2(max(1.0, MORE_ERROR * ratio)))

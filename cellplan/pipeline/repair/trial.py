@@ -15,7 +15,7 @@ from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.pipeline.repair.confirm import Confirmed, confirmed, solved_cell
 from cellplan.pipeline.repair.prepare import begins, ready_cell, start_posture, with_attempt
-from cellplan.pipeline.repair.solved import Solved, time_asked
+from cellplan.pipeline.repair.solved import Solved, required_time
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.variables.written import written_starts
@@ -63,27 +63,27 @@ def _least(ready: Prepared, attempt: Attempt) -> Confirmed | str:
 def _of_variables(ready: Prepared, start: Array, attempt: Attempt) -> Confirmed | str:
     """The least change of variables."""
     count = BEGINNINGS if attempt.kind is RemedyKind.LAYOUT else FEWER
-    found: list[Improved] = []
+    candidates: list[Improved] = []
     for begin in begins(ready, start, seed=ready.request.seed, count=count):
         improved = improve(ready.coarse, *begin, ready.demands(), EFFORT)
         if improved is not None:
-            found.append(improved)
-    if not found:
+            candidates.append(improved)
+    if not candidates:
         return NO_MOTION
     reason = ""
-    for each in sorted(found, key=lambda one: (one.violation, one.objective)):
-        if not each.is_conforming:
-            return reason or _shortfall(ready, each)
-        done = confirmed(ready, each.x, each.start)
+    for candidate in sorted(candidates, key=lambda one: (one.violation, one.objective)):
+        if not candidate.is_conforming:
+            return reason or _shortfall(ready, candidate)
+        done = confirmed(ready, candidate.x, candidate.start)
         if not done.reason:
             return done
         reason = reason or done.reason
     return reason
 
 
-def _shortfall(ready: Prepared, found: Improved) -> str:
+def _shortfall(ready: Prepared, improved: Improved) -> str:
     """What the best layout of a search still breaks."""
-    left = standing_of(ready.coarse, found.point, ready.demands(), EFFORT).violations()
+    left = standing_of(ready.coarse, improved.point, ready.demands(), EFFORT).violations()
     return f"at best {left[0]['text']}" if left else "at best less room than is asked for beyond the demands"
 
 
@@ -126,10 +126,10 @@ def _slower(ready: Prepared, factor: float) -> Confirmed:
         factor = whole_steps(cell, factor, longer_than=longer_than)
         values = {key: round(float(str(value)), DIGITS) for key, value in scaled_values(cell, factor).items()}
         done = _of_values(ready, values, TENTHS * (factor - 1.0))
-        asked = 1.0 if done.solved is None else time_asked(done.solved.figures["failed"])
-        if not done.reason or asked <= 1.0 or factor > SLOWEST:
+        required = 1.0 if done.solved is None else required_time(done.solved.figures["failed"])
+        if not done.reason or required <= 1.0 or factor > SLOWEST:
             return done
-        factor, longer_than = factor * asked, factor
+        factor, longer_than = factor * required, factor
 
 
 def _of_values(ready: Prepared, values: Mapping[str, object], cost: float) -> Confirmed:
@@ -138,13 +138,17 @@ def _of_values(ready: Prepared, values: Mapping[str, object], cost: float) -> Co
     return Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=1)
 
 
-def _outcome(found: Confirmed | str) -> Outcome:
+def _outcome(confirmation: Confirmed | str) -> Outcome:
     """What came of an attempt, as plain data."""
-    if isinstance(found, str):
-        return Outcome(status=TrialStatus.FAILED, reason=found, figures={})
-    solved: Solved | None = found.solved
-    figures: dict[str, Any] = {"values": plain_values(found.values), "cost": found.cost, "solves": found.solves}
+    if isinstance(confirmation, str):
+        return Outcome(status=TrialStatus.FAILED, reason=confirmation, figures={})
+    solved: Solved | None = confirmation.solved
+    figures: dict[str, Any] = {
+        "values": plain_values(confirmation.values),
+        "cost": confirmation.cost,
+        "solves": confirmation.solves,
+    }
     if solved is None:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=found.reason, figures=figures)
-    status = TrialStatus.FAILED if found.reason else TrialStatus.PASSED
-    return Outcome(status=status, reason=found.reason, figures={**figures, **solved.figures})
+        return Outcome(status=TrialStatus.NO_SOLUTION, reason=confirmation.reason, figures=figures)
+    status = TrialStatus.FAILED if confirmation.reason else TrialStatus.PASSED
+    return Outcome(status=status, reason=confirmation.reason, figures={**figures, **solved.figures})

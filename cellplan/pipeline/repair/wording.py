@@ -74,14 +74,14 @@ def _of_pose(name: str, parts: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
         elif component in TURNS:
             turned.append(f"{by:+.4g} deg {component.removesuffix('_deg')}")
     if moved:
-        yield f"move {name} {', '.join(text for _, text in sorted(moved, key=lambda each: -each[0]))}"
+        yield f"move {name} {', '.join(text for _, text in sorted(moved, key=lambda move: -move[0]))}"
     if turned:
         yield f"turn {name} {', '.join(turned)}"
 
 
 def _of_robot(cell: Cell, name: str, attempt: Attempt, parts: Mapping[str, tuple[Any, Any]]) -> Iterator[str]:
     """Start posture and weights of a robot; start postures that follow from other changes are not named."""
-    varies_start = any("start" in each and each.startswith(f"robots.{name}.") for each in attempt.addresses)
+    varies_start = any("start" in address and address.startswith(f"robots.{name}.") for address in attempt.addresses)
     for component, (old, new) in parts.items():
         if component == "path":
             rows = new.get("coefficients_deg") or new["coefficients"]
@@ -124,28 +124,28 @@ def _arrows(parts: Mapping[str, tuple[Any, Any]]) -> str:
 def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[EffectRecord]:
     """What a remedy does to the checks that fail as the cell is given."""
     after = {(check["name"], check["subject"]): check for check in figures["checks"]}
-    found: list[EffectRecord] = []
+    effects: list[EffectRecord] = []
     for check in given["failed"]:
         subject = check["subject"]
         if check["name"] in {"joint_position", MARGIN}:
-            old, new = (each["margins"][subject] for each in (given, figures))
+            old, new = (figures_of["margins"][subject] for figures_of in (given, figures))
             unit = given["units"][subject]
             text = f"{subject.replace('/', ' ')} margin {new - old:+.3g} {unit} to {new:.3g} {unit}"
-            found.append(_effect(check, old, new, unit, text))
+            effects.append(_effect(check, old, new, unit, text))
             continue
         now = after.get((check["name"], subject))
         name, unit, old = _short_name(check["name"]), check["unit"], check["value"]
         if name == "collision":
-            found.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
+            effects.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
         elif now is not None and check["name"] in PASSED_BY_TIME:
-            shares = [100.0 * each["value"] / each["limit"] for each in (check, now)]
+            shares = [100.0 * values["value"] / values["limit"] for values in (check, now)]
             text = f"{subject.replace('/', ' ')} {name} {shares[0]:.4g} % -> {shares[1]:.4g} % of its limit"
-            found.append(_effect(check, shares[0], shares[1], "%", text))
+            effects.append(_effect(check, shares[0], shares[1], "%", text))
         elif now is not None:
-            found.append(
+            effects.append(
                 _effect(check, old, now["value"], unit, f"{name} {subject} {old:.3g} -> {now['value']:.3g} {unit}")
             )
-    return found
+    return effects
 
 
 def _short_name(check: str) -> str:

@@ -57,7 +57,7 @@ def _narrowest(report: Report, check: Check | None) -> Instant:
     uses = [use for use in report.joints if np.isfinite(use.margin) and np.isfinite(use.upper - use.lower)]
     if not uses:
         return Instant(at_s=float(report.times[0]), check=check)
-    use = min(uses, key=lambda each: each.margin / max(each.upper - each.lower, 1e-12))
+    use = min(uses, key=lambda joint: joint.margin / max(joint.upper - joint.lower, 1e-12))
     return Instant(at_s=use.margin_at_s, check=check, use=use)
 
 
@@ -84,16 +84,18 @@ def _of_check(check: Check, report: Report, cell: Cell) -> Instant:
     at_s = check.at_s or 0.0
     names = tuple(check.subject.split(" - "))
     if check.name == "clearance" and len(names) == 1:
-        found = next((each for kind, each in report.clearance.minima.items() if str(kind) == check.subject), None)
-        if found is not None and found.at_s is not None:
-            return Instant(at_s=found.at_s, check=check, minimum=found, bodies=found.pair or ())
+        minimum = next(
+            (minimum for kind, minimum in report.clearance.minima.items() if str(kind) == check.subject), None
+        )
+        if minimum is not None and minimum.at_s is not None:
+            return Instant(at_s=minimum.at_s, check=check, minimum=minimum, bodies=minimum.pair or ())
     if len(names) == 2:
         return Instant(at_s=at_s, check=check, bodies=names)
     robot, _, joint = check.subject.partition("/")
-    if robot in {each.name for each in cell.robots}:
+    if robot in {robot.name for robot in cell.robots}:
         known = joint if joint in cell.robot(robot).model.joint_names else None
         return Instant(at_s=at_s, check=check, robot=robot, joint=known)
-    task = next((each for each in cell.tasks if each.name == check.subject), None)
+    task = next((task for task in cell.tasks if task.name == check.subject), None)
     if task is not None:
         return Instant(at_s=at_s, check=check, robot=task.robot, task=task.name)
     return Instant(at_s=at_s, check=check)

@@ -93,15 +93,19 @@ def _marked(instant: Instant, cell: Cell, bodies: Sequence[SceneBody]) -> frozen
         return frozenset(instant.bodies)
     if instant.robot is None:
         return frozenset()
-    own = [body for body in bodies if body.robot == instant.robot and body.kind is not Kind.PART]
+    bodies_of_robot = [body for body in bodies if body.robot == instant.robot and body.kind is not Kind.PART]
     if instant.joint is not None:
         model = cell.robot(instant.robot).model
         number = model.joint_names.index(instant.joint)
         moved = {link for link in range(len(model.axes)) if model.drive(link).joint == number}
-        found = frozenset(body.name for body in own if body.link in moved and body.kind is Kind.LINK)
-        return found or frozenset(body.name for body in own if body.kind is Kind.LINK and not body.is_at_rest)
-    tools = frozenset(body.name for body in own if body.kind is Kind.TOOL)
-    return tools or frozenset(body.name for body in own if body.link == cell.robot(instant.robot).model.flange_link)
+        names = frozenset(body.name for body in bodies_of_robot if body.link in moved and body.kind is Kind.LINK)
+        return names or frozenset(
+            body.name for body in bodies_of_robot if body.kind is Kind.LINK and not body.is_at_rest
+        )
+    tools = frozenset(body.name for body in bodies_of_robot if body.kind is Kind.TOOL)
+    return tools or frozenset(
+        body.name for body in bodies_of_robot if body.link == cell.robot(instant.robot).model.flange_link
+    )
 
 
 def _material(body: SceneBody, *, marked: frozenset[str], involved: set[str | None] | None) -> str:
@@ -117,11 +121,11 @@ def _material(body: SceneBody, *, marked: frozenset[str], involved: set[str | No
 
 def materials(cell: Cell) -> Mapping[str, Colour]:
     """All colours by name."""
-    found = dict(GREYS)
+    greys = dict(GREYS)
     for name, colour in robot_colours(cell).items():
-        found[f"{ROBOT}{name}"] = Colour(light=mixed(colour, "#ffffff", 0.12), dark=mixed(colour, "#ffffff", 0.12))
-        found[f"{MUTED}{name}"] = Colour(light=mixed(colour, LIGHT_WASH, MUTING), dark=mixed(colour, DARK_WASH, MUTING))
-    return found
+        greys[f"{ROBOT}{name}"] = Colour(light=mixed(colour, "#ffffff", 0.12), dark=mixed(colour, "#ffffff", 0.12))
+        greys[f"{MUTED}{name}"] = Colour(light=mixed(colour, LIGHT_WASH, MUTING), dark=mixed(colour, DARK_WASH, MUTING))
+    return greys
 
 
 def _mark(
@@ -146,9 +150,9 @@ def _mark(
         number = robot.model.joint_names.index(instant.joint)
         link = next(k for k in range(len(robot.model.axes)) if robot.model.drive(k).joint == number)
         D = chains[robot.name].link_displacements(q[robot.name])[0, link + 1]
-        own = [solid for solid in solids if solid.material == MARKED]
+        marked = [solid for solid in solids if solid.material == MARKED]
         point = transform_points(D, robot.model.axes[link].point_B[None])
-        return (np.array([own[0].X_WS[:3, 3]]) if own else point), label
+        return (np.array([marked[0].X_WS[:3, 3]]) if marked else point), label
     return chains[instant.robot].tool_poses(q[instant.robot])[0][None, :3, 3], label
 
 
@@ -160,7 +164,7 @@ def _between(pair: Sequence[ShownSolid]) -> Array:
     for solid in pair:
         corners = facets(solid.shape, CONTACT_SIDES)
         surfaces.append(corners @ solid.X_WS[:3, :3].T + solid.X_WS[:3, 3])
-    clouds = [np.concatenate([each.mean(axis=1), each[:, 0]]) for each in surfaces]
+    clouds = [np.concatenate([surface.mean(axis=1), surface[:, 0]]) for surface in surfaces]
     sunk = [points[_inside(points, other)] for points, other in zip(clouds, reversed(surfaces), strict=True)]
     if any(map(len, sunk)):
         return np.concatenate(sunk).mean(axis=0)[None]
@@ -179,14 +183,14 @@ def _inside(points: Array, surface: Array) -> NDArray[np.bool_]:
 
 def _paths(cell: Cell, schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> list[ShownLine]:
     """The path of every task, where the part is."""
-    found = []
-    for each in schedule.tasks:
-        rows = np.unique(np.linspace(0, len(each.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
-        points = each.X_PT[rows, :3, 3]
-        if each.task.relative_to is Frame.PART:
+    paths = []
+    for task in schedule.tasks:
+        rows = np.unique(np.linspace(0, len(task.X_PT) - 1, PATH_POINTS).round().astype(np.intp))
+        points = task.X_PT[rows, :3, 3]
+        if task.task.relative_to is Frame.PART:
             points = transform_points(_part_pose(cell, chains, q), points)
-        found.append(ShownLine(points=points, material=f"{ROBOT}{each.task.robot}", width=3.2))
-    return found
+        paths.append(ShownLine(points=points, material=f"{ROBOT}{task.task.robot}", width=3.2))
+    return paths
 
 
 def _part_pose(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:
@@ -203,7 +207,7 @@ def _skeletons(
     """Robots without bodies as lines from axis to axis, and tools without bodies from the flange to their tips."""
     links = {body.robot for body in bodies if body.kind is Kind.LINK}
     tools = {body.robot for body in bodies if body.kind is Kind.TOOL}
-    found = []
+    skeletons = []
     for robot in cell.robots:
         flange = chains[robot.name].flange_poses(q[robot.name])[0][:3, 3]
         tip = chains[robot.name].tool_poses(q[robot.name])[0][:3, 3]
@@ -214,23 +218,23 @@ def _skeletons(
                 for link in robot.model.links_to_flange
             ]
             points = np.array([robot.X_WB[:3, 3], *axes, flange])
-            found.append(ShownLine(points=points, material=f"{ROBOT}{robot.name}", width=9.0))
+            skeletons.append(ShownLine(points=points, material=f"{ROBOT}{robot.name}", width=9.0))
         if robot.name not in tools and not robot.tool.is_bare:
-            found.append(ShownLine(points=np.array([flange, tip]), material="tool", width=6.0))
-    return found
+            skeletons.append(ShownLine(points=np.array([flange, tip]), material="tool", width=6.0))
+    return skeletons
 
 
 def _names(cell: Cell, solids: Sequence[ShownSolid], bodies: Sequence[SceneBody]) -> list[ShownName]:
     """Names of the robots, below what stands still of them."""
-    found = []
+    labels = []
     for robot in cell.robots:
         at = robot.X_WB[:3, 3].copy()
         for solid, body in zip(solids, bodies, strict=True):
             if body.robot == robot.name and body.is_at_rest:
                 down = solid.X_WS[:3, :3].T @ np.array([0.0, 0.0, -1.0])
                 at[2] = min(at[2], solid.X_WS[2, 3] - float(support(solid.shape, down)))
-        found.append(ShownName(text=robot.name, at=at))
-    return found
+        labels.append(ShownName(text=robot.name, at=at))
+    return labels
 
 
 def _floor(cell: Cell) -> float | None:

@@ -41,10 +41,10 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
     failures: list[tuple[str, str]] = []  # subject and message
     scene = Scene.from_cell(cell)
     try:
-        found = check(cell, scene=scene, progress=progress)
-        started = found.cell
-        failures += [(each.subject, each.message) for each in found.checks if not each.passed]
-        facts = [["start", (found.choice or "given").removeprefix("start ")]]
+        checked = check(cell, scene=scene, progress=progress)
+        started = checked.cell
+        failures += [(check.subject, check.message) for check in checked.checks if not check.passed]
+        facts = [["start", (checked.choice or "given").removeprefix("start ")]]
     except (InputError, NoSolutionError) as error:
         started = cell
         failures += [("", line) for line in str(error).splitlines()]
@@ -62,7 +62,7 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
 def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> Iterator[FailureRecord]:
     """Failures by subject and message, but for pairs that are known to touch."""
     index = {body["name"]: number for number, body in enumerate(record["bodies"])}
-    known = [set(each["bodies"]) for each in record["failures"]]
+    known = [set(failure["bodies"]) for failure in record["failures"]]
     for subject, message in failures:
         bodies = [index[name] for name in subject.split(" - ") if name in index]
         if set(bodies) not in known:

@@ -74,8 +74,8 @@ def _axis(robot: Robot, link: int) -> AxisRecord:
     return {
         "parent": axis.parent,
         "turns": axis.is_revolute,
-        "axis": [float(each) for each in axis.axis_B],
-        "point": [float(each) for each in axis.point_B],
+        "axis": [float(component) for component in axis.axis_B],
+        "point": [float(coordinate) for coordinate in axis.point_B],
         "joint": drive.joint,
         "ratio": float(drive.ratio),
         "offset": float(drive.offset),
@@ -84,7 +84,7 @@ def _axis(robot: Robot, link: int) -> AxisRecord:
 
 def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[BodyViewRecord]:
     """All bodies of a scene in its order."""
-    drawn = {robot.name: {each.link for each in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
+    drawn = {robot.name: {visual.link for visual in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
     replaced = {
         f"{robot.name}/{body.name}"
         for robot in cell.robots
@@ -92,7 +92,7 @@ def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries
         if body.link_name in drawn[robot.name]
     }
     geometries.announce([body.shape for body in bodies])
-    geometries.announce([each.shape for robot in drawn for each in geometries.visuals[robot]])
+    geometries.announce([visual.shape for robot in drawn for visual in geometries.visuals[robot]])
     return [
         {
             "name": body.name,
@@ -115,10 +115,10 @@ def visual_records(cell: Cell, geometries: Geometries) -> list[VisualRecord]:
     records: list[VisualRecord] = []
     for index, robot in enumerate(cell.robots):
         links = {link.name: link for link in robot.model.links}
-        for each in geometries.visuals_of(cell, robot.name):
-            if each.link in links:
-                link = links[each.link]
-                place, X_BS = geometries.place(each.shape), link.X_BL @ each.X_LS
+        for visual in geometries.visuals_of(cell, robot.name):
+            if visual.link in links:
+                link = links[visual.link]
+                place, X_BS = geometries.place(visual.shape), link.X_BL @ visual.X_LS
                 records.append({"robot": index, "link": link.index, "geometry": place, "pose": pose_numbers(X_BS)})
     return records
 
@@ -184,8 +184,8 @@ def path_points(cell: Cell, task: Task) -> Array:
 def excluded_records(scene: Scene) -> list[ExcludedRecord]:
     """Pairs of which less than the clearance is demanded, by reason: not watched ones, then those with another rule."""
     by_reason: dict[str, list[list[int]]] = {}
-    for each in scene.excluded:
-        by_reason.setdefault(each.reason, []).append([each.first, each.second])
+    for exclusion in scene.excluded:
+        by_reason.setdefault(exclusion.reason, []).append([exclusion.first, exclusion.second])
     for pair in scene.pairs:
         if pair.reason:
             by_reason.setdefault(pair.reason, []).append([pair.first, pair.second])

@@ -89,8 +89,8 @@ def mesh_record(mesh: Mesh, limit: int) -> GeometryRecord:
     steps = np.rint((drawn.points - low) / size * STEPS)
     rounding = float(np.linalg.norm(size / STEPS / 2))
     return {
-        "low": [float(each) for each in low],
-        "size": [float(each) for each in size],
+        "low": [float(coordinate) for coordinate in low],
+        "size": [float(length) for length in size],
         "points": packed(steps, "<u2"),
         "triangles": packed(drawn.triangles, "<u2" if len(drawn.points) <= STEPS + 1 else "<u4"),
         "deviation": point_numbers(np.array([drawn.deviation + rounding]))[0],

@@ -62,7 +62,7 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
     record = NearestRecord(
         step=round(float(np.diff(chosen).max(initial=0.0)), 6),
         required=stretches[0].scene.cell.checks.clearance_mm,
-        times=[round(float(each), 9) for each in chosen],
+        times=[round(float(time), 9) for time in chosen],
         pairs=[],
         distances=[],
         lower_bound=[],
@@ -70,9 +70,9 @@ def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: I
     )
     queries = SURFACES
     for stretch in stretches:
-        own = rows[(rows >= stretch.first) & (rows < stretch.end)]
-        if len(own):
-            queries = _search(stretch.scene, q[own], record, queries)
+        selected = rows[(rows >= stretch.first) & (rows < stretch.end)]
+        if len(selected):
+            queries = _search(stretch.scene, q[selected], record, queries)
     return record
 
 
@@ -92,22 +92,22 @@ class _ClosestSearch:
             if best is not None and bound >= best.distance:
                 break
             row = int(near.rows[place])
-            found = Closest(row, bound, near.first[place], near.second[place], _is_bound(self.scene, row, bound))
-            if found.is_bound and self.queries > 0:
-                found = self._of_surfaces(found, sample)
-            best = found if best is None or found.distance < best.distance else best
+            candidate = Closest(row, bound, near.first[place], near.second[place], _is_bound(self.scene, row, bound))
+            if candidate.is_bound and self.queries > 0:
+                candidate = self._of_surfaces(candidate, sample)
+            best = candidate if best is None or candidate.distance < best.distance else best
         return best
 
-    def _of_surfaces(self, found: Closest, sample: int) -> Closest:
+    def _of_surfaces(self, closest_pair: Closest, sample: int) -> Closest:
         """The same pair with the distance of its surfaces; as it was where they touch."""
-        solids = self.scene.pairs[found.row].solids
+        solids = self.scene.pairs[closest_pair.row].solids
         if solids is None:
-            return found
+            return closest_pair
         self.queries -= 1
         points = self.scene.engine.surface_points(*solids, self.poses, sample=sample)
         if points is None:
-            return found
-        return Closest(found.row, float(np.linalg.norm(points[1] - points[0])), *points, is_bound=False)
+            return closest_pair
+        return Closest(closest_pair.row, float(np.linalg.norm(points[1] - points[0])), *points, is_bound=False)
 
     def local(self, body: int, point: Array, sample: int) -> Array:
         """A point of the world in the frame of a body, shape (3,)."""
@@ -121,9 +121,9 @@ def _search(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
     """Add the closest pair at some configurations, shape (K, nq); gives the surface queries that are left."""
     counted = np.array([_counts(scene, pair) for pair in scene.pairs], dtype=bool)
     search = _ClosestSearch(scene, scene.body_poses(q), queries)
-    found: dict[int, Closest] = {}
+    closest_pairs: dict[int, Closest] = {}
     for within in WITHIN:
-        left = np.array([sample for sample in range(len(q)) if sample not in found], dtype=np.intp)
+        left = np.array([sample for sample in range(len(q)) if sample not in closest_pairs], dtype=np.intp)
         if not len(left):
             break
         near = scene.near(q[left], within)
@@ -131,21 +131,21 @@ def _search(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
             places = np.flatnonzero((near.samples == place) & counted[near.rows])
             closest = search.closest(sample, near, places)
             if closest is not None and closest.distance < within:
-                found[sample] = closest
+                closest_pairs[sample] = closest
     for sample in range(len(q)):
-        _add(record, search, sample, found.get(sample))
+        _add(record, search, sample, closest_pairs.get(sample))
     return search.queries
 
 
-def _add(record: NearestRecord, search: _ClosestSearch, sample: int, found: Closest | None) -> None:
+def _add(record: NearestRecord, search: _ClosestSearch, sample: int, closest_pair: Closest | None) -> None:
     """Add what was found at a configuration."""
-    pair = None if found is None else search.scene.pairs[found.row]
+    pair = None if closest_pair is None else search.scene.pairs[closest_pair.row]
     record["pairs"].append([] if pair is None else [pair.first, pair.second])
-    record["distances"].append(0.0 if found is None else round(MM * found.distance, DECIMALS) + 0.0)
-    record["lower_bound"].append(found is not None and found.is_bound)
+    record["distances"].append(0.0 if closest_pair is None else round(MM * closest_pair.distance, DECIMALS) + 0.0)
+    record["lower_bound"].append(closest_pair is not None and closest_pair.is_bound)
     points: list[float] = []
-    if found is not None and pair is not None:
-        ends = ((pair.first, found.first), (pair.second, found.second))
+    if closest_pair is not None and pair is not None:
+        ends = ((pair.first, closest_pair.first), (pair.second, closest_pair.second))
         points = point_numbers(np.stack([search.local(body, point, sample) for body, point in ends]))
     record["points"].append(points)
 
@@ -153,7 +153,7 @@ def _add(record: NearestRecord, search: _ClosestSearch, sample: int, found: Clos
 def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
     """Pairs that must not touch but do, at one configuration of shape (nq,); tools at work on the part are left out."""
     near, poses = scene.near(q[None], 0.0), scene.body_poses(q[None])
-    kept = []
+    touching = []
     for row in near.rows:
         pair = scene.pairs[row]
         if pair.rule in CUT:
@@ -164,8 +164,8 @@ def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
             first, second = pair.solids or (pair.first, pair.second)
             touches = scene.engine.touch(first, second, poses, sample=0)
         if touches:
-            kept.append((pair.first, pair.second))
-    return kept
+            touching.append((pair.first, pair.second))
+    return touching
 
 
 def _counts(scene: Scene, pair: ScenePair) -> bool:

@@ -233,12 +233,12 @@ class ViewRecord(TypedDict):
 
 def pose_numbers(X: Array) -> Numbers:
     """A pose of shape (4, 4) as twelve numbers, row by row."""
-    return [each + 0.0 for each in np.round(X[:3], POSE_DECIMALS).ravel().tolist()]
+    return [number + 0.0 for number in np.round(X[:3], POSE_DECIMALS).ravel().tolist()]
 
 
 def point_numbers(points: Array) -> Numbers:
     """Points of shape (..., 3) as x, y, z one after the other."""
-    return [each + 0.0 for each in np.round(points, POINT_DECIMALS).ravel().tolist()]
+    return [number + 0.0 for number in np.round(points, POINT_DECIMALS).ravel().tolist()]
 
 
 def packed(values: np.ndarray[Any, Any], kind: str) -> str:
@@ -269,7 +269,7 @@ def _about(record: ViewRecord) -> Iterator[str]:
         )
     else:
         yield "Bodies are those of the proof."
-    deviation = max((each.get("deviation", 0.0) for each in record["geometries"]), default=0.0)
+    deviation = max((geometry.get("deviation", 0.0) for geometry in record["geometries"]), default=0.0)
     if deviation > 0.0:
         yield f"Meshes are drawn nowhere farther than {MM * deviation:.2g} mm from their files."
     scene = record["scenes"][0]
@@ -290,7 +290,7 @@ def _about(record: ViewRecord) -> Iterator[str]:
     elif motion["count"] > 1:
         yield "Nothing is certified here; the curve over the time line is that of the computed distances."
     yield "The closest pair is one of those that are to keep a clearance and move against each other."
-    if any(each for one in record["scenes"] for each in one["nearest"]["lower_bound"]):
+    if any(bound for one in record["scenes"] for bound in one["nearest"]["lower_bound"]):
         yield "A distance after ≥ is that of convex hulls, never above the true one."
 
 

@@ -55,7 +55,7 @@ class Played:
     times: Array  # times of its rows on the clock of the program in [s], shape (N,)
     q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
     kept_times: Array  # times on the clock of the program for which the report certifies a distance in [s], shape (M,)
-    kept: Array  # what all pairs keep about each of them in [mm], shape (M,); what is not finite is not known
+    distances: Array  # what all pairs keep about each of them in [mm], shape (M,); what is not finite is not known
 
 
 def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:
@@ -76,7 +76,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     index = {body.name: number for number, body in enumerate(bodies)}
     contacts = list(_contacts(stored, played, index))
     failures = list(_failures(stored, played, cell, index))
-    further: list[float | None] = [each for contact in contacts for each in (contact["first"], contact["last"])]
+    further: list[float | None] = [time for contact in contacts for time in (contact["first"], contact["last"])]
     further += [failure["at"] for failure in failures]
     further += [at for one in played for at in _worst_times(stored.records[one.place], one.begin)]
     ends = [*firsts[1:], len(times)]
@@ -137,18 +137,18 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
         if phase["name"] not in read:
             file = stored.file("", "report.json")
             raise InputError(f"{file}: phases: expected the runs {', '.join(read)}, got '{phase['name']}'")
-        begin, own = float(phase["begin_s"]), read[phase["name"]]
-        shifted = {key: begin + own[key] for key in ("times", "kept_times")}
+        begin, read_phase = float(phase["begin_s"]), read[phase["name"]]
+        shifted = {key: begin + read_phase[key] for key in ("times", "kept_times")}
         number = labels.index(phase["name"]) if phase["name"] in labels else 0
-        yield Played(name=phase["name"], place=phase["name"], begin=begin, number=number, **(own | shifted))
+        yield Played(name=phase["name"], place=phase["name"], begin=begin, number=number, **(read_phase | shifted))
 
 
 def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
     """Times and stacked joint positions of one run and what it keeps of distances, from its series."""
     tree, file = stored.series(place), stored.file(place, SERIES)
     times, q = _positions(tree, file, cell)
-    kept_times, kept = _kept_distances(tree.get("clearance", {}), file)
-    return {"times": times, "q": q, "kept_times": kept_times, "kept": kept}
+    kept_times, distances = _kept_distances(tree.get("clearance", {}), file)
+    return {"times": times, "q": q, "kept_times": kept_times, "distances": distances}
 
 
 def stored_series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
@@ -195,7 +195,7 @@ def _phases(record: Record) -> list[dict[str, Any]]:
     phases = record["phases"]
     if len(phases) < 2:
         return []
-    return [{"name": each["name"], "begin": each["begin_s"], "end": each["end_s"]} for each in phases]
+    return [{"name": phase["name"], "begin": phase["begin_s"], "end": phase["end_s"]} for phase in phases]
 
 
 def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceRecord]:
@@ -210,10 +210,13 @@ def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceR
 
 def _certified(played: Sequence[Played]) -> ClearanceCurveRecord:
     """The smallest distance of all classes over time, as the runs certify it."""
-    times, kept = np.concatenate([one.kept_times for one in played]), np.concatenate([one.kept for one in played])
+    times, distances = (
+        np.concatenate([one.kept_times for one in played]),
+        np.concatenate([one.distances for one in played]),
+    )
     return {
         "times": np.round(times, TIME_DECIMALS).tolist(),
-        "distances": [plain(each) for each in np.round(kept, DISTANCE_DECIMALS).tolist()],
+        "distances": [plain(distance) for distance in np.round(distances, DISTANCE_DECIMALS).tolist()],
     }
 
 
@@ -222,13 +225,13 @@ def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
     try:
         classes = [np.array(values, dtype=np.float64) for name, values in tree.items() if name != "times_s"]
         times = np.array(tree["times_s"] if tree else [], dtype=np.float64)
-        kept = np.fmin.reduce([np.full(times.shape, np.inf), *classes])
-        is_sound = times.ndim == 1 and times.shape == kept.shape and bool(np.all(np.isfinite(times)))
+        distances = np.fmin.reduce([np.full(times.shape, np.inf), *classes])
+        is_sound = times.ndim == 1 and times.shape == distances.shape and bool(np.all(np.isfinite(times)))
     except (AttributeError, KeyError, TypeError, ValueError):
         is_sound = False
     if not is_sound:
         raise InputError(f"{file}: clearance: expected times and as many distances of each class, got something else")
-    return times, kept
+    return times, distances
 
 
 def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]) -> Iterator[ContactViewRecord]:
@@ -249,7 +252,7 @@ def _failures(
     stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]
 ) -> Iterator[FailureRecord]:
     """Checks that failed, on the clock of the program, in the order of their times; those without one come last."""
-    found: list[FailureRecord] = []
+    failures: list[FailureRecord] = []
     seen = set[str]()
     for one in played:
         for check in stored.records[one.place]["checks"]:
@@ -257,7 +260,7 @@ def _failures(
                 continue
             seen.add(one.place + check["message"])
             prefix = f"{one.name}: " if one.place else ""
-            found.append(
+            failures.append(
                 {
                     "text": f"{prefix}{check['message']}",
                     "at": None if check["at_s"] is None else one.begin + check["at_s"],
@@ -265,7 +268,7 @@ def _failures(
                     "joint": _joint(check["subject"], cell),
                 }
             )
-    yield from sorted(found, key=lambda each: math.inf if each["at"] is None else each["at"])
+    yield from sorted(failures, key=lambda failure: math.inf if failure["at"] is None else failure["at"])
 
 
 def _named(check: Record, record: Record, index: dict[str, int]) -> list[int]:
@@ -279,17 +282,17 @@ def _named(check: Record, record: Record, index: dict[str, int]) -> list[int]:
 def _joint(subject: str, cell: Cell) -> list[int]:
     """Numbers of the robot and the joint that a check is about."""
     robot, _, joint = subject.partition("/")
-    for place, each in enumerate(cell.robots):
-        if each.name == robot and joint in each.model.joint_names:
-            return [place, each.model.joint_names.index(joint)]
+    for place, candidate in enumerate(cell.robots):
+        if candidate.name == robot and joint in candidate.model.joint_names:
+            return [place, candidate.model.joint_names.index(joint)]
     return []
 
 
 def _worst_times(record: Record, begin: float) -> Iterator[float]:
     """Times of the smallest distance of each class."""
-    for each in record["clearance"].values():
-        if each["at_s"] is not None:
-            yield begin + each["at_s"]
+    for minimum in record["clearance"].values():
+        if minimum["at_s"] is not None:
+            yield begin + minimum["at_s"]
 
 
 def _facts(record: Record) -> list[list[str]]:

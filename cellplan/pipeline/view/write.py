@@ -147,9 +147,9 @@ def write_view(record: ViewRecord, target: Path) -> int:
 def _view_of_run(request: ViewRequest, progress: Progress) -> ViewRecord:
     """The record of a run on disk."""
     stored = read_stored_run(request.path)
-    found = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs)
+    stored_cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs)
     progress("making the 3-D page", 0.0)
-    return _record_of_run(stored, found.cell)
+    return _record_of_run(stored, stored_cell.cell)
 
 
 def _record_of_run(stored: StoredRun, cell: Cell) -> ViewRecord:

@@ -44,9 +44,9 @@ class BatchTasks:
         constraints = TaskConstraints.of(cell, tasks, moving)
         self._robots, self._holder, self._X_CP = constraints.operators, constraints.carrier, cell.part.X_CP
         self._is_on_part, self._is_spin_free = constraints.is_on_part, constraints.is_spin_free
-        self._kept = constraints.kept.T[:, :, None].astype(float)
+        self._constrained = constraints.constrained.T[:, :, None].astype(float)
         self._is_whole = constraints.is_whole
-        self._own, self._share = constraints.operator_signs[:, None], constraints.carrier_signs[:, None]
+        self._operator_signs, self._share = constraints.operator_signs[:, None], constraints.carrier_signs[:, None]
         joints = 0 if self._holder is None else len(cell.robots[self._holder].model.joints)
         self._own_columns = self.chains.columns[:, self._robots]
         self._shared_columns = self.chains.columns[:joints, self._holder or 0]
@@ -82,9 +82,9 @@ class BatchTasks:
         arrow = ArrowInverse(
             columns[:, :, :count],
             columns[:, : len(shared), count:] * (self._share * shared),
-            mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._own,
+            mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._operator_signs,
             coupling_weights=weights[self._shared_columns],
-            idle=1.0 - self._kept + damping * self._kept,
+            idle=1.0 - self._constrained + damping * self._constrained,
             is_given=self._is_given[self._shared_columns],
         )
         rows = seen.R_WR if self._is_whole else None
@@ -113,7 +113,7 @@ class BatchTasks:
 
     def unstacked(self, everything: Array) -> tuple[Array, Array]:
         """The parts of stacked joint vectors, shape (nq, batch), that belong to each task and to all of them."""
-        return _padded(everything)[self._own_columns] * self._own, everything[self._shared_columns]
+        return _padded(everything)[self._own_columns] * self._operator_signs, everything[self._shared_columns]
 
     def _seen(self, state: BatchState) -> ToolPoses:
         """The tools as the tasks see them."""
@@ -145,7 +145,7 @@ class BatchTasks:
             z, goal = seen.R[:, 2, free], X[:3, 2, free]
             across_tool = np.einsum("jitb,jtb->itb", X[:3, :3, free], _cross(z, goal))
             errors[3:, free] = _rotation(across_tool, np.einsum("itb,itb->tb", z, goal))
-        return errors if self._is_whole else errors * self._kept
+        return errors if self._is_whole else errors * self._constrained
 
     def _twists(self, X: Array, V: Array) -> Array:
         """Desired twists of the constrained components, in the frames of `errors`, shape (6, tasks, batch)."""
@@ -154,7 +154,7 @@ class BatchTasks:
         twists = V.copy()
         free = self._is_spin_free
         twists[3:, free] = np.einsum("jitb,jtb->itb", X[:3, :3, free], twists[3:, free])
-        twists *= self._kept
+        twists *= self._constrained
         return twists
 
     def _columns(self, state: BatchState, seen: ToolPoses, X: Array) -> Array:
@@ -186,7 +186,7 @@ class BatchTasks:
         for half in (slice(None, len(free)), slice(len(free), None)):
             rows[:3, :, half] = np.einsum("jitb,jltb->iltb", R, columns[:3, :, half])
             rows[3:, :, half] = np.einsum("jitb,jltb->iltb", turned, columns[3:, :, half])
-            rows[:, :, half] *= self._kept[:, None]
+            rows[:, :, half] *= self._constrained[:, None]
         return rows
 
 

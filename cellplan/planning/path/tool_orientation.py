@@ -107,7 +107,7 @@ def _unit(axes: Array) -> Array:
     return axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
-def _room(z: Array, direction: Array) -> Array:
+def _sines(z: Array, direction: Array) -> Array:
     """Lower bound of the angle in [rad] between a direction and a moving axis, at each axis and just after it.
 
     Between two neighbours the axis is within half of their angle of the nearer one.
@@ -120,10 +120,10 @@ def _room(z: Array, direction: Array) -> Array:
 
 def _refuse_parallel(z: Array, p: Array, task: Task) -> None:
     """Refuse a ``tool_x`` that runs along the tool axis somewhere, and name the best direction instead."""
-    distance = _room(z, task.tool_x)
+    distance = _sines(z, task.tool_x)
     k = int(np.argmin(distance))
     if distance[k] < PARALLEL:
-        best = max(_CHOICES, key=lambda choice: (round(float(_room(z, choice).min()), 6), float(choice.sum())))
+        best = max(_CHOICES, key=lambda choice: (round(float(_sines(z, choice).min()), 6), float(choice.sum())))
         place = f" at {in_mm(p[k])}" if len(z) > 1 else ""
         raise InputError(
             f"{task.where('tool_x')}: expected a direction across the tool axis, but "

@@ -15,7 +15,7 @@ CLOSED: Final = 1e-7  # [m, rad] within which the tool is on the line
 ITERATIONS: Final = 12
 LONGEST_MOVE: Final = 0.15  # [rad, m] of a joint from one configuration to the next: more is near a singularity
 DAMPING: Final = 1e-5  # of the normal equations, in shares of their largest entry
-KEPT: Final = (6, 5, 3)  # components that are kept: all, all but the turn about the tool's axis, the place only
+COUNTS: Final = (6, 5, 3)  # components that are kept: all, all but the turn about the tool's axis, the place only
 TILT: Final = 0.4  # [-] tangent of the angle between the tool's axis and the directions tried beside it
 
 
@@ -76,7 +76,7 @@ class Lines:
             words: The direction in words.
             longest: Length in [m] at which it ends at the latest.
         """
-        for count in KEPT:
+        for count in COUNTS:
             q = self._followed(robot, direction, longest, count)
             if len(q) > 1:
                 return RetractLine(robot=robot, lengths=np.arange(len(q), dtype=np.float64) * STEP, q=q, words=words)

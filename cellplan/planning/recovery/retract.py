@@ -168,7 +168,7 @@ def _fault(growth: Growth, scene: Scene, q: Array, near: Sequence[int]) -> str:
     if growth.faults:
         (first, second), what = growth.faults[0]
         return f"is not free: '{first}' to '{second}' {what}"
-    if not growth.kept.is_kept:
+    if not growth.bound.is_kept:
         others = [row for row in range(len(scene.pairs)) if row not in set(near)]
         bound = certify(scene_of_rows(scene, others), q, with_curves=False)
         pairs = [pair for pair in bound.pairs if not pair.is_kept]

@@ -18,7 +18,7 @@ STEPS_BETWEEN_BREAKS: Final = 12  # [-] intervals of integration between two bre
 FEWEST_STEPS: Final = 2000  # [-] intervals of integration of a whole path
 REST_SHARE: Final = 1e-6  # [-] of the largest speed over the nominal time: a slower path is at rest
 KINK: Final = 1e-3  # [-] change of the unit direction of the path at a break: a larger one is a corner
-BESIDE: Final = 3e-9  # [s] behind a break: its later side
+BEHIND: Final = 3e-9  # [s] behind a break: its later side
 HALVINGS: Final = 60  # of an interval: down to the last digit
 
 
@@ -100,14 +100,14 @@ def _stretch(path: JointPath, scale: Array, sigma: Array) -> Stretch:
     speeds = np.linalg.norm(path.at(inside, 1) * scale, axis=1).reshape(-1, 3)
     lengths = np.append(0.0, np.cumsum(0.5 * width * (speeds @ weights)))
     rates = np.linalg.norm(path.at(sigma, 1) * scale, axis=1)
-    rates[0] = np.linalg.norm(path.at(sigma[:1] + BESIDE, 1) * scale)
+    rates[0] = np.linalg.norm(path.at(sigma[:1] + BEHIND, 1) * scale)
     return Stretch(path=path, scale=scale, sigma=sigma, lengths=lengths, rates=rates)
 
 
 def _kinks(path: JointPath, scale: Array) -> Sequence[int]:
     """Numbers of the inner breaks at which the direction of the path jumps."""
     inner = path.breaks[1:-1]
-    before, after = path.at(inner, 1) * scale, path.at(inner + BESIDE, 1) * scale
+    before, after = path.at(inner, 1) * scale, path.at(inner + BEHIND, 1) * scale
     speeds = np.minimum(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
     is_slow = speeds <= REST_SHARE * speeds.max(initial=0.0)
     safe = np.where(is_slow, 1.0, speeds)[:, None]

@@ -14,12 +14,12 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.joint_path import JointPath
-from cellplan.planning.timing.kept_rates import (
+from cellplan.planning.timing.fixed_rates import (
     FEWEST_STEPS,
     RATES,
-    AtKeptRate,
+    AtFixedRate,
     AtRest,
-    KeptRate,
+    FixedRate,
     least_steps,
     spans_within,
     whole_steps,
@@ -86,7 +86,7 @@ class Retimer:
     step: float  # time between two rows in [s]
     feed_share: Callable[[Array], Array]
     slower: Slower
-    kept: tuple[KeptRate, ...] = ()  # where the rate of the nominal time is demanded
+    fixed_rates: tuple[FixedRate, ...] = ()  # where the rate of the nominal time is demanded
     errors: StepTolerance | None = None
 
     def fastest(self, path: JointPath) -> RetimedPath:
@@ -98,7 +98,7 @@ class Retimer:
         made: list[tuple[int, Rows]] = []
         rest = 0.0
         for piece in stretches(path, self.bounds.velocity):
-            made += [*self._rest(rest, float(piece.sigma[0])), self._kept(piece) or self._settled(piece)]
+            made += [*self._rest(rest, float(piece.sigma[0])), self._at_fixed_rate(piece) or self._settled(piece)]
             rest = float(piece.sigma[-1])
         made += self._rest(rest, path.end)
         retimed = RetimedPath(
@@ -122,23 +122,23 @@ class Retimer:
         Where errors between rows count, a rest takes a step at least: in a step into it or out of it the nominal time
         would run ahead of the joints.
         """
-        spans = spans_within(self.kept, begin, end)
+        spans = spans_within(self.fixed_rates, begin, end)
         waits = AtRest(begin, end, spans)
         takes_steps = len(spans) or (self.errors is not None and end - begin > MARGIN)
         return [(whole_steps(waits.seconds, self.step), waits)] if takes_steps else []
 
-    def _kept(self, piece: Stretch) -> tuple[int, Rows] | None:
+    def _at_fixed_rate(self, piece: Stretch) -> tuple[int, Rows] | None:
         """The motion of one stretch with the demanded rates; None where nothing is demanded, or limits forbid it."""
         begin, end = float(piece.sigma[0]), float(piece.sigma[-1])
-        spans = spans_within(self.kept, begin, end)
+        spans = spans_within(self.fixed_rates, begin, end)
         spans = spans[np.diff(spans, axis=1)[:, 0] > FEWEST_STEPS * self.step]
         if not len(spans):
             return None
         left = min(
-            fixed_rate.tolerance for fixed_rate in self.kept if fixed_rate.begin < end and fixed_rate.end > begin
+            fixed_rate.tolerance for fixed_rate in self.fixed_rates if fixed_rate.begin < end and fixed_rate.end > begin
         )
         for share in RATES:
-            motion = AtKeptRate(piece, spans, 1.0 - left * (1.0 - share), self.step)
+            motion = AtFixedRate(piece, spans, 1.0 - left * (1.0 - share), self.step)
             count = least_steps(motion, lambda sigma: self.slower(sigma, piece.path.at(sigma)) <= 1.0)
             if count is not None:
                 return count, motion

@@ -224,7 +224,7 @@ class TrackingProblem:
         A tool that is still on its way to the path is not lost. With a joint that fails the report is to say how far
         the others get.
         """
-        distances = np.linalg.norm(error[:, :3] * self.constraints.kept[:, :3], axis=1)
+        distances = np.linalg.norm(error[:, :3] * self.constraints.constrained[:, :3], axis=1)
         is_lost = (distances >= self._lost) & (self.times[k] >= self._settled) & (not self.cell.motion.locked)
         if not is_lost.any() and np.isfinite(error.sum()):
             return

@@ -34,7 +34,7 @@ class TaskConstraints:
         carrier: Index of the positioner that carries the part frame; None for a part at a fixed pose.
         is_on_part: Whether R is the part frame P rather than the world frame W, shape (tasks,).
         is_spin_free: Whether the rotation about the tool's own axis is left open, shape (tasks,).
-        kept: Which of the six components are constrained, shape (tasks, 6).
+        constrained: Which of the six components are constrained, shape (tasks, 6).
         operator_signs: ``s_i``, 1 or 0, shape (tasks,).
         carrier_signs: ``c_i``, -1, 0 or 1, shape (tasks,).
         may_move: 1 for the joints of robots that may move, 0 for all others, shape (nq,).
@@ -46,7 +46,7 @@ class TaskConstraints:
     carrier: int | None
     is_on_part: NDArray[np.bool_]
     is_spin_free: NDArray[np.bool_]
-    kept: NDArray[np.bool_]
+    constrained: NDArray[np.bool_]
     operator_signs: Array
     carrier_signs: Array
     may_move: Array
@@ -71,7 +71,7 @@ class TaskConstraints:
             carrier=cell.carrier,
             is_on_part=is_on_part,
             is_spin_free=np.array([task.is_spin_free for task in tasks], dtype=bool),
-            kept=np.array([kept_components(task) for task in tasks], dtype=bool).reshape(-1, 6),
+            constrained=np.array([constrained_components(task) for task in tasks], dtype=bool).reshape(-1, 6),
             operator_signs=np.where(is_carrier, 0.0, 1.0),
             carrier_signs=is_carrier.astype(float) - is_on_part,
             may_move=may_move,
@@ -82,7 +82,7 @@ class TaskConstraints:
     @property
     def is_whole(self) -> bool:
         """Whether every task constrains all six components, so that no rows need to be picked."""
-        return bool(self.kept.all())
+        return bool(self.constrained.all())
 
     def column_signs(self, carries_flange: NDArray[np.bool_]) -> Array:
         """Sign of each joint in each task: +1 where it moves the tool, -1 where it moves the part, 0 elsewhere.
@@ -104,7 +104,7 @@ class TaskConstraints:
         return np.where(self.is_on_part[:, None, None], X_WP, np.eye(4))
 
 
-def kept_components(task: Relation) -> NDArray[np.bool_]:
+def constrained_components(task: Relation) -> NDArray[np.bool_]:
     """Which components a task constrains, shape (6,); with free spin the two rotations across the tool axis."""
     is_constrained = np.isin(np.arange(6), task.axes)
     if task.is_spin_free:
@@ -123,4 +123,4 @@ def constraint_rows(task: Relation, X_RT: Array) -> Array:
     to_frames[:, :3, :3] = to_frames[:, 3:, 3:] = np.eye(3)
     if task.is_spin_free:
         to_frames[:, 3:, 3:] = np.swapaxes(X_RT[:, :3, :3], 1, 2)
-    return np.ascontiguousarray(to_frames[:, kept_components(task)])
+    return np.ascontiguousarray(to_frames[:, constrained_components(task)])

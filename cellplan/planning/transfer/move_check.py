@@ -69,7 +69,7 @@ class MoveCheck:
         moved = rows_moved_by(scene, robot)
         self._rows = [row for row in moved if scene.pairs[row].is_ground or scene.pairs[row].solids is not None]
         self._ends = np.array([_ends(scene, row) for row in self._rows], dtype=np.intp).reshape(-1, 2)
-        self._own = _own_bodies(scene, robot)
+        self._robot_bodies = _own_bodies(scene, robot)
         self._demands = np.array([_demand(scene, row) for row in self._rows])
         self._needs = self._demands + reserve
         self._levers = lever_matrix(scene, robot, self._ends)
@@ -188,8 +188,8 @@ class MoveCheck:
         for index in np.unique(self._ends[places]).tolist():
             if index < 0:
                 continue
-            if index in self._own:
-                X = D[:, self._own[index][0]] @ self._own[index][1]
+            if index in self._robot_bodies:
+                X = D[:, self._robot_bodies[index][0]] @ self._robot_bodies[index][1]
                 R, p = X[:, :3, :3], X[:, :3, 3]
             else:
                 R, p = others.R[index][moments], others.p[index][moments]

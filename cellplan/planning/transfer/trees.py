@@ -58,7 +58,7 @@ class Tree:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Found:
+class Connection:
     """What a search came to."""
 
     way: Array | None  # via points in [rad] or [m] from start to goal, shape (K, n); None where none was found
@@ -74,7 +74,7 @@ def connected(
     drawn: int,
     rng: np.random.Generator,
     tick: Callable[[float], object],
-) -> Found:
+) -> Connection:
     """A way between two configurations.
 
     Args:
@@ -99,8 +99,8 @@ def connected(
             way = trees[0].way_to(ahead) + trees[1].way_to(back)[-2::-1]
             path = np.array(way) * scale
             path[0], path[-1] = start, goal
-            return Found(way=path, reached=(trees[0].count, trees[1].count))
-    return Found(way=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
+            return Connection(way=path, reached=(trees[0].count, trees[1].count))
+    return Connection(way=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

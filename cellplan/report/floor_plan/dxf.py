@@ -52,8 +52,8 @@ def floor_plan_dxf(plan: FloorPlan) -> str:
     _draw_areas(space, plan)
     _draw_bodies(space, plan, height)
     _draw_bases(space, plan, height)
-    for number, each in enumerate(plan.dimensions):
-        _draw_dimension(document, each, corner=low - 3.0 * height, height=height, number=number)
+    for number, dimension in enumerate(plan.dimensions):
+        _draw_dimension(document, dimension, corner=low - 3.0 * height, height=height, number=number)
     words = f"Floor plan of {plan.cell}: {plan.state}; lengths in mm"
     _text(space, NAMES, words, at=np.array([low[0], high[1] + 2.0 * height]), height=height)
     stream = StringIO()
@@ -124,11 +124,11 @@ def _draw_areas(space: "Modelspace", plan: FloorPlan) -> None:
 def _draw_bodies(space: "Modelspace", plan: FloorPlan, height: float) -> None:
     """Outlines of all bodies, and the paths."""
     colours = {robot.name: {"true_color": int(robot.colour[1:], 16)} for robot in plan.robots}
-    for each in plan.outlines:
-        of_robot = colours[each.robot] if each.robot is not None and each.layer is Layer.ROBOTS else {}
-        _closed(space, each.corners, {"layer": str(each.layer), **of_robot})
-        if each.layer is Layer.SURROUNDINGS:
-            _text(space, NAMES, each.name, at=each.corners.mean(axis=0), height=0.7 * height)
+    for outline in plan.outlines:
+        of_robot = colours[outline.robot] if outline.robot is not None and outline.layer is Layer.ROBOTS else {}
+        _closed(space, outline.corners, {"layer": str(outline.layer), **of_robot})
+        if outline.layer is Layer.SURROUNDINGS:
+            _text(space, NAMES, outline.name, at=outline.corners.mean(axis=0), height=0.7 * height)
     for path in plan.paths:
         space.add_lwpolyline(_points(path.points), dxfattribs={"layer": str(Layer.PATHS), **colours[path.robot]})
 
@@ -137,18 +137,18 @@ def _draw_bases(space: "Modelspace", plan: FloorPlan, height: float) -> None:
     """A point at each base, the direction of its x axis, its name and its coordinates."""
     for robot in plan.robots:
         attributes = {"layer": str(Layer.ROBOTS), "true_color": int(robot.colour[1:], 16)}
-        space.add_point([_number(each) for each in robot.base], dxfattribs=attributes)
+        space.add_point([_number(coordinate) for coordinate in robot.base], dxfattribs=attributes)
         yaw = np.radians(robot.yaw_deg)
         toward = robot.base[:2] + 3.0 * height * np.array([np.cos(yaw), np.sin(yaw)])
         space.add_line(_point(robot.base[:2]), _point(toward), dxfattribs=attributes)
-        x, y, z = (_number(each) for each in robot.base)
+        x, y, z = (_number(coordinate) for coordinate in robot.base)
         lines = (robot.name, f"x {x:g} y {y:g} z {z:g} yaw {robot.yaw_deg:g} deg")
         for number, words in enumerate(lines):
             at = robot.base[:2] + height * np.array([0.6, -1.6 - 1.3 * number])
             _text(space, NAMES, words, at=at, height=(0.7 if number else 1.0) * height)
 
 
-def _draw_dimension(document: "Drawing", each: Dimension, *, corner: Array, height: float, number: int) -> None:
+def _draw_dimension(document: "Drawing", dimension: Dimension, *, corner: Array, height: float, number: int) -> None:
     """A DIMENSION below or left of the plan, with the lines and the text that show it as its block.
 
     Args:
@@ -156,12 +156,12 @@ def _draw_dimension(document: "Drawing", each: Dimension, *, corner: Array, heig
         height: Height of texts.
         number: Number of the dimension.
     """
-    along, across = np.eye(2)[[each.axis, 1 - each.axis]]
-    at = float(corner @ across) - 3.0 * height * each.row
-    first, second = (place * along + at * across for place in (each.first, each.second))
-    middle = 0.5 * (first + second) + 0.9 * height * across * (1.0 if each.axis == 0 else -1.0)
+    along, across = np.eye(2)[[dimension.axis, 1 - dimension.axis]]
+    at = float(corner @ across) - 3.0 * height * dimension.row
+    first, second = (place * along + at * across for place in (dimension.first, dimension.second))
+    middle = 0.5 * (first + second) + 0.9 * height * across * (1.0 if dimension.axis == 0 else -1.0)
     block = document.blocks.new(f"*D{number + 1}")
-    _fill_block(block, each, ends=(first, second), middle=middle, height=height)
+    _fill_block(block, dimension, ends=(first, second), middle=middle, height=height)
     document.modelspace().new_entity(
         "DIMENSION",
         {
@@ -173,33 +173,33 @@ def _draw_dimension(document: "Drawing", each: Dimension, *, corner: Array, heig
             "defpoint2": _point(first),
             "defpoint3": _point(second),
             "text_midpoint": _point(middle),
-            "angle": 0.0 if each.axis == 0 else 90.0,
-            "text": _length(each),
-            "actual_measurement": _number(each.length),
+            "angle": 0.0 if dimension.axis == 0 else 90.0,
+            "text": _length(dimension),
+            "actual_measurement": _number(dimension.length),
         },
     )
 
 
 def _fill_block(
-    block: "BlockLayout", each: Dimension, *, ends: tuple[Array, Array], middle: Array, height: float
+    block: "BlockLayout", dimension: Dimension, *, ends: tuple[Array, Array], middle: Array, height: float
 ) -> None:
     """Line, ticks and text of a dimension."""
     attributes = {"layer": str(Layer.DIMENSIONS)}
-    along, across = np.eye(2)[[each.axis, 1 - each.axis]]
+    along, across = np.eye(2)[[dimension.axis, 1 - dimension.axis]]
     block.add_line(_point(ends[0]), _point(ends[1]), dxfattribs=attributes)
     for end in ends:
         block.add_line(_point(end - TICK * height * across), _point(end + 2.0 * height * across), dxfattribs=attributes)
         slant = TICK * height * (along + across)
         block.add_line(_point(end - slant), _point(end + slant), dxfattribs=attributes)
-    turn = 0.0 if each.axis == 0 else 90.0
-    text = block.add_text(_length(each), height=_number(height), rotation=turn, dxfattribs=attributes)
+    turn = 0.0 if dimension.axis == 0 else 90.0
+    text = block.add_text(_length(dimension), height=_number(height), rotation=turn, dxfattribs=attributes)
     text.dxf.halign, text.dxf.valign = 4, 0  # its middle is where it is put
     text.dxf.insert = text.dxf.align_point = _point(middle)
 
 
-def _length(each: Dimension) -> str:
+def _length(dimension: Dimension) -> str:
     """Length of a dimension as text."""
-    return f"{each.length:.1f}".removesuffix(".0")
+    return f"{dimension.length:.1f}".removesuffix(".0")
 
 
 def _ends(wall: PlanWall, low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -222,12 +222,12 @@ def _text(space: "Modelspace", layer: str, words: str, *, at: Array, height: flo
 
 def _points(line: Array) -> list[tuple[float, float]]:
     """Points of a line, those that are one once."""
-    found: list[tuple[float, float]] = []
+    points: list[tuple[float, float]] = []
     for point in line:
         place = _point(point)
-        if not found or found[-1] != place:
-            found.append(place)
-    return found
+        if not points or points[-1] != place:
+            points.append(place)
+    return points
 
 
 def _point(point: Array) -> tuple[float, float]:

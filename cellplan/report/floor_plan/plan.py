@@ -105,12 +105,12 @@ class FloorPlan:
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
         """Distances between the bases along x and along y, and to the ends of the surroundings where there are any."""
-        return tuple(each for axis in (0, 1) for each in self._dimensions(axis))
+        return tuple(dimension for axis in (0, 1) for dimension in self._dimensions(axis))
 
     def _dimensions(self, axis: int) -> Iterator[Dimension]:
         """One chain from base to base, and one round it from end to end."""
         places = distinct([float(robot.base[axis]) for robot in self.robots])
-        around = [each.corners[:, axis] for each in self.outlines if each.layer is Layer.SURROUNDINGS]
+        around = [outline.corners[:, axis] for outline in self.outlines if outline.layer is Layer.SURROUNDINGS]
         ends = [float(min(map(np.min, around))), float(max(map(np.max, around)))] if around else []
         chain = distinct([*places, *ends])
         if len(chain) <= LONGEST_CHAIN:
@@ -122,7 +122,7 @@ class FloorPlan:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest coordinates of everything but walls, shape (2,) each."""
-        points = [each.corners for each in self.outlines] + [each.points for each in self.paths]
+        points = [outline.corners for outline in self.outlines] + [path.points for path in self.paths]
         points += [line for robot in self.robots for line in robot.swept] + [
             robot.base[None, :2] for robot in self.robots
         ]
@@ -135,8 +135,8 @@ class FloorPlan:
 
 def distinct(places: list[float]) -> list[float]:
     """Places in ascending order, those that are one once."""
-    found: list[float] = []
+    distinct_values: list[float] = []
     for place in sorted(places):
-        if not found or place - found[-1] > SAME_PLACE:
-            found.append(place)
-    return found
+        if not distinct_values or place - distinct_values[-1] > SAME_PLACE:
+            distinct_values.append(place)
+    return distinct_values

@@ -47,7 +47,7 @@ def laid_out(plan: FloorPlan) -> Sheet:
     high = np.array([UNIT * WIDTH_MM - MARGIN - COLUMN - GAP, UNIT * HEIGHT_MM - MARGIN - band])
     least, most = plan.bounds
     needed = float((UNIT * (most - least) / (high - low)).max())
-    scale = next((each for each in SCALES if each >= needed), 100 * int(np.ceil(needed / 100.0)))
+    scale = next((candidate for candidate in SCALES if candidate >= needed), 100 * int(np.ceil(needed / 100.0)))
     return Sheet(scale=float(scale), middle=0.5 * (least + most), low=low, high=high)
 
 
@@ -68,7 +68,7 @@ def floor_plan_svg(plan: FloorPlan) -> str:
         *_areas(plan, sheet, numbers),
         *_bodies(plan, sheet, numbers),
         *_bases(plan, sheet, numbers),
-        *(line for each in plan.dimensions for line in _dimension(each, sheet)),
+        *(line for dimension in plan.dimensions for line in _dimension(dimension, sheet)),
         *_table(plan, sheet, numbers),
         "</svg>\n",
     ]
@@ -99,14 +99,14 @@ def _areas(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
 def _bodies(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[str]:
     """Outlines of the surroundings, of robots at the start and of the part, and the paths."""
     for layer in (Layer.SURROUNDINGS, Layer.ROBOTS, Layer.PART):
-        for each in (one for one in plan.outlines if one.layer is layer):
-            kind = "" if each.robot is None or layer is Layer.PART else f" r{numbers[each.robot]}"
-            base = " base" if each.is_base else ""
-            path = _closed([sheet.place(each.corners)])
-            yield f'<path class="{layer}{kind}{base}" d="{path}"><title>{escape(each.name)}</title></path>'
+        for outline in (one for one in plan.outlines if one.layer is layer):
+            kind = "" if outline.robot is None or layer is Layer.PART else f" r{numbers[outline.robot]}"
+            base = " base" if outline.is_base else ""
+            path = _closed([sheet.place(outline.corners)])
+            yield f'<path class="{layer}{kind}{base}" d="{path}"><title>{escape(outline.name)}</title></path>'
             if layer is Layer.SURROUNDINGS:
-                x, y = sheet.place(each.corners.mean(axis=0))
-                yield _text("thing", x, y + 9, each.name)
+                x, y = sheet.place(outline.corners.mean(axis=0))
+                yield _text("thing", x, y + 9, outline.name)
     for line in plan.paths:
         points = _points(sheet.place(line.points))
         kind = f"path r{numbers[line.robot]}"
@@ -124,25 +124,25 @@ def _bases(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield _text(f"name n{numbers[robot.name]}", x, y + 60, shortened(robot.name, NAME_IN_PLAN))
 
 
-def _dimension(each: Dimension, sheet: Sheet) -> Iterator[str]:
+def _dimension(dimension: Dimension, sheet: Sheet) -> Iterator[str]:
     """A dimension below the plan, or to its left."""
-    bounds = np.array([[each.first, each.first], [each.second, each.second]])
+    bounds = np.array([[dimension.first, dimension.first], [dimension.second, dimension.second]])
     (a, d), (b, c) = sheet.place(bounds)
-    if each.axis == 0:
-        at = sheet.high[1] + BAND + ROW * each.row
+    if dimension.axis == 0:
+        at = sheet.high[1] + BAND + ROW * dimension.row
         lines = f"M{a:.1f} {at - 45:.1f}V{at + 12:.1f}M{b:.1f} {at - 45:.1f}V{at + 12:.1f}M{a:.1f} {at:.1f}H{b:.1f}"
         ticks = "".join(f"M{x - 9:.1f} {at + 9:.1f}L{x + 9:.1f} {at - 9:.1f}" for x in (a, b))
         yield f'<path class="dimension" d="{lines}{ticks}"/>'
-        yield _text("length", 0.5 * (a + b), at - 10, _length(each.length))
+        yield _text("length", 0.5 * (a + b), at - 10, _length(dimension.length))
         return
-    at = sheet.low[0] - BAND - ROW * each.row
+    at = sheet.low[0] - BAND - ROW * dimension.row
     lines = f"M{at + 45:.1f} {d:.1f}H{at - 12:.1f}M{at + 45:.1f} {c:.1f}H{at - 12:.1f}M{at:.1f} {d:.1f}V{c:.1f}"
     ticks = "".join(f"M{at - 9:.1f} {y + 9:.1f}L{at + 9:.1f} {y - 9:.1f}" for y in (d, c))
     yield f'<path class="dimension" d="{lines}{ticks}"/>'
     x, y = at - 10, 0.5 * (c + d)
     yield (
         f'<text class="length" x="{x:.1f}" y="{y:.1f}" transform="rotate(-90 {x:.1f} {y:.1f})">'
-        f"{_length(each.length)}</text>"
+        f"{_length(dimension.length)}</text>"
     )
 
 
@@ -166,7 +166,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
     """Directions, scale bar, coordinates of the bases and what the lines mean."""
     left, top = UNIT * WIDTH_MM - MARGIN - COLUMN, MARGIN + HEADING
     yield from _directions(left + 40, top + 130)
-    bar = max((each for each in BARS if UNIT * each / sheet.scale <= LONGEST_BAR), default=BARS[0])
+    bar = max((length for length in BARS if UNIT * length / sheet.scale <= LONGEST_BAR), default=BARS[0])
     length, x, y = UNIT * bar / sheet.scale, left + 250.0, top + 105
     yield f'<path class="bar" d="M{x:.1f} {y - 14}V{y}H{x + length:.1f}V{y - 14}"/>'
     yield _text("key", x, y + 40, f"{bar:g} mm")
@@ -182,7 +182,10 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
         yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE))
         y += TEXT * (_lines(robot) - 1)
-        cells = (*(_length(float(each)) for each in robot.base), f"{robot.yaw_deg:.1f}°".replace(".0°", "°"))
+        cells = (
+            *(_length(float(coordinate)) for coordinate in robot.base),
+            f"{robot.yaw_deg:.1f}°".replace(".0°", "°"),
+        )
         reach = "–" if robot.reach is None else f"{robot.reach:.0f}"
         for text, (_, offset) in zip((*cells, reach), columns[1:], strict=True):
             yield _text("key right", left + offset, y, text)
@@ -199,9 +202,9 @@ def _lines(robot: PlanRobot) -> int:
 
 def _with_room(robots: Sequence[PlanRobot], top: float) -> Sequence[PlanRobot]:
     """The robots that the table has room for."""
-    room = int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
+    count = int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
     taken = np.cumsum([_lines(robot) for robot in robots])
-    return robots[: int(np.searchsorted(taken, room, side="right"))]
+    return robots[: int(np.searchsorted(taken, count, side="right"))]
 
 
 def _directions(x: float, y: float) -> Iterator[str]:
@@ -218,7 +221,7 @@ def _legend(plan: FloorPlan, left: float, top: float) -> Iterator[str]:
         ("robots", "links and tools at the start"),
         ("part", "part at the start"),
     ]
-    if any(each.layer is Layer.SURROUNDINGS for each in plan.outlines) or plan.walls:
+    if any(outline.layer is Layer.SURROUNDINGS for outline in plan.outlines) or plan.walls:
         entries.append(("surroundings", "surroundings"))
     entries.append(("reach", "reach of the flange"))
     if plan.square is not None:
@@ -257,12 +260,12 @@ def _closed(lines: Iterable[Array]) -> str:
 
 def _points(line: Array) -> str:
     """Points in units, those that are one once."""
-    found: list[str] = []
+    points: list[str] = []
     for x, y in line.tolist():
         text = f"{x:.1f} {y:.1f}"
-        if not found or found[-1] != text:
-            found.append(text)
-    return "L".join(found)
+        if not points or points[-1] != text:
+            points.append(text)
+    return "L".join(points)
 
 
 def _text(kind: str, x: float, y: float, words: str) -> str:

@@ -61,4 +61,4 @@ def _of_robot(number: int, colour: str) -> str:
 def _lighter(colour: str) -> str:
     """A colour that can be read in dark surroundings."""
     channels = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return "#" + "".join(f"{round(each + 0.45 * (255 - each)):02x}" for each in channels)
+    return "#" + "".join(f"{round(channel + 0.45 * (255 - channel)):02x}" for channel in channels)

@@ -20,7 +20,7 @@ def key_figures(record: Record) -> Entries:
     joint that is nearest to any limit ``is_nearest``.
     """
     joints = [*_joint_figures(record), *_acceleration_figures(record)]
-    nearest = max(joints, key=lambda each: each["used"], default=None)
+    nearest = max(joints, key=lambda joint: joint["used"], default=None)
     if nearest is not None:
         nearest["is_nearest"] = True
     return [
@@ -99,7 +99,7 @@ def _closure_figures(record: Record) -> Entries:
     robot = max(closures, key=lambda name: closures[name]["max_position_error_mm"])
     worst = closures[robot]
     value, allowed = worst["max_position_error_mm"], worst["allowed"]["position_mm"]
-    found = figure(
+    closure = figure(
         "Largest closure error",
         against(value, allowed),
         "mm",
@@ -108,7 +108,7 @@ def _closure_figures(record: Record) -> Entries:
         note=f"allowed {stated(allowed)} mm",
         is_bad=value > allowed,
     )
-    return [found]
+    return [closure]
 
 
 def _joint_figures(record: Record) -> Entries:
@@ -168,7 +168,7 @@ def _acceleration_figures(record: Record) -> Entries:
         return []
     robot, name, joint = max(limited, key=lambda use: use[2]["acceleration_ratio"])
     ratio, is_assumed = joint["acceleration_ratio"], joint["acceleration_limit_source"] == "assumed"
-    found = figure(
+    highest = figure(
         "Highest joint acceleration",
         percent(ratio, 1).removesuffix(" %"),
         f"% of {'assumed' if is_assumed else 'stated'} limit",
@@ -178,7 +178,7 @@ def _acceleration_figures(record: Record) -> Entries:
         is_bad=ratio > 1.0,
         used=ratio,
     )
-    return [found]
+    return [highest]
 
 
 def _clearance_figure(record: Record) -> dict[str, Any]:
@@ -188,7 +188,7 @@ def _clearance_figure(record: Record) -> dict[str, Any]:
         return figure("Smallest clearance", value, "mm", note=required)
     rests_on = accuracy_note(whole["pair"] or (), whole["accuracies_mm"])
     classes = other_classes(record["clearance"])
-    others = [f"{words} {floored(each['minimum_mm'])} mm" for words, each in classes.items()]
+    others = [f"{words} {floored(minimum['minimum_mm'])} mm" for words, minimum in classes.items()]
     return figure(
         "Smallest clearance",
         value if whole["exact"] else f"at least {value}",

@@ -63,9 +63,9 @@ def _not_judged(record: Record) -> Iterator[tuple[str, str]]:
     heads = dict.fromkeys(line.partition(": ")[0] for line in record["rests_on"]["lines"])
     yield from ((head, "#unstated") for head in heads)
     yield from _reduced_checks(record)
-    for each in record["accelerations"]["not_judged"]:
-        of = f" of {each['robot']}" if each["robot"] else ""
-        yield f"{each['what']}{of}", "#accelerations"
+    for left_out in record["accelerations"]["not_judged"]:
+        of = f" of {left_out['robot']}" if left_out["robot"] else ""
+        yield f"{left_out['what']}{of}", "#accelerations"
     if record["open_surfaces"]:
         yield f"{len(record['open_surfaces'])} meshes are not closed", "#open-surfaces"
     if record.get("clearance_proof", {}).get("not_certified"):
@@ -79,16 +79,16 @@ def _clocks(record: Record) -> Iterator[tuple[str, str]]:
         if pair["stated_ms"] is not None and pair["stated_ms"] > pair["allowed_ms"]:
             robots, allowed = " and ".join(pair["robots"]), small(pair["allowed_ms"])
             yield f"stated skew of {robots}, {small(pair['stated_ms'])} ms, of which {allowed} ms are allowed", "#skew"
-    for each in record["stops"]["distances"] if "stops" in record else ():
-        if each["distance_mm"] == 0.0 and not any(check["name"].startswith("stop_") for check in record["checks"]):
-            bodies = " and ".join(each["bodies"] or each["robots"])
+    for distance in record["stops"]["distances"] if "stops" in record else ():
+        if distance["distance_mm"] == 0.0 and not any(check["name"].startswith("stop_") for check in record["checks"]):
+            bodies = " and ".join(distance["bodies"] or distance["robots"])
             yield f"when one robot stops, {bodies} touch; nothing is demanded of stops", "#stops"
 
 
 def _reduced_checks(record: Record) -> Iterator[tuple[str, str]]:
     """Pairs that were not checked in full: those that someone excluded by name, the others by their number."""
-    entries = [(each["kind"], tuple(each["bodies"]), each["reason"]) for each in record.get("left_out", ())]
-    by_name = [each for each in entries if each[0] in BY_NAME]
+    entries = [(entry["kind"], tuple(entry["bodies"]), entry["reason"]) for entry in record.get("left_out", ())]
+    by_name = [entry for entry in entries if entry[0] in BY_NAME]
     if by_name or not entries:
         yield from ((line, "#left-out") for line in left_out_lines(by_name))
     kinds = [kind for kind, _, _ in entries if kind not in BY_NAME]

@@ -14,7 +14,7 @@ VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
 
 
 def file_links(
-    tables: Collection[str], plots: Iterable[str], beside: Iterable[str], *, phase: str | None
+    tables: Collection[str], plots: Iterable[str], files: Iterable[str], *, phase: str | None
 ) -> dict[str, Links]:
     """Links to the files of a run by what they are.
 
@@ -25,11 +25,11 @@ def file_links(
         phase: Phase of the page, which lies in a folder of its own; None for the page in the run folder.
     """
     up = _up(phase)
-    found = {title: _tables(tables, folder, up) for folder, title in TABLES.items()}
+    groups = {title: _tables(tables, folder, up) for folder, title in TABLES.items()}
     of_the_run = [(name, f"{up}{name}") for name in ("cell.yaml", "manifest.json")]
-    found["Results"] = [*((name, name) for name in beside), *of_the_run]
-    found["Plots"] = [(PurePosixPath(name).stem.replace("_", " "), f"plots/{quote(name)}") for name in plots]
-    return {title: links for title, links in found.items() if links}
+    groups["Results"] = [*((name, name) for name in files), *of_the_run]
+    groups["Plots"] = [(PurePosixPath(name).stem.replace("_", " "), f"plots/{quote(name)}") for name in plots]
+    return {title: links for title, links in groups.items() if links}
 
 
 def view_link(phase: str | None) -> str:

@@ -36,7 +36,7 @@ NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
 
 
-class Beside(TypedDict, total=False):
+class PageFiles(TypedDict, total=False):
     """What lies beside a page, and the pictures in it; what is left out is empty."""
 
     still: Annotated[
@@ -47,7 +47,7 @@ class Beside(TypedDict, total=False):
 
 
 def report_page(
-    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], **beside: Unpack[Beside]
+    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], **pictures: Unpack[PageFiles]
 ) -> str:
     """The page of one run.
 
@@ -65,30 +65,30 @@ def report_page(
         "method": list(method_lines(record["solver"], record["step_s"])),
         "plots": inline_plots(plots),
         "task_times": task_times(record, cell),
-        "links": _links(record, drawings, beside),
+        "links": _links(record, drawings, pictures),
     }
-    return cell_page("report.html", record, cell, parts | _shared_parts(record, cell, beside))
+    return cell_page("report.html", record, cell, parts | _shared_parts(record, cell, pictures))
 
 
-def overview_page(record: Record, *, cell: Cell, **beside: Unpack[Beside]) -> str:
+def overview_page(record: Record, *, cell: Cell, **pictures: Unpack[PageFiles]) -> str:
     """The page of several runs, with a link to the page of each.
 
     Args:
         record: Result of ``summary_record``.
         **beside: What lies beside it, and its pictures.
     """
-    parts = {"links": _links(record, (), beside), "errors": phase_errors(record)}
-    return cell_page("overview.html", record, cell, parts | _shared_parts(record, cell, beside))
+    parts = {"links": _links(record, (), pictures), "errors": phase_errors(record)}
+    return cell_page("overview.html", record, cell, parts | _shared_parts(record, cell, pictures))
 
 
-def _links(record: Record, plots: Iterable[str], beside: Beside) -> dict[str, Links]:
+def _links(record: Record, plots: Iterable[str], pictures: PageFiles) -> dict[str, Links]:
     """Files that a page leads to."""
     names = ["report.json"] if "runs" in record else ["report.json", "series.json"]
-    names += [name for name, text in ((STILL, beside.get("still")), (FLOOR_PLAN, beside.get("floor_plan"))) if text]
-    return file_links(beside.get("files", ()), plots, names, phase=record.get("phase"))
+    names += [name for name, text in ((STILL, pictures.get("still")), (FLOOR_PLAN, pictures.get("floor_plan"))) if text]
+    return file_links(pictures.get("files", ()), plots, names, phase=record.get("phase"))
 
 
-def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, object]:
+def _shared_parts(record: Record, cell: Cell, pictures: PageFiles) -> dict[str, object]:
     """What the pages of one run and of several have in common."""
     view, begins = view_link(record.get("phase")), phase_begins(record)
     return {
@@ -105,8 +105,8 @@ def _shared_parts(record: Record, cell: Cell, beside: Beside) -> dict[str, objec
         "line": time_line(record, cell),
         "at": TimeLinks(view, page_begin(record), begins if "runs" in record else {}),
         "view": view,
-        "still": svg_element(beside.get("still", "")),
-        "floor_plan_svg": svg_element(beside.get("floor_plan", "")),
+        "still": svg_element(pictures.get("still", "")),
+        "floor_plan_svg": svg_element(pictures.get("floor_plan", "")),
     }
 
 
@@ -178,8 +178,8 @@ def _shares(record: Record) -> Entries:
 
 def _of_links(record: Record) -> Entries:
     """Pairs with reduced requirements that are not among those that were not judged in full: links of one robot."""
-    named = {frozenset(each["bodies"]) for each in record["left_out"]}
-    return [each for each in record["exclusions"] if frozenset(each["pair"]) not in named]
+    named = {frozenset(entry["bodies"]) for entry in record["left_out"]}
+    return [exclusion for exclusion in record["exclusions"] if frozenset(exclusion["pair"]) not in named]
 
 
 def _by_reason(exclusions: Iterable[Record]) -> dict[str, list[str]]:

@@ -23,6 +23,6 @@ def page_scripts(texts: Iterable[str]) -> PageScripts:
     A browser compares the digest with the text between the tags to the byte, so that a script that was changed or
     added does not run; see https://www.w3.org/TR/CSP3/#match-element-to-source-list.
     """
-    own = tuple(texts)
-    digests = (b64encode(sha256(text.encode()).digest()).decode() for text in own)
-    return PageScripts(own, " ".join(f"'sha256-{digest}'" for digest in digests))
+    scripts = tuple(texts)
+    digests = (b64encode(sha256(text.encode()).digest()).decode() for text in scripts)
+    return PageScripts(scripts, " ".join(f"'sha256-{digest}'" for digest in digests))

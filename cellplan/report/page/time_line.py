@@ -52,13 +52,13 @@ def time_line(record: Record, cell: Cell) -> dict[str, Any]:
 
 def task_times(record: Record, cell: Cell) -> Entries:
     """When each task of a run begins and ends, and its process is on."""
-    found: Entries = []
+    entries: Entries = []
     for task in cell.tasks:
         if task.name in record["tasks"]:
-            own = record["tasks"][task.name]
-            process = None if task.process is None else (own["start_s"], own["end_s"] + task.off_delay)
-            found.append({"name": task.name, **own, "process": process, "dwell_s": task.dwell})
-    return found
+            task_record = record["tasks"][task.name]
+            process = None if task.process is None else (task_record["start_s"], task_record["end_s"] + task.off_delay)
+            entries.append({"name": task.name, **task_record, "process": process, "dwell_s": task.dwell})
+    return entries
 
 
 def _phases(record: Record) -> Entries:
@@ -67,8 +67,8 @@ def _phases(record: Record) -> Entries:
     first = [phase for phase in record["phases"] if phase["begin_s"] == begins[phase["name"]]]
     if "runs" in record:
         return [dict(phase) for phase in first]
-    own = [phase for phase in first if record["phase"] in (None, phase["name"])]
-    return [{**phase, "begin_s": 0.0, "end_s": record["cycle_time_s"]} for phase in own[:1]]
+    phases = [phase for phase in first if record["phase"] in (None, phase["name"])]
+    return [{**phase, "begin_s": 0.0, "end_s": record["cycle_time_s"]} for phase in phases[:1]]
 
 
 def _spans(phase: Record, robot: str, records: Record, tasks: Mapping[str, Task]) -> Iterator[Span]:
@@ -108,7 +108,7 @@ def _work(task: Task, record: Record, begin: float, end: float) -> Iterator[Span
 def _ticks(total: float) -> list[float]:
     """Round times in [s] from 0 to the end of the axis."""
     unit = 10.0 ** math.floor(math.log10(total / MAX_TICKS))
-    step = next(unit * each for each in STEPS if MAX_TICKS * unit * each >= total * (1.0 - SHORTEST))
+    step = next(unit * step for step in STEPS if MAX_TICKS * unit * step >= total * (1.0 - SHORTEST))
     return [step * k for k in range(math.floor(total / step * (1.0 + SHORTEST)) + 1)]
 
 

@@ -56,12 +56,12 @@ def style() -> Iterator[None]:
 
 def paint(figure: Figure, kind: str) -> bytes:
     """A figure as PNG or PDF, without date and program name."""
-    found, buffer = placed(figure), io.BytesIO()
+    layout, buffer = placed(figure), io.BytesIO()
     with style():
-        canvas = Canvas(figsize=(found.width / INCH, found.height / INCH))
-        flipped = Affine2D().scale(1.0, -1.0).translate(0.0, found.height).scale(1.0 / INCH)
+        canvas = Canvas(figsize=(layout.width / INCH, layout.height / INCH))
+        flipped = Affine2D().scale(1.0, -1.0).translate(0.0, layout.height).scale(1.0 / INCH)
         in_points = flipped + canvas.dpi_scale_trans
-        for artist, frame in _artists(found):
+        for artist, frame in _artists(layout):
             artist.set_transform(in_points)
             canvas.add_artist(artist)
             if frame is not None:
@@ -71,21 +71,21 @@ def paint(figure: Figure, kind: str) -> bytes:
     return buffer.getvalue()
 
 
-def _artists(found: Placed) -> Iterator[tuple[Artist, PlacedPanel | None]]:
+def _artists(layout: Placed) -> Iterator[tuple[Artist, PlacedPanel | None]]:
     """Everything in a figure, and the panel at whose frame it is cut off, if any."""
-    is_plane = found.figure.is_plane
-    for x, y, colour in found.swatches:
+    is_plane = layout.figure.is_plane
+    for x, y, colour in layout.swatches:
         yield patches.Rectangle((x, y), *SWATCH, color=colour, linewidth=0), None
-    for box in found.panels:
+    for box in layout.panels:
         for artist in _panel(box, is_plane=is_plane):
             yield artist, None
         for place, item in enumerate(box.panel.items):
             for artist in _item(box, item, 2.0 + 1e-3 * place):
                 yield artist, box if is_plane else None
-        for each in box.words:
-            yield _text(each._replace(x=each.x + box.left, y=each.y + box.top)), None
-    for each in found.words:
-        yield _text(each), None
+        for words in box.words:
+            yield _text(words._replace(x=words.x + box.left, y=words.y + box.top)), None
+    for words in layout.words:
+        yield _text(words), None
 
 
 def _panel(box: PlacedPanel, *, is_plane: bool) -> Iterator[Artist]:
@@ -137,8 +137,8 @@ def _item(box: PlacedPanel, item: object, order: float) -> Iterator[Artist]:
         yield _line(box, *ends, color=LIMIT, linewidth=1.0, zorder=order)
 
 
-def _text(each: Words) -> Text:
+def _text(words: Words) -> Text:
     """A line of text."""
-    weight = "bold" if each.is_bold else "normal"
-    anchor = _ANCHORS[each.anchor]
-    return Text(each.x, each.y, each.text, size=each.size, color=each.colour, weight=weight, ha=anchor, zorder=5.0)
+    weight = "bold" if words.is_bold else "normal"
+    anchor = _ANCHORS[words.anchor]
+    return Text(words.x, words.y, words.text, size=words.size, color=words.colour, weight=weight, ha=anchor, zorder=5.0)

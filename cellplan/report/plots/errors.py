@@ -16,7 +16,7 @@ MIN_IN_UNIT: Final = 0.5  # [-] of an error in its unit: a larger unit is not ch
 DECADES: Final = 9  # [-] most below the upper end of a logarithmic scale
 FAR_BELOW: Final = 1e-4  # [-] of the largest error: smaller ones need not be seen
 NOISE: Final = 1e-3  # [-] of the tolerance
-ROOM: Final = 3.0  # [-] times the largest value: upper end of a logarithmic scale
+HEADROOM: Final = 3.0  # [-] times the largest value: upper end of a logarithmic scale
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +102,7 @@ def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> Axis:
     smallest = max(min(positive), FAR_BELOW * largest) if positive else 1e-3 * top
     decade = math.floor(math.log10(min(smallest, 0.1 * top)))
     low = max(decade, math.floor(math.log10(top)) - DECADES)
-    return Axis(low=10.0**low, high=ROOM * top, unit=unit, is_log=True)
+    return Axis(low=10.0**low, high=HEADROOM * top, unit=unit, is_log=True)
 
 
 def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:

@@ -49,10 +49,10 @@ def speeds_figure(report: Report, robots: Sequence[str], colours: Mapping[str, s
 def _margins(report: Report, robot: str) -> tuple[list[JointUse], Array]:
     """Joints with two limits, and their margins in [%]."""
     uses = [use for use in report.joints if use.robot == robot]
-    kept = [i for i, use in enumerate(uses) if np.isfinite(use.upper - use.lower)]
-    lower, upper = np.array([[uses[i].lower, uses[i].upper] for i in kept]).reshape(-1, 2).T
-    q = report.q[robot][:, kept]
-    return [uses[i] for i in kept], PERCENT * np.minimum(q - lower, upper - q) / (0.5 * (upper - lower))
+    limited = [i for i, use in enumerate(uses) if np.isfinite(use.upper - use.lower)]
+    lower, upper = np.array([[uses[i].lower, uses[i].upper] for i in limited]).reshape(-1, 2).T
+    q = report.q[robot][:, limited]
+    return [uses[i] for i in limited], PERCENT * np.minimum(q - lower, upper - q) / (0.5 * (upper - lower))
 
 
 def _figure(
@@ -94,7 +94,7 @@ def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *,
 
 def _crowd(shares: Shares, times: Array, colours: Mapping[str, str], *, is_margin: bool) -> Panel:
     """The worst joint of every robot at each instant."""
-    worst = {robot: each.min(axis=1) if is_margin else each.max(axis=1) for robot, (_, each) in shares.items()}
+    worst = {robot: values.min(axis=1) if is_margin else values.max(axis=1) for robot, (_, values) in shares.items()}
     stacked = np.stack(list(worst.values()))
     robot, row = np.unravel_index(int(stacked.argmin() if is_margin else stacked.argmax()), stacked.shape)
     value = float(stacked[robot, row])

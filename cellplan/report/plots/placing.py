@@ -98,7 +98,7 @@ def placed(figure: Figure) -> Placed:
     entries = [(key, head + 8.0 + LINE * line) for line, key in enumerate(figure.legend)]
     words += [_entry(key, left, y) for key, y in entries]
     swatches = [(left, y - 0.5 * SWATCH[1], key.colour) for key, y in entries if key.colour]
-    shown = [each for each in words if each.text]
+    shown = [token for token in words if token.text]
     return Placed(figure=figure, width=width, height=height, panels=panels, words=shown, swatches=swatches)
 
 
@@ -152,7 +152,7 @@ def _panel(
         words=(),
     )
     words = [*_headings(panel, size[0]), *_tick_labels(box, has_x_labels=has_x_labels), *_words_within(box)]
-    return replace(box, words=[each for each in words if each.text])
+    return replace(box, words=[token for token in words if token.text])
 
 
 def _headings(panel: Panel, width: float) -> Iterator[Words]:
@@ -162,8 +162,8 @@ def _headings(panel: Panel, width: float) -> Iterator[Words]:
     for key in panel.keys:
         yield Words(x, -5.0, key.text, size=8.5, colour=key.colour, is_bold=True, kind="key")
         x += 8.5 * LETTER * (len(key.text) + 1)
-    room = (width - x) / (LETTER * max(len(panel.note), 1))
-    yield Words(width, -5.0, panel.note, min(7.5, max(room, SMALLEST_NOTE)), GREY, anchor="end", kind="note")
+    size = (width - x) / (LETTER * max(len(panel.note), 1))
+    yield Words(width, -5.0, panel.note, min(7.5, max(size, SMALLEST_NOTE)), GREY, anchor="end", kind="note")
 
 
 def _tick_labels(box: PlacedPanel, *, has_x_labels: bool) -> Iterator[Words]:

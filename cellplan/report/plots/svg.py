@@ -28,8 +28,10 @@ STYLE: Final = re.compile(r"<style>.*?</style>", re.DOTALL)
 
 def svg_text(figure: Figure) -> str:
     """A figure as the text of an SVG file."""
-    found = placed(figure)
-    return "\n".join([*_head(found), *map(_words, found.words), *_swatches(found), *_panels(found), "</svg>\n"])
+    placement = placed(figure)
+    return "\n".join(
+        [*_head(placement), *map(_words, placement.words), *_swatches(placement), *_panels(placement), "</svg>\n"]
+    )
 
 
 def inline_svg(text: str) -> str:
@@ -37,10 +39,10 @@ def inline_svg(text: str) -> str:
     return STYLE.sub("", text, count=1)
 
 
-def _head(found: Placed) -> Iterator[str]:
+def _head(placement: Placed) -> Iterator[str]:
     """The opening tag, what the figure shows in words, its style for dark pages and its paper."""
-    figure = found.figure
-    size = f"{found.width:.6g} {found.height:.6g}"
+    figure = placement.figure
+    size = f"{placement.width:.6g} {placement.height:.6g}"
     title, kind = figure.title or figure.panels[0].title, "exact" if figure.is_exact else "figure"
     yield (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" class="{kind}" '
@@ -50,7 +52,7 @@ def _head(found: Placed) -> Iterator[str]:
     yield f"<desc>{escape(figure.text or _description(figure))}</desc>"
     if not figure.is_exact:
         yield f"<style>{dark_rules()}</style>"
-    yield f'<rect class="paper" width="{found.width:.6g}" height="{found.height:.6g}" fill="{PAPER}"/>'
+    yield f'<rect class="paper" width="{placement.width:.6g}" height="{placement.height:.6g}" fill="{PAPER}"/>'
 
 
 def _description(figure: Figure) -> str:
@@ -59,23 +61,25 @@ def _description(figure: Figure) -> str:
     return f"{'; '.join(text for text in texts if text)}. Along: {figure.x.label}."
 
 
-def _words(each: Words) -> str:
+def _words(words: Words) -> str:
     """A line of text."""
-    place = f'x="{_short(each.x)}" y="{_short(each.y)}" font-size="{each.size:g}" fill="{each.colour}"'
-    anchor = f' text-anchor="{each.anchor}"' if each.anchor != "start" else ""
-    weight = ' font-weight="bold"' if each.is_bold else ""
-    kind = f' class="{each.kind}"' if each.kind else ""
-    return f"<text{kind} {place}{anchor}{weight}>{escape(each.text)}</text>"
+    place = f'x="{_short(words.x)}" y="{_short(words.y)}" font-size="{words.size:g}" fill="{words.colour}"'
+    anchor = f' text-anchor="{words.anchor}"' if words.anchor != "start" else ""
+    weight = ' font-weight="bold"' if words.is_bold else ""
+    kind = f' class="{words.kind}"' if words.kind else ""
+    return f"<text{kind} {place}{anchor}{weight}>{escape(words.text)}</text>"
 
 
 def _tick_labels(box: PlacedPanel) -> Iterator[str]:
     """The numbers along both axes, a group for each."""
     for kind in ("tick-y", "tick-x"):
-        labels = [each for each in box.words if each.kind == kind]
+        labels = [words for words in box.words if words.kind == kind]
         if labels:
             first = labels[0]
             pen = f'font-size="{first.size:g}" fill="{first.colour}" text-anchor="{first.anchor}"'
-            texts = (f'<text x="{_short(each.x)}" y="{_short(each.y)}">{escape(each.text)}</text>' for each in labels)
+            texts = (
+                f'<text x="{_short(label.x)}" y="{_short(label.y)}">{escape(label.text)}</text>' for label in labels
+            )
             yield f'<g class="{kind}" {pen}>{"".join(texts)}</g>'
 
 
@@ -84,16 +88,16 @@ def _short(length: float) -> str:
     return f"{length:.2f}".rstrip("0").rstrip(".")
 
 
-def _swatches(found: Placed) -> Iterator[str]:
+def _swatches(placement: Placed) -> Iterator[str]:
     """The colours of the legend."""
-    for x, y, colour in found.swatches:
+    for x, y, colour in placement.swatches:
         yield f'<rect x="{x:.2f}" y="{y:.2f}" width="{SWATCH[0]:g}" height="{SWATCH[1]:g}" fill="{colour}"/>'
 
 
-def _panels(found: Placed) -> Iterator[str]:
+def _panels(placement: Placed) -> Iterator[str]:
     """Every panel."""
-    is_plane = found.figure.is_plane
-    for box in found.panels:
+    is_plane = placement.figure.is_plane
+    for box in placement.panels:
         y = box.panel.y
         kinds = (' data-time=""' if box.x.is_time else "") + (' data-log=""' if y.is_log else "")
         unit = f' data-unit="{escape(y.unit)}"' if y.unit else ""
@@ -114,7 +118,7 @@ def _panels(found: Placed) -> Iterator[str]:
         frame = _plane_frame(box) if is_plane else f"M0 0V{box.height:.6g}H{box.width:.6g}"
         yield f'<path class="frame" d="{frame}" fill="none" stroke="{GREY if is_plane else FRAME}" stroke-width="0.8"/>'
         yield from _tick_labels(box)
-        yield from (_words(each) for each in box.words if not each.kind.startswith("tick"))
+        yield from (_words(words) for words in box.words if not words.kind.startswith("tick"))
         yield "</g>"
 
 
@@ -182,8 +186,8 @@ def _curve(box: PlacedPanel, curve: Curve) -> Iterator[str]:
 def _stretch(box: PlacedPanel, x: Array, y: Array, is_function: bool) -> str:
     """The path of a stretch without gaps: its first point, and from each point to the next."""
     if is_function:
-        kept = peaks_kept(y, round(POINTS_DRAWN * box.width))
-        x, y = x[kept], y[kept]
+        selected = peaks_kept(y, round(POINTS_DRAWN * box.width))
+        x, y = x[selected], y[selected]
     points = np.stack([FINE * box.across(x), FINE * box.down(y)], axis=-1)
     points = np.rint(np.clip(points, -FARTHEST, FARTHEST))
     if is_function:

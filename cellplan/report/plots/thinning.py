@@ -44,13 +44,13 @@ def straightened(x: Array, y: Array, tolerance: float) -> Indices:
         y: Shape (K,).
         tolerance: In the unit of ``y``.
     """
-    kept = np.arange(len(x))
+    indices = np.arange(len(x))
     for share in ROUND_SHARES:
-        if len(kept) < 3:
+        if len(indices) < 3:
             break
-        middle = np.arange(1, len(kept) - 1, 2)
-        before, at, after = kept[middle - 1], kept[middle], kept[middle + 1]
+        middle = np.arange(1, len(indices) - 1, 2)
+        before, at, after = indices[middle - 1], indices[middle], indices[middle + 1]
         shares = (x[at] - x[before]) / np.maximum(x[after] - x[before], np.finfo(float).tiny)
         apart = np.abs(y[before] + shares * (y[after] - y[before]) - y[at])
-        kept = np.delete(kept, middle[apart <= share * tolerance])
-    return kept
+        indices = np.delete(indices, middle[apart <= share * tolerance])
+    return indices

@@ -42,14 +42,14 @@ class AccelerationsRecord(TypedDict):
     not_judged: Annotated[list[NotJudgedRecord], "quantities without a limit"]
 
 
-def accelerations_record(found: MotionAccelerations) -> AccelerationsRecord:
+def accelerations_record(accelerations: MotionAccelerations) -> AccelerationsRecord:
     """Accelerations of tool tips and part, and what was not judged."""
     return {
         "assumption": REST,
-        "tools": {robot: _point_record(point) for robot, point in found.tools.items()},
-        "part": None if found.part is None else _part_record(found.part),
+        "tools": {robot: _point_record(point) for robot, point in accelerations.tools.items()},
+        "part": None if accelerations.part is None else _part_record(accelerations.part),
         "not_judged": [
-            {"robot": left.robot or None, "what": left.what, "reason": left.reason} for left in found.not_judged
+            {"robot": left.robot or None, "what": left.what, "reason": left.reason} for left in accelerations.not_judged
         ],
     }
 
@@ -69,9 +69,9 @@ def _part_record(part: PartAcceleration) -> PartRecord:
     return {"centre": _point_record(part.centre), "corner": _point_record(part.corner)}
 
 
-def table_line(found: MotionAccelerations, robot: str) -> str:
+def table_line(accelerations: MotionAccelerations, robot: str) -> str:
     """Header line of a robot's table: its largest acceleration and jerk, as fractions of known limits."""
-    uses = [use for use in found.joints if use.robot == robot]
+    uses = [use for use in accelerations.joints if use.robot == robot]
     most = max(uses, key=lambda use: (use.ratio is not None, use.peak if use.ratio is None else use.ratio))
     unit, scale = most.display_unit
     against = "not judged" if most.ratio is None else f"{100.0 * most.ratio:.3g} % of its {most.source} limit"

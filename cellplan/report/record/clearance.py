@@ -170,12 +170,12 @@ def clearance_proof_record(clearance: ClearanceReport) -> ProofRecord:
 
 def left_out_record(left_out: Iterable[LeftOut]) -> list[LeftOutRecord]:
     """Everything that was not judged in full, except pairs of links in one robot's model."""
-    return [{"kind": str(each.kind), "bodies": list(each.bodies), "reason": each.reason} for each in left_out]
+    return [{"kind": str(entry.kind), "bodies": list(entry.bodies), "reason": entry.reason} for entry in left_out]
 
 
 def other_classes(record: Mapping[str, Any]) -> dict[str, Any]:
     """Minima of the classes that the smallest one of all does not belong to, by what each is called."""
     of_all = (record["whole"]["pair"], record["whole"]["minimum_mm"])
     minima = {words: record[kind] for kind, words in CLASSES.items() if kind in record}
-    known = {words: each for words, each in minima.items() if each["minimum_mm"] is not None}
-    return {words: each for words, each in known.items() if (each["pair"], each["minimum_mm"]) != of_all}
+    known = {words: minimum for words, minimum in minima.items() if minimum["minimum_mm"] is not None}
+    return {words: minimum for words, minimum in known.items() if (minimum["pair"], minimum["minimum_mm"]) != of_all}

@@ -22,8 +22,8 @@ def terminal_lines(rows: Sequence[Sequence[str]], indent: str) -> list[str]:
 def terminal_table(keys: Iterable[str], figures: Iterable[Mapping[str, Any]], indent: str) -> list[str]:
     """A line of headings and a line for each row of figures."""
     shown = {key: SHOWN[key] for key in keys}
-    heads = [each.column for each in shown.values()]
-    rows = [heads, *([each.text(row[key]) for key, each in shown.items()] for row in figures)]
+    heads = [figure.column for figure in shown.values()]
+    rows = [heads, *([figure.text(row[key]) for key, figure in shown.items()] for row in figures)]
     return terminal_lines(rows, indent)
 
 

@@ -80,8 +80,10 @@ SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
     "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", 1.0, "smallest certified clearance, in mm"),
 })
 # fmt: on
-QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.key: each for each in _LISTED})
-SUBJECTS: Final[Mapping[str, Quantity]] = MappingProxyType({each.subject: each for each in _LISTED if each.subject})
+QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({quantity.key: quantity for quantity in _LISTED})
+SUBJECTS: Final[Mapping[str, Quantity]] = MappingProxyType(
+    {quantity.subject: quantity for quantity in _LISTED if quantity.subject}
+)
 
 # fmt: off
 KEY: Final = (
@@ -150,10 +152,13 @@ def figures_of_records(phases: Iterable[Record]) -> Figures:
 
 def _folded(phases: Iterable[Iterable[tuple[str, str, float]]]) -> dict[str, dict[str, float]]:
     """By key and subject the value over all phases."""
-    found: dict[str, dict[str, list[float]]] = {}
+    values: dict[str, dict[str, list[float]]] = {}
     for key, subject, value in chain.from_iterable(phases):
-        found.setdefault(key, {}).setdefault(subject, []).append(value)
-    return {key: {it: QUANTITIES[key].over_phases(every) for it, every in own.items()} for key, own in found.items()}
+        values.setdefault(key, {}).setdefault(subject, []).append(value)
+    return {
+        key: {it: QUANTITIES[key].over_phases(every) for it, every in subjects.items()}
+        for key, subjects in values.items()
+    }
 
 
 def _measured(report: Report) -> Iterator[tuple[str, str, float]]:
@@ -200,8 +205,8 @@ def _recorded(record: Record) -> Iterator[tuple[str, str, float]]:
         yield "min_clearance_mm", " - ".join(whole["pair"] or ()), whole["minimum_mm"] / MM
     for task, errors in record["tasks"].items():
         for key, unit in (("position_error_mm", MM), ("orientation_error_deg", DEG)):
-            found = [errors[f"max_{key}"], errors.get(f"max_{key.replace('error', 'error_between_rows')}")]
-            yield f"max_{key}", task, max((value for value in found if value is not None), default=0.0) / unit
+            values = [errors[f"max_{key}"], errors.get(f"max_{key.replace('error', 'error_between_rows')}")]
+            yield f"max_{key}", task, max((value for value in values if value is not None), default=0.0) / unit
     for robot, speed in record["speeds"].items():
         yield "max_tool_speed_mm_s", robot, (speed["tool_peak_mm_s"] or 0.0) / MM
 
@@ -217,9 +222,9 @@ def energy_proxy(report: Report) -> float:
     Args:
         report: The report of one phase.
     """
-    found, steps = 0.0, np.diff(report.times)
+    total, steps = 0.0, np.diff(report.times)
     for robot, speeds in report.qd.items():
         limits = np.array([use.velocity_limit for use in report.joints if use.robot == robot])
         turns = limits > 0.0
-        found += float(steps @ np.sum((speeds[:, turns] / limits[turns]) ** 2, axis=1))
-    return found
+        total += float(steps @ np.sum((speeds[:, turns] / limits[turns]) ** 2, axis=1))
+    return total

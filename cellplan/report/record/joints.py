@@ -161,29 +161,29 @@ def _is_position_worse(record: Record) -> bool:
 
 def repeatability_record(report: Report) -> dict[str, RepeatabilityRecord]:
     """Drift of the joints over the cycles, by the task, or under ``all`` for several tasks."""
-    found = report.repeatability
-    if found is None:
+    repeatability = report.repeatability
+    if repeatability is None:
         return {}
     record: RepeatabilityRecord = {
-        "cycles": found.cycles,
-        "period_s": number(found.period),
-        "ends_s": [number(float(time)) for time in found.cycle_times[1:]],
-        **_worst_drift(found),
-        "closes": found.closes,
-        "per_joint": _drifts_by_joint(found),
+        "cycles": repeatability.cycles,
+        "period_s": number(repeatability.period),
+        "ends_s": [number(float(time)) for time in repeatability.cycle_times[1:]],
+        **_worst_drift(repeatability),
+        "closes": repeatability.closes,
+        "per_joint": _drifts_by_joint(repeatability),
     }
     return {report.tasks[0] if len(report.tasks) == 1 else "all": record}
 
 
-def _worst_drift(found: Repeatability) -> _WorstDriftRecord:
+def _worst_drift(drifts: Repeatability) -> _WorstDriftRecord:
     """The joint of each kind that drifts most in a cycle."""
     record: _WorstDriftRecord = {}
-    revolute = [drift for drift in found.drifts if drift.is_revolute]
+    revolute = [drift for drift in drifts.drifts if drift.is_revolute]
     if revolute:
         worst = max(revolute, key=lambda drift: drift.worst)
         record["worst_drift_deg"] = number(worst.display_unit.scale * worst.worst)
         record["joint"], record["at_cycle"] = f"{worst.robot} {worst.joint}", worst.at_cycle
-    prismatic = [drift for drift in found.drifts if not drift.is_revolute]
+    prismatic = [drift for drift in drifts.drifts if not drift.is_revolute]
     if prismatic:
         worst = max(prismatic, key=lambda drift: drift.worst)
         record["worst_drift_mm"] = number(MM * worst.worst)
@@ -191,10 +191,10 @@ def _worst_drift(found: Repeatability) -> _WorstDriftRecord:
     return record
 
 
-def _drifts_by_joint(found: Repeatability) -> dict[str, dict[str, JointDriftRecord]]:
+def _drifts_by_joint(drifts: Repeatability) -> dict[str, dict[str, JointDriftRecord]]:
     """Drift of each cycle, by robot and joint."""
     record: dict[str, dict[str, JointDriftRecord]] = {}
-    for drift in found.drifts:
+    for drift in drifts.drifts:
         unit, scale = drift.display_unit
         record.setdefault(drift.robot, {})[drift.joint] = {
             "unit": unit,

@@ -53,7 +53,7 @@ def _in_phase(value: Any, phase: str) -> Any:
     """The same of what stands within a record."""
     if isinstance(value, Mapping):
         return in_phase(value, phase)
-    return [_in_phase(each, phase) for each in value] if isinstance(value, list) else value
+    return [_in_phase(item, phase) for item in value] if isinstance(value, list) else value
 
 
 def instant_text(entry: Record, key: str = AT) -> str:

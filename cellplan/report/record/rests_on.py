@@ -49,7 +49,7 @@ def rests_on_record(cell: Cell, loads: Sequence[LoadUse], tips: Sequence[Standof
 
 def unstated_standoffs(cell: Cell, tips: Sequence[Standoff]) -> list[str]:
     """One line on the tasks without a process whose tips are off the part and that state no distance."""
-    off = {each.task: each.worst_nearest for each in tips if each.is_off}
+    off = {tip.task: tip.worst_nearest for tip in tips if tip.is_off}
     silent = [name for name in off if cell.task(name).standoff is None and cell.task(name).process is None]
     words = ", ".join(f"{name} (tip {MM * off[name]:.1f} mm off the part)" for name in silent)
     return [f"standoff_mm of {words} not stated"] if silent else []
@@ -59,12 +59,12 @@ def bodies_record(cell: Cell) -> dict[str, BodiesRecord]:
     """Accuracy of the link bodies of each robot and its source; nothing for a robot without bodies."""
     record: dict[str, BodiesRecord] = {}
     for robot in cell.robots:
-        stated, own = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
+        stated, bodies = robot.model.body_accuracy, [body for body in robot.model.bodies if body.accuracy is not None]
         if robot.model.bodies:
             record[robot.name] = {
                 "accuracy_mm": None if stated is None else number(stated.accuracy_mm),
                 "source": "not stated" if stated is None else stated.source,
-                "own_accuracy_mm": {body.name: number(MM * (body.accuracy or 0.0)) for body in own},
+                "own_accuracy_mm": {body.name: number(MM * (body.accuracy or 0.0)) for body in bodies},
             }
     return record
 

@@ -32,9 +32,9 @@ def columns_of(rows: Iterable[Row], names: Iterable[str] = ()) -> dict[str, Any]
     Args:
         names: Columns that are there even without a row, in their order.
     """
-    found = list(rows)
-    every = dict.fromkeys([*names, *(name for row in found for name in row)])
-    return {name: [row.get(name) for row in found] for name in every}
+    columns = list(rows)
+    every = dict.fromkeys([*names, *(name for row in columns for name in row)])
+    return {name: [row.get(name) for row in columns] for name in every}
 
 
 def format_of(record: Record) -> str:
@@ -50,7 +50,7 @@ def run_tables(records: Sequence[Record]) -> Tables:
         records: The ``report.json`` of each phase.
     """
 
-    def each(make: Callable[[Record], Iterable[Row]], names: Sequence[str] = ()) -> Table:
+    def column(make: Callable[[Record], Iterable[Row]], names: Sequence[str] = ()) -> Table:
         def rows() -> Iterator[Row]:
             rows = ((row.get("phase") or _phase(record), row) for record in records for row in make(record))
             return ({"phase": phase} | row | {"phase": phase} for phase, row in rows)
@@ -58,15 +58,15 @@ def run_tables(records: Sequence[Record]) -> Tables:
         return lambda: columns_of(rows(), ["phase", *names] if names else ())
 
     return {
-        "checks": each(lambda record: map(flat, record["checks"]), columns_named(CheckRecord)),
-        "joints": each(_joints),
-        "tasks": each(lambda record: by_name(record["tasks"], "task")),
-        "clearance": each(lambda record: by_name(record["clearance"], "class")),
-        "closest_pairs": each(lambda record: map(flat, record.get("closest_pairs", ())), columns_named(ClosestPair)),
-        "contacts": each(lambda record: map(flat, record.get("contacts", ())), columns_named(Contact)),
-        "left_out": each(lambda record: map(flat, record["left_out"]), columns_named(LeftOutRecord)),
-        "speeds": each(lambda record: by_name(record.get("speeds", {}), "robot")),
-        "motion_share": each(lambda record: by_name(record.get("motion_share", {}), "robot")),
+        "checks": column(lambda record: map(flat, record["checks"]), columns_named(CheckRecord)),
+        "joints": column(_joints),
+        "tasks": column(lambda record: by_name(record["tasks"], "task")),
+        "clearance": column(lambda record: by_name(record["clearance"], "class")),
+        "closest_pairs": column(lambda record: map(flat, record.get("closest_pairs", ())), columns_named(ClosestPair)),
+        "contacts": column(lambda record: map(flat, record.get("contacts", ())), columns_named(Contact)),
+        "left_out": column(lambda record: map(flat, record["left_out"]), columns_named(LeftOutRecord)),
+        "speeds": column(lambda record: by_name(record.get("speeds", {}), "robot")),
+        "motion_share": column(lambda record: by_name(record.get("motion_share", {}), "robot")),
     }
 
 
@@ -107,9 +107,11 @@ def curve_columns(tree: Mapping[str, Any]) -> dict[str, Any]:
     count = len(tree["times_s"])
     columns: dict[str, Any] = {"time_s": tree["times_s"]}
     for robot, joints in tree["joints"].items():
-        columns |= {f"{robot}.{joint}.{key}": values for joint, own in joints.items() for key, values in own.items()}
-    for task, own in tree["tasks"].items():
-        columns |= {f"{task}.{key}": values for key, values in own.items()}
+        columns |= {
+            f"{robot}.{joint}.{key}": values for joint, of_task in joints.items() for key, values in of_task.items()
+        }
+    for task, of_task in tree["tasks"].items():
+        columns |= {f"{task}.{key}": values for key, values in of_task.items()}
     columns |= dict(tree["conditioning"])
     columns |= {name: tree[name] for name in ("iterations", "slack") if tree[name] is not None}
     return {name: [*values, *[None] * (count - len(values))] for name, values in columns.items()}

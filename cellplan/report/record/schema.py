@@ -84,7 +84,7 @@ def _schema(form: Any, definitions: dict[str, dict[str, Any]], *, closed: bool) 
     if origin is Annotated:
         return {**_schema(arguments[0], definitions, closed=closed), "description": arguments[1]}
     if origin in {Union, types.UnionType}:
-        return {"anyOf": [_schema(each, definitions, closed=closed) for each in arguments]}
+        return {"anyOf": [_schema(argument, definitions, closed=closed) for argument in arguments]}
     if origin is list:
         return {"type": "array", "items": _schema(arguments[0], definitions, closed=closed)}
     if origin is dict:

@@ -129,7 +129,7 @@ def _clearance_series(clearance: ClearanceReport) -> Tree:
     """What each class of pairs keeps over time; nothing where the curves were not worked out."""
     if not clearance.curves:
         return {}
-    return {"times_s": clearance.curve_times} | {f"{kind}_mm": MM * kept for kind, kept in clearance.curves.items()}
+    return {"times_s": clearance.curve_times} | {f"{kind}_mm": MM * curve for kind, curve in clearance.curves.items()}
 
 
 def _joint_series(uses: Iterable[JointUse], *, q: Array, qd: Array) -> Tree:

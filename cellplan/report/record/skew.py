@@ -88,7 +88,7 @@ def _record(skew: SkewReport) -> SkewRecord:
     return {
         "allowed_ms": number(MS * skew.allowed),
         "or_more": skew.allowed >= MOST_SKEW,
-        "each_ms": number(MS * skew.each),
+        "each_ms": number(MS * skew.alone),
         "clocks": [list(group) for group in skew.groups],
         "pairs": [_pair_record(pair) for pair in skew.pairs],
         "tools": {tool.name: _tool_record(tool) for tool in skew.tools},

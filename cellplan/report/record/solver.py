@@ -163,7 +163,7 @@ def solver_record(
         "slack": None if motion is None else _slack_record(motion),
         "resolution": None if motion is None else _resolution_record(motion),
         "transfers": dict(transfers) if transfers else None,
-        "moved_starts": [moved_start_record(each) for each in moved],
+        "moved_starts": [moved_start_record(start) for start in moved],
     }
 
 
@@ -186,18 +186,18 @@ def _own_settings(solver: SolverSettings) -> SettingsRecord:
     """Settings of the method itself; only the recursive search has a sequence."""
     match solver.method:
         case "damped_least_squares":
-            own = entry_record(solver.damped_least_squares)
+            damping = entry_record(solver.damped_least_squares)
         case "filtered_inverse" | "filtered_inverse_ii":
-            own = entry_record(solver.filtered_inverse)
+            damping = entry_record(solver.filtered_inverse)
         case "quadratic_program":
-            own = entry_record(solver.quadratic_program)
+            damping = entry_record(solver.quadratic_program)
         case "heuristic_search":
-            own = entry_record(solver.search, without={"sequence"})
+            damping = entry_record(solver.search, without={"sequence"})
         case "recursive_search":
-            own = entry_record(solver.search)
+            damping = entry_record(solver.search)
         case _:
-            own = {}
-    return own
+            damping = {}
+    return damping
 
 
 def _iterations_record(motion: Motion) -> IterationsRecord | None:

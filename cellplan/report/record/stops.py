@@ -64,25 +64,25 @@ def stops_record(report: Report) -> StopsKey:
     return {} if report.stops is None else {"stops": _record(report.stops)}
 
 
-def _record(found: StopReport) -> StopsRecord:
+def _record(stops: StopReport) -> StopsRecord:
     return {
-        "goes_on_ms": {robot: number(MS * time) for robot, time in found.runs_on.items()},
+        "goes_on_ms": {robot: number(MS * time) for robot, time in stops.runs_on.items()},
         "depths": {
-            each.task: {"depth_mm": number(MM * each.depth), "worst": _instant(each.worst)} for each in found.depths
+            depth.task: {"depth_mm": number(MM * depth.depth), "worst": _instant(depth.worst)} for depth in stops.depths
         },
         "distances": [
             {
-                "robots": list(each.robots),
-                "distance_mm": _distance(each.distance),
-                "proved_mm": _distance(each.proved),
-                "bodies": None if each.bodies is None else list(each.bodies),
-                "worst": _instant(each.worst),
+                "robots": list(distance.robots),
+                "distance_mm": _distance(distance.distance),
+                "proved_mm": _distance(distance.proved),
+                "bodies": None if distance.bodies is None else list(distance.bodies),
+                "worst": _instant(distance.worst),
             }
-            for each in found.distances
+            for distance in stops.distances
         ],
         "grips": {
-            each.robot: {"distance_mm": number(MM * each.distance), "worst": _instant(each.worst)}
-            for each in found.grips
+            grip.robot: {"distance_mm": number(MM * grip.distance), "worst": _instant(grip.worst)}
+            for grip in stops.grips
         },
     }
 

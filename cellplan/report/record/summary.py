@@ -97,7 +97,7 @@ def summary_record(
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": merged["clearance"],
         "required_clearance_mm": number(cell.checks.clearance_mm),
-        "left_out": left_out_record(dict.fromkeys(each for report in runs for each in report.clearance.left_out)),
+        "left_out": left_out_record(dict.fromkeys(entry for report in runs for entry in report.clearance.left_out)),
         "checks": [
             {"phase": name, **check_record(check)} for name, report in reports.items() for check in report.checks
         ],
@@ -156,7 +156,7 @@ def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
     if not {task.name for task in cell.tasks}.issuperset(report.tasks):
         return entry
     tasks = tasks_record(report, cell).values()
-    for task in sorted(tasks, key=lambda each: each["max_position_error_mm"] or 0.0)[-1:]:
+    for task in sorted(tasks, key=lambda errors: errors["max_position_error_mm"] or 0.0)[-1:]:
         entry["robot"] = task["robot"]
         entry["max_position_error_mm"] = task["max_position_error_mm"]
         entry["max_position_error_at_s"] = task["max_position_error_at_s"]

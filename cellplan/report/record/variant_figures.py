@@ -44,8 +44,8 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         phases: The ``report.json`` of each of its phases, in their order.
         proof: ``solved``, ``verified``, or why a run on disk was not verified again.
     """
-    whole, by_phase = figures_of_records(phases.values()), [figures_of_records([each]) for each in phases.values()]
-    at_work = [each for each in phases.values() if not record["tasks"].keys().isdisjoint(each["tasks"])]
+    whole, by_phase = figures_of_records(phases.values()), [figures_of_records([phase]) for phase in phases.values()]
+    at_work = [phase for phase in phases.values() if not record["tasks"].keys().isdisjoint(phase["tasks"])]
     work = figures_of_records(at_work)
     robots = _robots(record, phases.values(), whole, by_phase, work)
     holders = [name for name, robot in robots.items() if robot["role"] == "positioner"]
@@ -54,7 +54,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
     errors = {"position_error_mm": MM, "orientation_error_deg": DEG}
     failed = [check for check in record["checks"] if not check["passed"]]
     cycle = record["cycle_time_s"]
-    found = {
+    figures = {
         **whole.record(KEY),
         **{f"work_{key}": work.recorded(f"max_{key}") for key in WORK},
         "cycle_time_s": cycle,
@@ -62,7 +62,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         "mean_velocity_ratio": number(total / (cycle * joints)) if cycle and joints else None,
         "positioner_load_s": number(holding),
         "positioner_phase_load_s": number(
-            max((sum(_load(each, name) for name in holders) for each in by_phase), default=0.0)
+            max((sum(_load(phase, name) for name in holders) for phase in by_phase), default=0.0)
         ),
         "operator_load_s": number(total - holding),
         "operator_work_load_s": number(
@@ -79,7 +79,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         "required_clearance_mm": record["required_clearance_mm"],
         "proof": proof,
     }
-    return {key: found[key] for key in SHOWN}
+    return {key: figures[key] for key in SHOWN}
 
 
 def variant_curves(record: Record, phases: Sequence[Record], clearance: tuple[Array, Array] | None) -> dict[str, Any]:
@@ -90,22 +90,23 @@ def variant_curves(record: Record, phases: Sequence[Record], clearance: tuple[Ar
         phases: The ``series.json`` of each phase.
         clearance: Times in [s] and smallest distances of all bodies in [m], shape (K,) each; None if not known.
     """
-    found: dict[str, list[Array]] = {robot: [] for robot in record["joints"]}
+    ratios_of_robots: dict[str, list[Array]] = {robot: [] for robot in record["joints"]}
     times, begin = [], 0.0
     for phase in phases:
-        own = np.asarray(phase["times_s"], dtype=np.float64)
-        times.append(begin + 0.5 * (own[1:] + own[:-1]))
-        begin += float(own[-1])
+        phase_times = np.asarray(phase["times_s"], dtype=np.float64)
+        times.append(begin + 0.5 * (phase_times[1:] + phase_times[:-1]))
+        begin += float(phase_times[-1])
         for robot, joints in record["joints"].items():
-            found[robot].append(_speed_ratio(joints, phase["joints"][robot]))
+            ratios_of_robots[robot].append(_speed_ratio(joints, phase["joints"][robot]))
     middle = np.concatenate(times)
     place = np.minimum((INTERVALS * middle / begin).astype(np.int64), INTERVALS - 1)
-    kept, first = np.unique(place, return_index=True)
+    intervals, first = np.unique(place, return_index=True)
     at, distance = clearance or (np.empty(0), np.empty(0))
     return {
-        "times_s": _short((kept + 0.5) * begin / INTERVALS),
+        "times_s": _short((intervals + 0.5) * begin / INTERVALS),
         "velocity_ratio": {
-            robot: _short(np.maximum.reduceat(np.concatenate(ratios), first)) for robot, ratios in found.items()
+            robot: _short(np.maximum.reduceat(np.concatenate(ratios), first))
+            for robot, ratios in ratios_of_robots.items()
         },
         "clearance_times_s": _short(at),
         "clearance_mm": _short(1e3 * distance),
@@ -140,7 +141,7 @@ def _robots(
         robot: {
             "role": min(roles.get(robot, ["idle"]), key=ROLES.index),
             "load_s": number(_load(whole, robot)),
-            "phase_load_s": number(max((_load(each, robot) for each in by_phase), default=0.0)),
+            "phase_load_s": number(max((_load(phase, robot) for phase in by_phase), default=0.0)),
             "work_load_s": number(_load(work, robot)),
             "motion_share": number(_load(whole, robot) / total if total else 0.0),
             "joints": {name: _joint(joint) for name, joint in joints.items()},

@@ -66,7 +66,9 @@ def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[
     high, place = low + window.edge, low + 0.5 * window.edge
     middle = picture.mark.mean(axis=0)
     close = Camera(axes=camera.axes, middle=camera.axes[:2] @ middle, scale=scale, place=place)
-    near = [each for each in picture.solids if _reaches(each, close, low, high) and not _hides(each, picture, close)]
+    near = [
+        solid for solid in picture.solids if _reaches(solid, close, low, high) and not _hides(solid, picture, close)
+    ]
     x, y, edge = window.x, window.y, window.edge
     box = f'x="{x}" y="{y}" width="{edge}" height="{edge}" rx="40"'
     return "\n".join(

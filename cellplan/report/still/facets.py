@@ -85,7 +85,7 @@ def _of_mesh(mesh: Mesh, segments: int) -> Array:
 @lru_cache(maxsize=64)
 def _box(parts: tuple[int, int, int]) -> Array:
     """The unit cube about the origin, its faces cut into a grid."""
-    found = []
+    pieces = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         low = np.stack(np.meshgrid(np.arange(parts[u]), np.arange(parts[v]), indexing="ij"), axis=-1).reshape(-1, 1, 2)
@@ -93,8 +93,8 @@ def _box(parts: tuple[int, int, int]) -> Array:
         for side in (-0.5, 0.5):
             face = np.full((len(corners), 4, 3), side)
             face[..., [u, v]] = corners if side > 0.0 else corners[:, ::-1]
-            found.append(face)
-    return np.concatenate(found)
+            pieces.append(face)
+    return np.concatenate(pieces)
 
 
 @lru_cache(maxsize=64)
@@ -109,13 +109,13 @@ def _capsule(segments: int, parts: int) -> Array:
     """Side and both half balls of a capsule of unit radius and length; no side without parts."""
     bands = max(1, segments // 6)
     latitude = 0.5 * np.pi * np.arange(bands + 1) / bands
-    found = [_side(segments, parts)] if parts else []
+    pieces = [_side(segments, parts)] if parts else []
     for low, high in pairwise(latitude):
         lower, upper = (_ring(segments, np.cos(at), np.sin(at)) for at in (low, high))
         band = np.stack([lower, np.roll(lower, -1, 0), np.roll(upper, -1, 0), upper], axis=1)
         mirrored = band[:, ::-1] * (1.0, 1.0, -1.0)
-        found += [_raised(band, 0.5), _raised(mirrored, -0.5)]
-    return np.concatenate(found)
+        pieces += [_raised(band, 0.5), _raised(mirrored, -0.5)]
+    return np.concatenate(pieces)
 
 
 def _ring(segments: int, radius: float, height: float) -> Array:

@@ -42,7 +42,7 @@ def shadow_path(camera: Camera, picture: StillPicture) -> str:
         outline = np.array([R @ support_point(solid.shape, R.T @ n) + p for n in AROUND])
         outline[:, 2] = picture.floor
         seen = np.rint(camera.project(outline)[:, :2]).astype(np.int64)
-        kept = seen[np.any(seen != np.roll(seen, 1, axis=0), axis=1)].tolist()
-        if len(kept) > 2:
-            parts.append("M" + "L".join(f"{x} {y}" for x, y in kept) + "z")
+        points = seen[np.any(seen != np.roll(seen, 1, axis=0), axis=1)].tolist()
+        if len(points) > 2:
+            parts.append("M" + "L".join(f"{x} {y}" for x, y in points) + "z")
     return "".join(parts)

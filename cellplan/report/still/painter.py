@@ -63,23 +63,23 @@ class Painter:
             self._class(solids[solid].material, tone)
             for solid, tone in zip(mesh.solids.tolist(), tones(mesh.normals).tolist(), strict=True)
         ]
-        found = _Paths()
+        drawing = _Paths()
         texts = _polygons(corners)
         for index in order.tolist():
             if index >= len(names):
-                found.add_piece(pieces[index - len(names)][1])
+                drawing.add_piece(pieces[index - len(names)][1])
                 continue
-            found.add(names[index], texts[index])
+            drawing.add(names[index], texts[index])
             for first, second in edges.get(index, ()):
                 (x, y), (u, v) = corners[index, first].tolist(), corners[index, second].tolist()
                 if abs(u - x) + abs(v - y) > SHORTEST_EDGE:
-                    found.add("e", f"M{x} {y}l{u - x} {v - y}")
-        return found.text()
+                    drawing.add("e", f"M{x} {y}l{u - x} {v - y}")
+        return drawing.text()
 
     def _mesh(self, solids: Sequence[ShownSolid]) -> Mesh2D:
         """Facets that face the viewer and lie within what is shown."""
         placed = self._placed(solids)
-        counts = [len(each) // 4 for each in placed]
+        counts = [len(corners) // 4 for corners in placed]
         world = np.concatenate([np.zeros((0, 3)), *placed]).reshape(-1, 4, 3)
         owners = np.repeat(np.arange(len(solids)), counts)
         normals = np.cross(world[:, 2] - world[:, 0], world[:, 3] - world[:, 1]) @ self.camera.axes.T
@@ -92,37 +92,37 @@ class Painter:
 
     def _placed(self, solids: Sequence[ShownSolid]) -> list[Array]:
         """Corners of the facets of each solid in the world, shape (4 K, 3): as many as a picture may have."""
-        coarser, found = 1.0, self._facets(solids, 1.0)
-        while sum(map(len, found)) > 4 * MOST_FACETS and coarser < COARSEST:
+        coarser, facets = 1.0, self._facets(solids, 1.0)
+        while sum(map(len, facets)) > 4 * MOST_FACETS and coarser < COARSEST:
             coarser *= 2.0
-            found = self._facets(solids, coarser)
-        beyond = sum(map(len, found)) - 4 * MOST_FACETS
-        sizes = np.round([bounding_sphere(each.shape)[1] for each in solids], 6)
+            facets = self._facets(solids, coarser)
+        beyond = sum(map(len, facets)) - 4 * MOST_FACETS
+        sizes = np.round([bounding_sphere(solid.shape)[1] for solid in solids], 6)
         for index in np.argsort(sizes, kind="stable").tolist():  # the smallest first
             if beyond <= 0:
                 break
             flat = silhouette(solids[index].shape, solids[index].X_WS, self.camera.axes).reshape(-1, 3)
-            beyond -= len(found[index]) - len(flat)
-            found[index] = flat
-        return found
+            beyond -= len(facets[index]) - len(flat)
+            facets[index] = flat
+        return facets
 
     def _facets(self, solids: Sequence[ShownSolid], coarser: float) -> list[Array]:
         """Corners of the facets of each solid in the world, shape (4 K, 3)."""
-        return [solid_facets(each, self.camera, coarser=coarser).reshape(-1, 3) for each in solids]
+        return [solid_facets(solid, self.camera, coarser=coarser).reshape(-1, 3) for solid in solids]
 
     def _pieces(self, line: ShownLine) -> list[tuple[float, str]]:
         """Depth and path of pieces of a line."""
         seen = self.camera.project(line.points)
-        name, found = self._class(line.material, LINE), []
+        name, pieces = self._class(line.material, LINE), []
         for first in range(0, max(1, len(seen) - 1), RUN):
-            own = seen[first : first + RUN + 1]
-            if (own[:, :2].max(axis=0) < self.low).any() or (own[:, :2].min(axis=0) > self.high).any():
+            run = seen[first : first + RUN + 1]
+            if (run[:, :2].max(axis=0) < self.low).any() or (run[:, :2].min(axis=0) > self.high).any():
                 continue
-            points = " ".join(f"{x} {y}" for x, y in np.rint(own[:, :2]).astype(np.int64).tolist())
+            points = " ".join(f"{x} {y}" for x, y in np.rint(run[:, :2]).astype(np.int64).tolist())
             width = round(10.0 * line.width)
             text = f'<path class="{name}" style="stroke-width:{width}" d="M{points}"/>'
-            found.append((float(own[:, 2].mean()) + LIFT, text))
-        return found
+            pieces.append((float(run[:, 2].mean()) + LIFT, text))
+        return pieces
 
     def _class(self, material: str, tone: int) -> str:
         """Name of the class of a material in a tone."""
@@ -143,8 +143,8 @@ def depths_near(corners: Array, focus: Array) -> Array:
 
 def solid_facets(solid: ShownSolid, camera: Camera, *, coarser: float = 1.0) -> Array:
     """Facets of a solid in the world in [m], shape (K, 4, 3), as fine as a camera needs them."""
-    found = facets(solid.shape, sides(solid.shape, coarser * DEVIATION / camera.scale))
-    return transform_points(solid.X_WS, found.reshape(-1, 3)).reshape(-1, 4, 3)
+    corners = facets(solid.shape, sides(solid.shape, coarser * DEVIATION / camera.scale))
+    return transform_points(solid.X_WS, corners.reshape(-1, 3)).reshape(-1, 4, 3)
 
 
 @dataclass(slots=True)
@@ -210,7 +210,7 @@ def drawn_edges(mesh: Mesh2D) -> Mapping[int, list[tuple[int, int]]]:
     lone[:-1] &= ~same
     first, second = order[:-1][same], order[1:][same]
     bent = np.einsum("ij,ij->i", mesh.normals[first // 4], mesh.normals[second // 4]) < CREASE
-    found: dict[int, list[tuple[int, int]]] = {}
+    edges: dict[int, list[tuple[int, int]]] = {}
     for place in [*order[lone].tolist(), *first[bent].tolist()]:
-        found.setdefault(place // 4, []).append((place % 4, (place + 1) % 4))
-    return found
+        edges.setdefault(place // 4, []).append((place % 4, (place + 1) % 4))
+    return edges

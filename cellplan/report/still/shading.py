@@ -27,10 +27,10 @@ def tone_colour(colour: str, tone: int) -> str:
     factor = AMBIENT + (BRIGHTEST - AMBIENT) * tone / (LEVELS - 1)
     channels = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
     if factor <= 1.0:
-        mixed = [factor * each for each in channels]
+        mixed = [factor * channel for channel in channels]
     else:
-        mixed = [each + (factor - 1.0) * 1.6 * (255 - each) for each in channels]
-    return "#" + "".join(f"{min(255, round(each)):02x}" for each in mixed)
+        mixed = [channel + (factor - 1.0) * 1.6 * (255 - channel) for channel in channels]
+    return "#" + "".join(f"{min(255, round(channel)):02x}" for channel in mixed)
 
 
 def mixed(colour: str, other: str, share: float) -> str:

@@ -65,9 +65,9 @@ def _framing(picture: StillPicture) -> tuple[Camera, Window | None]:
     narrow = high - (DETAIL + GAP, 0)
     size = narrow - low
     axes = best_axes(picture, float(size[0] / size[1]))
-    beside = framed(axes, points, low=low, high=narrow)
-    if is_worth_it(picture, beside, DETAIL):
-        return beside, Window(x=WIDTH - MARGIN - DETAIL, y=round(float(low[1])), edge=DETAIL)
+    framing = framed(axes, points, low=low, high=narrow)
+    if is_worth_it(picture, framing, DETAIL):
+        return framing, Window(x=WIDTH - MARGIN - DETAIL, y=round(float(low[1])), edge=DETAIL)
     return framed(axes, points, low=low, high=high), None
 
 
@@ -80,11 +80,11 @@ def _described(picture: StillPicture) -> str:
 def _corners(picture: StillPicture) -> Array:
     """Corners of the boxes round all solids and the points of all lines, shape (N, 3)."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
-    found = [line.points for line in picture.lines]
+    points = [line.points for line in picture.lines]
     for solid in picture.solids:
         middle, half = bounding_box(solid.shape)
-        found.append((middle + signs * half) @ solid.X_WS[:3, :3].T + solid.X_WS[:3, 3])
-    return np.concatenate([*found, picture.mark]) if found else np.zeros((1, 3))
+        points.append((middle + signs * half) @ solid.X_WS[:3, :3].T + solid.X_WS[:3, 3])
+    return np.concatenate([*points, picture.mark]) if points else np.zeros((1, 3))
 
 
 def _floor(picture: StillPicture, camera: Camera) -> str:

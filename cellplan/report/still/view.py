@@ -27,7 +27,7 @@ STEP: Final = 1e-6  # [-] scores that differ by less are equal
 def best_axes(picture: StillPicture, aspect: float) -> Array:
     """Axes of the camera for a picture, shape (3, 3)."""
     choices = [(view_axes(a, e), usual) for e, usual in zip(ELEVATIONS, USUAL, strict=True) for a in AZIMUTHS]
-    axes = np.array([each for each, _ in choices])
+    axes = np.array([axes_tried for axes_tried, _ in choices])
     scores = np.array([usual for _, usual in choices]) + WIDE * _filled(picture, axes, aspect)
     scores += ROBOTS_IN_SIGHT * _robots_in_sight(picture, axes[:, 2])
     if len(picture.mark):
@@ -46,7 +46,7 @@ def _in_sight(picture: StillPicture, toward: Array) -> Array:
     points = np.array([point for point, _ in sights])
     hidden = np.zeros((len(toward), len(points)), dtype=bool)
     for solid in picture.solids:
-        hidden |= _hides(solid, points, toward) & np.array([solid.name not in own for _, own in sights])
+        hidden |= _hides(solid, points, toward) & np.array([solid.name not in marked for _, marked in sights])
     return 1.0 - hidden.mean(axis=1)
 
 
@@ -74,21 +74,21 @@ def _hides(solid: ShownSolid, points: Array, toward: Array) -> Flags:
 
 def _sights(picture: StillPicture) -> Iterator[tuple[Array, tuple[str, ...]]]:
     """Points that are to be seen, with the names of the solids that they lie in."""
-    own = tuple(picture.marked)
+    marked = tuple(picture.marked)
     if len(picture.mark) == 2:
         for share in BETWEEN:
             yield picture.mark[0] + share * (picture.mark[1] - picture.mark[0]), ()
     else:
-        yield picture.mark[0], own
-        yield picture.mark[0], own
+        yield picture.mark[0], marked
+        yield picture.mark[0], marked
     for solid in picture.solids:
-        if solid.name in own:
+        if solid.name in marked:
             yield solid.X_WS[:3, 3], (solid.name,)
 
 
 def _filled(picture: StillPicture, axes: Array, aspect: float) -> Array:
     """How much of the sheet middles of solids and lines fill, from 0 in the worst direction to 1 in the best."""
-    middles = np.array([each.X_WS[:3, 3] for each in picture.solids]).reshape(-1, 3)
+    middles = np.array([solid.X_WS[:3, 3] for solid in picture.solids]).reshape(-1, 3)
     points = np.concatenate([middles, *(line.points for line in picture.lines), picture.mark])
     if not len(points):
         return np.zeros(len(axes))

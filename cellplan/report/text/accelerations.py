@@ -29,19 +29,19 @@ def not_judged_lines(record: Record) -> Iterator[str]:
 def _joint_rows(joints: Record) -> Iterator[Row]:
     """The joint with the largest fraction of its limit, or else the largest acceleration; the largest jerk."""
     uses = [(f"{robot} {name}", use) for robot, named in joints.items() for name, use in named.items()]
-    known = [each for each in uses if each[1].get("peak_acceleration") is not None]
-    limited = [each for each in known if each[1]["acceleration_ratio"] is not None]
+    known = [use for use in uses if use[1].get("peak_acceleration") is not None]
+    limited = [entry for entry in known if entry[1]["acceleration_ratio"] is not None]
     if limited:
-        joint, use = max(limited, key=lambda each: float(each[1]["acceleration_ratio"]))
+        joint, use = max(limited, key=lambda entry: float(entry[1]["acceleration_ratio"]))
         source = "assumed" if use["acceleration_limit_source"] == "assumed" else "stated"
         figure = f"{percent(use['acceleration_ratio'], 1)} of its {source} limit"
         yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
     elif known:
-        joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_acceleration"]))
+        joint, use = max(known, key=lambda entry: (entry[1]["unit"] == "deg", entry[1]["peak_acceleration"]))
         figure = f"{fixed(use['peak_acceleration'])} {use['unit']}/s2, not limited"
         yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
     if known:
-        joint, use = max(known, key=lambda each: (each[1]["unit"] == "deg", each[1]["peak_jerk"]))
+        joint, use = max(known, key=lambda entry: (entry[1]["unit"] == "deg", entry[1]["peak_jerk"]))
         figure = f"{fixed(use['peak_jerk'], 0)} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
         yield "largest joint jerk", figure, f"{joint} {instant_text(use, 'peak_jerk_at_s')}"
 

@@ -42,11 +42,11 @@ def method_lines(record: Record, step_s: float) -> Iterator[str]:
 
 def moved_start_lines(records: Iterable[Record]) -> Iterator[str]:
     """How far each start was moved, from where the cell or an earlier run has it."""
-    for each in records:
-        source = f"of the run '{each['run']}'" if each["run"] else "as given"
+    for move in records:
+        source = f"of the run '{move['run']}'" if move["run"] else "as given"
         yield (
-            f"start of '{each['robot']}' for '{each['task']}' moved: {source} its tool is {each['tool_mm']:.3f} mm and "
-            f"{each['tool_deg']:.3f} deg off; most by '{each['joint']}', {each['joint_moved']:.3f} {each['unit']}"
+            f"start of '{move['robot']}' for '{move['task']}' moved: {source} its tool is {move['tool_mm']:.3f} mm and "
+            f"{move['tool_deg']:.3f} deg off; most by '{move['joint']}', {move['joint_moved']:.3f} {move['unit']}"
         )
 
 

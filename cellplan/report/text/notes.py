@@ -43,7 +43,7 @@ def left_out_notes(record: Record) -> list[str]:
     """One line for each kind of pairs that were not judged in full; none if the record has no such key."""
     if "left_out" not in record:
         return []
-    return left_out_lines((each["kind"], tuple(each["bodies"]), each["reason"]) for each in record["left_out"])
+    return left_out_lines((entry["kind"], tuple(entry["bodies"]), entry["reason"]) for entry in record["left_out"])
 
 
 def grip_notes(record: Record) -> list[str]:
@@ -60,13 +60,13 @@ def reaches_nowhere(check: Record) -> bool:
 def open_surface_notes(entries: Iterable[Record]) -> Iterator[tuple[str, str]]:
     """A line for each open surface, one for all links of a robot, with the key of the cell that it is about."""
     links: dict[str, list[Record]] = {}
-    for each in entries:
-        if each["has_inside"]:
-            links.setdefault(each["key"], []).append(each)
+    for entry in entries:
+        if entry["has_inside"]:
+            links.setdefault(entry["key"], []).append(entry)
         else:
-            edges = f"{each['open_edges']} open edge{'s' if each['open_edges'] != 1 else ''}"
-            yield each["key"], f"the mesh of {each['body']} has {edges}: contact is detected, containment is not"
+            edges = f"{entry['open_edges']} open edge{'s' if entry['open_edges'] != 1 else ''}"
+            yield entry["key"], f"the mesh of {entry['body']} has {edges}: contact is detected, containment is not"
     for key, meshes in links.items():
-        names = ", ".join(each["body"] for each in meshes[:MAX_NAMES]) + (", …" if len(meshes) > MAX_NAMES else "")
+        names = ", ".join(mesh["body"] for mesh in meshes[:MAX_NAMES]) + (", …" if len(meshes) > MAX_NAMES else "")
         count = f"{len(meshes)} meshes of links are" if len(meshes) > 1 else "the mesh of a link is"
         yield key, f"{count} open ({names}): points with a winding number above one half count as inside"

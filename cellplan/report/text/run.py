@@ -68,7 +68,7 @@ def left_out_lines(record: Record, more: str) -> list[str]:
     """
     if "left_out" not in record:
         return []
-    counts = Counter(str(each["kind"]) for each in record["left_out"])
+    counts = Counter(str(entry["kind"]) for entry in record["left_out"])
     if not counts:
         return [f"  {NOTHING_LEFT_OUT}"]
     kinds = ", ".join(f"{counts[kind]} {TITLES[kind]}" for kind in LeftOutKind if counts[kind])
@@ -168,39 +168,39 @@ def _program_lines(record: Record) -> Iterator[str]:
     """The phases of a program from home to home, and how its transfer moves were found."""
     if not record.get("cycles"):
         return
-    runs, found = record["runs"], record["solver"]["transfers"] or {}
+    runs, transfers = record["runs"], record["solver"]["transfers"] or {}
     phases = ", ".join(f"{name} {seconds(run['cycle_time_s'])} s" for name, run in runs.items())
     yield f"  from home to home, {record['cycles']} x: {phases}"
-    for name, words in found.items():
+    for name, words in transfers.items():
         yield f"  {name}: {words}"
 
 
 def _drift_rows(repeatability: Record) -> Iterator[Row]:
     """The largest drift of a joint over a cycle; nothing if all joints return."""
-    for name, found in repeatability.items():
-        if found["closes"]:
+    for name, joint_drift in repeatability.items():
+        if joint_drift["closes"]:
             continue
         subject = "all tasks" if name == "all" else f"task {name}"
-        of_cycles = f"cycle {{}} of {found['cycles']}" if found["cycles"] > 1 else "the cycle"
+        of_cycles = f"cycle {{}} of {joint_drift['cycles']}" if joint_drift["cycles"] > 1 else "the cycle"
         for unit, joint, cycle in (("deg", "joint", "at_cycle"), ("mm", "sliding_joint", "sliding_at_cycle")):
-            if f"worst_drift_{unit}" in found:
-                where = of_cycles.format(found[cycle])
-                drift = found[f"worst_drift_{unit}"]
-                yield "largest joint drift", f"{drift:.4g} {unit}", f"{found[joint]} in {where} of {subject}"
+            if f"worst_drift_{unit}" in joint_drift:
+                where = of_cycles.format(joint_drift[cycle])
+                drift = joint_drift[f"worst_drift_{unit}"]
+                yield "largest joint drift", f"{drift:.4g} {unit}", f"{joint_drift[joint]} in {where} of {subject}"
 
 
 def _clearance_rows(clearance: Record) -> Iterator[Row]:
     """The smallest distance of all, and those of the classes that it does not belong to."""
-    for words, found in {"smallest clearance": clearance["whole"], **other_classes(clearance)}.items():
-        if found["minimum_mm"] is None or not found["pair"]:
+    for words, minimum in {"smallest clearance": clearance["whole"], **other_classes(clearance)}.items():
+        if minimum["minimum_mm"] is None or not minimum["pair"]:
             continue
-        first, second = found["pair"]
-        proof = "certified" if found["certified"] else "not certified"
-        least = "" if found.get("exact", True) else "at least "
-        rests_on = accuracy_note(found["pair"], found.get("accuracies_mm"))
-        where = f"{first} - {second} {instant_text(found)}{f', {rests_on}' if rests_on else ''}"
-        label = words if found is clearance["whole"] else f"  {words}"
-        yield label, f"{least}{floored(found['minimum_mm'])} mm, {proof}", where
+        first, second = minimum["pair"]
+        proof = "certified" if minimum["certified"] else "not certified"
+        least = "" if minimum.get("exact", True) else "at least "
+        rests_on = accuracy_note(minimum["pair"], minimum.get("accuracies_mm"))
+        where = f"{first} - {second} {instant_text(minimum)}{f', {rests_on}' if rests_on else ''}"
+        label = words if minimum is clearance["whole"] else f"  {words}"
+        yield label, f"{least}{floored(minimum['minimum_mm'])} mm, {proof}", where
 
 
 def _slack_rows(slack: Record | None) -> Iterator[Row]:

@@ -15,8 +15,8 @@ def skew_row(record: Record) -> Iterator[Row]:
     """The smallest skew that is allowed between two clocks, and what limits it; nothing without controllers."""
     if "skew" not in record or not record["skew"]["pairs"]:
         return
-    pair = min(record["skew"]["pairs"], key=lambda each: float(each["allowed_ms"]))
-    least = min(pair["limits"], key=lambda each: float(each["skew_ms"]))
+    pair = min(record["skew"]["pairs"], key=lambda pair: float(pair["allowed_ms"]))
+    least = min(pair["limits"], key=lambda limit: float(limit["skew_ms"]))
     where = f"{pair['robots'][0]} - {pair['robots'][1]}"
     if least["subject"]:
         where = f"{where}, {demand_text(least['limit'], least['subject'])} {instant_text(least)}"
@@ -28,7 +28,7 @@ def skew_notes(skew: SkewReport) -> tuple[str, ...]:
     if not skew.pairs:
         return ("all robots share one clock",)
     lines = [
-        f"allowed skew between any two clocks: {_skew(skew.allowed)}; of each clock alone: +-{_skew(skew.each, 0.5)}"
+        f"allowed skew between any two clocks: {_skew(skew.allowed)}; of each clock alone: +-{_skew(skew.alone, 0.5)}"
     ]
     lines += [_pair_line(pair) for pair in skew.pairs]
     lines += [

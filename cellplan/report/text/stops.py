@@ -15,9 +15,9 @@ def stop_rows(record: Record) -> Iterator[Row]:
     if depths:
         task = max(depths, key=lambda name: float(depths[name]["depth_mm"]))
         yield "depth at a stop", f"{small(depths[task]['depth_mm'])} mm", f"task {task}{_when(depths[task]['worst'])}"
-    apart = [each for each in record["stops"]["distances"] if each["distance_mm"] is not None]
+    apart = [distance for distance in record["stops"]["distances"] if distance["distance_mm"] is not None]
     if apart:
-        nearest = min(apart, key=lambda each: float(each["distance_mm"]))
+        nearest = min(apart, key=lambda distance: float(distance["distance_mm"]))
         bodies = "" if nearest["bodies"] is None else " - ".join(nearest["bodies"])
         yield "clearance at a stop", f"{small(nearest['distance_mm'])} mm", f"{bodies}{_when(nearest['worst'])}"
     for robot, grip in record["stops"]["grips"].items():

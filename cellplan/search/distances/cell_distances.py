@@ -21,7 +21,7 @@ from cellplan.kinematics.link_forest import WORLD
 from cellplan.model.cell import Cell
 from cellplan.model.mounting import Bracket
 from cellplan.scene.body_table import BodyTable
-from cellplan.scene.near_table import Found, NearTable, wrenches
+from cellplan.scene.near_table import NearbyPairs, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
@@ -51,9 +51,9 @@ class LayoutDistances:
     D: Array  # displacements of the links, shape (links, K, 4, 4)
 
     @property
-    def found(self) -> Found:
+    def nearby(self) -> NearbyPairs:
         """The same as the table of bodies has them."""
-        return Found(
+        return NearbyPairs(
             rows=self.pairs,
             samples=self.keys,
             distances=self.distances,
@@ -98,7 +98,7 @@ class CellDistances:
             pairs=among(watched, _concerned(self.pairs, changed)),
             is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
-        self._demands, self._own = demands_of(self.pairs), are_own(self.pairs)
+        self._demands, self._within_robot = demands_of(self.pairs), are_own(self.pairs)
         self.most_demanded = float(self._demands.max(initial=0.0))
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array(
@@ -144,7 +144,7 @@ class CellDistances:
             keys=nearby.samples,
             distances=nearby.distances,
             demands=self._demands[nearby.rows],
-            is_own=self._own[nearby.rows],
+            is_own=self._within_robot[nearby.rows],
             normals=nearby.normals,
             first=nearby.first,
             second=nearby.second,
@@ -190,7 +190,7 @@ class CellDistances:
         robots = np.append(self._robots, -1)  # -1 for a half-space as well
         robots[list(self._moving.columns.values())] = -1  # they do not lean with their bases
         ends = robots[near.bodies]
-        forces = wrenches(near.found)
+        forces = wrenches(near.nearby)
         for side, sign in ((0, -1.0), (1, 1.0)):
             for robot in range(len(base)):
                 rows = (ends[:, side] == robot) & (ends[:, 1 - side] != robot)
@@ -233,7 +233,7 @@ class CellDistances:
             for component in np.flatnonzero(by.any(axis=1)).tolist():
                 forward, back = (self._column(name, _displaced(X_WB, component, step)) for step in (STEP, -STEP))
                 yield index, by[component], forward, back
-        for neighbour in self._variables.beside(x, STEP):
+        for neighbour in self._variables.neighbours(x, STEP):
             moved = (self._moving.that_differ(cell, neighbour.robot) for cell in neighbour.sides)
             for (index, forward), (_, back) in zip(*moved, strict=True):
                 if forward.shape != back.shape or not np.array_equal(forward.X_LS, back.X_LS):

@@ -33,13 +33,13 @@ class LayoutVariables(Protocol):
         """Velocity of the origin of each base in W and its angular velocity by each variable, shape (robots, 6, n)."""
         ...
 
-    def beside(self, x: Array, step: float) -> "Iterable[Beside]":
+    def neighbours(self, x: Array, step: float) -> "Iterable[NeighbourCells]":
         """Cells in which a tool or the part is a step to either side; all that variables do to these."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Beside:
+class NeighbourCells:
     """Two cells in which one number of a tool or of the part is a step in [m] or [rad] greater, and less.
 
     Attributes:
@@ -105,7 +105,7 @@ class MovingBodies:
                 yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone_mm.si, self._cuts[index])
 
     def that_differ(self, cell: Cell, robot: str | None) -> Iterator[tuple[int, Placed]]:
-        """Those of the tool of a robot, or the part where there is none; see ``Beside``."""
+        """Those of the tool of a robot, or the part where there is none; see ``NeighbourCells``."""
         return self.of_part(cell) if robot is None else self.of_tool(cell, robot)
 
     def of_part(self, cell: Cell) -> Iterator[tuple[int, Placed]]:

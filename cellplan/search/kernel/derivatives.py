@@ -106,19 +106,19 @@ class _Rates:
         twists += J @ bent
         bent -= inverse @ twists
         driven = -changes.in_rows(np.swapaxes(screws.based + screws.tooled, -1, -2))
-        self._beside = driven.reshape(len(q), -1, directions.count)
+        self._driven = driven.reshape(len(q), -1, directions.count)
         by_joints = np.ascontiguousarray(bent[:, :, :nq])
         self.by_joints, self.by_layout = (np.empty((len(q), 2 * nq, width)) for width in (nq, directions.count))
         projection, closed = self.by_joints[:, :nq], self.by_layout[:, :nq]
         np.subtract(np.eye(nq), inverse @ J, out=projection)
-        np.matmul(inverse, self._beside, out=closed)
+        np.matmul(inverse, self._driven, out=closed)
         np.matmul(by_joints, projection, out=self.by_joints[:, nq:])
         np.add(by_joints @ closed, bent[:, :, nq:], out=self.by_layout[:, nq:])
 
     def start(self, start: Array) -> Array:
         """Change of the start posture, shape (nq, p), once the tools are back at the starts of their paths."""
         inverse = self._inverse(self._J[None], self._settling / self._weights)[0]
-        return start + inverse @ (self._beside[0] - self._J @ start)
+        return start + inverse @ (self._driven[0] - self._J @ start)
 
     def _inverse(self, J: Array, mobility: Array) -> Array:
         """Weighted pseudo-inverse ``W^-1 J^T (J W^-1 J^T)^-1``, shape (N, nq, rows)."""

@@ -31,13 +31,13 @@ class JacobianChanges:
         self._is_carried = constraints.carrier_signs < 0.0
         self._ways, self._holder = ways(job)
         self._is_whole = constraints.is_whole and not at_tips
-        self.idle = (1.0 - constraints.kept).ravel()
+        self.idle = (1.0 - constraints.constrained).ravel()
         if not self._is_whole:
             self._rows = constrained_rows(job, screws.tip)
-        self._turning = screws.own * local[..., None]
+        self._turning = screws.operators * local[..., None]
         self._twist = self._turning.sum(axis=2, keepdims=True)  # of each tool seen from the base, (N, T, 1, 6)
         self._carried = screws.shared * shared[..., None]
-        self._minus = np.broadcast_to(-screws.shared[:, None], screws.own.shape)  # the part moves, not the tool
+        self._minus = np.broadcast_to(-screws.shared[:, None], screws.operators.shape)  # the part moves, not the tool
 
     @classmethod
     def of(cls, job: Job, screws: TaskScrews, qd: Array) -> "JacobianChanges":
@@ -49,7 +49,7 @@ class JacobianChanges:
     @property
     def jacobian(self) -> Array:
         """See the class."""
-        return self._columns(self._screws.own, self._minus, self._screws.based[:, :, :0])
+        return self._columns(self._screws.operators, self._minus, self._screws.based[:, :, :0])
 
     def twists(self) -> Array:
         """Change of ``J qd`` per unit of each joint and direction, shape (N, 6 T, nq + p)."""
@@ -57,7 +57,7 @@ class JacobianChanges:
         behind = twist - np.cumsum(self._turning, axis=2)
         before = np.cumsum(carried, axis=1) - carried
         turned, whole = bracket_matrix(twist[:, :, 0]), carried.sum(axis=1)
-        local = bracket(screws.own, behind)
+        local = bracket(screws.operators, behind)
         shared = self._minus @ turned + bracket(screws.shared, before)[:, None]
         held = screws.held @ bracket_matrix(whole)
         layout = screws.based @ turned + held[:, None] * self._is_carried[:, None, None]
@@ -73,11 +73,11 @@ class JacobianChanges:
         y = multipliers.reshape(nodes, -1, 6)
         if not self._is_whole:
             y = (np.swapaxes(self._rows, -1, -2) @ y[..., None])[..., 0]
-        power = screws.own @ power_matrix(y)
+        power = screws.operators @ power_matrix(y)
         held = (y * self._is_carried[:, None]).sum(axis=1)
         held_power = screws.shared @ power_matrix(held)
         below = np.tril(np.ones((power.shape[2],) * 2), -1)
-        by_own = (power @ np.swapaxes(screws.own, -1, -2)) * below
+        by_own = (power @ np.swapaxes(screws.operators, -1, -2)) * below
         by_shared, by_layout = -power @ np.swapaxes(screws.shared, -1, -2)[:, None], _products(power, screws.based)
         shared = (held_power @ np.swapaxes(screws.shared, -1, -2)) * below.T, _products(held_power, screws.held)
         forces = np.zeros((nodes, self._nq, self._nq + screws.held.shape[1]))
@@ -85,7 +85,7 @@ class JacobianChanges:
         for place, way in enumerate(self._ways):
             blocks = [by_own[:, place], by_shared[:, place], by_layout[:, place]]
             if tips is not None:
-                pull = cross(y[:, place, None, :3], screws.own[:, place, :, 3:])
+                pull = cross(y[:, place, None, :3], screws.operators[:, place, :, 3:])
                 blocks = [block + _products(pull, part[:, place]) for block, part in zip(blocks, tips, strict=True)]
             if self._has_own[place]:
                 self._put(forces, way, place, blocks)
@@ -129,7 +129,7 @@ class JacobianChanges:
     def _tips(self) -> tuple[Array, Array, Array]:
         """Displacement of the tips seen from R per unit of own axes, shared axes and directions, (N, T, ..., 3)."""
         screws = self._screws
-        moved = (screws.own, self._minus, screws.based + screws.tooled)
+        moved = (screws.operators, self._minus, screws.based + screws.tooled)
         local, shared, layout = (part[..., :3] + cross(part[..., 3:], screws.tip[:, :, None]) for part in moved)
         return local, shared, layout
 
@@ -170,7 +170,7 @@ def constrained_rows(job: Job, tip: Array) -> Array:
     free = constraints.is_spin_free
     R = np.moveaxis(job.X[:3, :3], (0, 1, 2, 3), (2, 3, 1, 0))[:, free]
     rows[:, free, 3:, 3:] = np.swapaxes(R, -1, -2)
-    return rows * constraints.kept[:, :, None]
+    return rows * constraints.constrained[:, :, None]
 
 
 def _products(first: Array, second: Array) -> Array:

@@ -45,7 +45,7 @@ class Directions:
 class TaskScrews:
     """Screws and twists at N nodes of one motion, for T relations and p directions."""
 
-    own: Array  # axes of each relation's own robot, shape (N, T, levels, 6)
+    operators: Array  # axes of each relation's own robot, shape (N, T, levels, 6)
     shared: Array  # axes of the positioner in the part frame, shape (N, levels, 6); zero without one
     tip: Array  # tool tips in R in [m], shape (N, T, 3)
     based: Array  # what each direction gives the base of the own robot, seen from R, shape (N, T, p, 6)
@@ -80,7 +80,7 @@ class TaskScrews:
             moved = bases[holder] @ _adjoint(R_WP, p_WP - layout.X_WB[0, holder, :3, 3]) + held
             based[:, constraints.carrier_signs < 0.0] -= moved[:, None]
         return cls(
-            own=unit_screws(axes[:, operators], points[:, operators], turning[operators], R, p),
+            operators=unit_screws(axes[:, operators], points[:, operators], turning[operators], R, p),
             shared=shared,
             tip=((tips[:, operators] - p)[..., None, :] @ R)[..., 0, :],
             based=based,

@@ -72,7 +72,7 @@ class SingularValues:
         job = replace(self.job, X=self.job.X[..., nodes])
         screws = TaskScrews.of(job, self.layout, self.q[nodes], directions)
         local, _ = ways(job)
-        left, rates = np.zeros((*screws.tip.shape[:2], 6)), np.zeros(screws.own.shape[:3])
+        left, rates = np.zeros((*screws.tip.shape[:2], 6)), np.zeros(screws.operators.shape[:3])
         for place, (J, is_constrained) in zip(arms(job), _jacobians(job, screws), strict=True):
             last = _count(J, is_constrained) - 1
             u, _, v = np.linalg.svd(J)
@@ -106,7 +106,9 @@ def usual_values(job: Job) -> Array:
     for place in arms(job):
         robot = int(job.constraints.operators[place])
         J = unit_screws(axes[:, robot], points[:, robot], turning[robot], R_WT[:, robot], tips[:, robot])
-        values.append(np.median(_least(np.swapaxes(J, 1, 2) @ local[place].to_joints, job.constraints.kept[place])))
+        values.append(
+            np.median(_least(np.swapaxes(J, 1, 2) @ local[place].to_joints, job.constraints.constrained[place]))
+        )
     return np.array(values)
 
 
@@ -115,8 +117,8 @@ def _jacobians(job: Job, screws: TaskScrews) -> list[tuple[Array, Flags]]:
     rows, (local, _) = constrained_rows(job, screws.tip), ways(job)
     return [
         (
-            rows[:, place] @ (np.swapaxes(screws.own[:, place], 1, 2) @ local[place].to_joints),
-            job.constraints.kept[place],
+            rows[:, place] @ (np.swapaxes(screws.operators[:, place], 1, 2) @ local[place].to_joints),
+            job.constraints.constrained[place],
         )
         for place in arms(job)
     ]

@@ -21,17 +21,19 @@ class Corner:
     start: Array  # its start posture in [rad] or [m], shape (nq,); not valid where it is not followed
     cycle: float  # its shortest cycle in [s]; inf where a tool loses its path
     margins: Array  # by how much each joint keeps more than the margin that is demanded, in [rad] or [m], shape (nq,)
-    rooms: Array  # by how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others
+    spare_distances: (
+        Array  # by how much each pair of bodies that is near keeps more than its distance, in [m]; inf for others
+    )
     first: str  # the limit that is the next to be missed, or that is missed most: one line of text
 
     @property
-    def room(self) -> float:
+    def spare_distance(self) -> float:
         """The least of ``rooms``."""
-        return float(self.rooms.min(initial=np.inf))
+        return float(self.spare_distances.min(initial=np.inf))
 
     def keeps(self, cycle: float) -> bool:
         """Whether all demands are kept in a cycle of so many seconds."""
-        return self.cycle <= cycle and bool(np.all(self.margins >= 0.0)) and self.room >= 0.0
+        return self.cycle <= cycle and bool(np.all(self.margins >= 0.0)) and self.spare_distance >= 0.0
 
 
 def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, effort: Effort) -> list[Corner]:
@@ -59,7 +61,7 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
 def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
     """A layout in which a tool cannot follow."""
     margins, rooms = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
-    return Corner(d=d, start=start, cycle=np.inf, margins=margins, rooms=rooms, first="a tool loses its path")
+    return Corner(d=d, start=start, cycle=np.inf, margins=margins, spare_distances=rooms, first="a tool loses its path")
 
 
 def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
@@ -73,7 +75,7 @@ def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
         start=point.start,
         cycle=measures.cycle,
         margins=-beyond,
-        rooms=rooms,
+        spare_distances=rooms,
         first=_first(problem, measures, beyond, rooms),
     )
 

@@ -11,7 +11,7 @@ from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.settings.layout import MisplacementEntry
-from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.variables import Variables
@@ -109,7 +109,7 @@ class BaseDisplacements:
             twists[robot, TWIST_ROWS[component], column] = 1.0
         return twists
 
-    def beside(self, d: Array, step: float) -> tuple[Beside, ...]:  # noqa: ARG002 - of the protocol
+    def neighbours(self, d: Array, step: float) -> tuple[NeighbourCells, ...]:  # noqa: ARG002 - of the protocol
         """Nothing: a displaced base changes no tool and no grasp."""
         return ()
 

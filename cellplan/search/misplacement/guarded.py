@@ -24,7 +24,7 @@ FOLDS: Final = 4.0  # [-] times the first-order change that is kept: 2 is the fo
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Found:
+class _Measured:
     """Distances of the bodies, the singular values at all nodes, and the node and arm of each that counts."""
 
     bodies: Distances
@@ -46,7 +46,7 @@ class GuardedProblem(LayoutProblem):
     def __post_init__(self) -> None:
         """Note which arms are guarded."""
         LayoutProblem.__post_init__(self)
-        constrained, robots = self.job.constraints.kept.sum(axis=1), self.job.cell.robots
+        constrained, robots = self.job.constraints.constrained.sum(axis=1), self.job.cell.robots
         joints = [len(robots[int(robot)].model.joints) for robot in self.job.constraints.operators]
         redundant = [count for count, place in enumerate(arms(self.job)) if joints[place] >= constrained[place]]
         derive(self, guards=np.array(redundant, dtype=np.intp))
@@ -78,7 +78,7 @@ class GuardedProblem(LayoutProblem):
         if not len(self.guards):
             return bodies
         at, subjects = np.repeat(nodes, len(self.guards)), np.tile(self.guards, len(nodes))
-        measured = _Found(bodies=bodies, arms=self.arms(point), nodes=at, subjects=subjects)
+        measured = _Measured(bodies=bodies, arms=self.arms(point), nodes=at, subjects=subjects)
         pairs = len(self.bodies.pairs) + np.tile(np.arange(len(self.guards)), len(nodes))
         return Distances(
             pairs=np.append(bodies.pairs, pairs).astype(np.intp),
@@ -86,14 +86,14 @@ class GuardedProblem(LayoutProblem):
             values=np.append(bodies.values, LENGTH * measured.arms.values[at, subjects]),
             demands=np.append(bodies.demands, np.zeros(len(at))),
             is_own=np.append(bodies.is_own, np.ones(len(at), dtype=bool)).astype(bool),
-            found=measured,
+            detail=measured,
         )
 
     def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        if not isinstance(distances.found, _Found):
+        if not isinstance(distances.detail, _Measured):
             return LayoutProblem.distance_derivatives(self, point, distances, by_joints)
-        measured = distances.found
+        measured = distances.detail
         bodies = LayoutProblem.distance_derivatives(self, point, measured.bodies, by_joints)
         return np.concatenate(
             [bodies, LENGTH * measured.arms.derivatives(measured.nodes, measured.subjects, by_joints.q)]

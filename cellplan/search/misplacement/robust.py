@@ -43,7 +43,7 @@ class Robust:
         corners: All corners that were planned: the worst ones by derivatives, the ends, then the seeded ones.
     """
 
-    found: Improved  # the layout, as the last programs left it, with its motion in place
+    improved: Improved  # the layout, as the last programs left it, with its motion in place
     corners: tuple[Corner, ...]
     worst_ones: int  # number of those by derivatives
     ends: int  # number of displacements at their ends, one at a time
@@ -58,7 +58,7 @@ class Robust:
         return all(corner.keeps(self.cycle) for corner in self.corners)
 
     @property
-    def kept(self) -> int:
+    def passing(self) -> int:
         """Number of corners that keep all demands in ``cycle``."""
         return sum(corner.keeps(self.cycle) for corner in self.corners)
 
@@ -129,7 +129,7 @@ class RobustSearch:
         d = np.concatenate([of.given[None], listed, ends, signs * of.upper])
         nominal, *corners = judged(of, d, improved.start, self.demands, replace(self.effort, within=WITHIN))
         return Robust(
-            found=replace(improved, point=point),
+            improved=replace(improved, point=point),
             corners=tuple(corners),
             worst_ones=len(listed),
             ends=len(ends),
@@ -145,10 +145,10 @@ class RobustSearch:
         followed = [corner for corner in corners if np.isfinite(corner.cycle)]
         if len(followed) < len(corners):  # only further from singular configurations helps
             self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
-        lacks = -np.min([corner.rooms for corner in followed], axis=0) if followed else np.zeros(0)
+        lacks = -np.min([corner.spare_distances for corner in followed], axis=0) if followed else np.zeros(0)
         if (lacks > 0.0).any():
             self._beyond += np.where(lacks > 0.0, np.minimum(lacks, MOST_LENGTH) + MORE_LENGTH, 0.0)
-        most = robust.found.cycle
+        most = robust.improved.cycle
         if self.demands.objective is not Objective.CYCLE and self.demands.duration is not None:
             most = self.demands.duration
         added = self._add(sorted(followed, key=lambda scenario: -_missed(scenario, most)), most)
@@ -207,4 +207,4 @@ def _missed(corner: Corner, most: float) -> float:
 def _rank(robust: Robust, demands: Demands) -> tuple[bool, int, float]:
     """What makes one better than another."""
     is_late = demands.duration is not None and robust.cycle > demands.duration
-    return is_late or not robust.is_kept, len(robust.corners) - robust.kept, robust.cycle
+    return is_late or not robust.is_kept, len(robust.corners) - robust.passing, robust.cycle

@@ -22,7 +22,7 @@ class Tolerance:
     sign: float  # direction, -1 or 1
     unit: Array  # the displacement by 1 [m] or [rad] in this direction, shape (m,)
     start: Array  # start posture at ``kept`` in [rad] or [m], shape (nq,)
-    kept: float  # largest displacement found in [m] or [rad] at which all demands are kept, not negative
+    extent: float  # largest displacement found in [m] or [rad] at which all demands are kept, not negative
     missed: float  # smallest one found at which a demand is missed; inf where none was missed as far as was asked
     first: str  # the demand that is missed there; empty without one
 
@@ -61,7 +61,7 @@ def tolerances(
             sign=1.0 if row < count else -1.0,
             unit=directions[row] / size[row],
             start=starts[row],
-            kept=float(tolerated[row] * size[row]),
+            extent=float(tolerated[row] * size[row]),
             missed=float(missed[row] * size[row]),
             first=first[row],
         )

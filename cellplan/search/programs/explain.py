@@ -51,7 +51,7 @@ class Explanation:
 def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) -> Explanation | None:
     """What binds at a point; None where the program there has no solution."""
     measures = Measures.of(problem, point, demands, effort)
-    program = Program.of(Linear.of(problem, measures), demands, effort.room, NEAR).priced(1.0)
+    program = Program.of(Linear.of(problem, measures), demands, effort.reserve, NEAR).priced(1.0)
     step = program.solve()
     if step is None:
         return None

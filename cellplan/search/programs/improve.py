@@ -140,7 +140,7 @@ class _Climb:
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
-        program = Program.of(linear, self._demands, self._effort.room, self._trust).priced(self._price)
+        program = Program.of(linear, self._demands, self._effort.reserve, self._trust).priced(self._price)
         self._price = program.price
         bends: Array | None = None
         for _ in range(1 + CORRECTIONS):
@@ -190,7 +190,7 @@ class _Climb:
         measures = Measures.of(self._problem, point, self._demands, self._effort)
         return _State(
             measures=measures,
-            missed=measures.missed(self._problem, self._demands, self._effort.room),
+            missed=measures.missed(self._problem, self._demands, self._effort.reserve),
             objective=measures.objective(self._problem, self._demands),
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.search.kernel.figures import FIGURES, Crests, refuse_not_finite
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve, Timing
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import ArmValues, Distances, Point, Problem
 
@@ -95,13 +95,13 @@ class Measures:
             pace=pace,
         )
 
-    def missed(self, problem: Problem, demands: Demands, reserve: Room) -> "Missed":
+    def missed(self, problem: Problem, demands: Demands, reserve: Reserve) -> "Missed":
         """What every joint and pair misses at its worst."""
         units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
         joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + reserve.margin) / units
         lacks, allowed = [joints.ravel()], [np.tile(0.5 * reserve.margin / units, 2)]
         worst = np.full(int(self.distances.pairs.max(initial=-1)) + 1, -np.inf)
-        reserved = rooms(self.distances, reserve)
+        reserved = reserves(self.distances, reserve)
         np.maximum.at(worst, self.distances.pairs, (self.lacks + reserved) / LENGTH)
         most = np.zeros_like(worst)
         most[self.distances.pairs] = 0.5 * reserved / LENGTH
@@ -212,9 +212,9 @@ def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, 
     return speeds, accelerations, factor
 
 
-def rooms(distances: Distances, reserve: Room) -> Array:
+def reserves(distances: Distances, reserve: Reserve) -> Array:
     """What is asked of near pairs beyond their demands in [m], shape (M,)."""
-    return np.where(distances.is_own, reserve.own, reserve.distance)
+    return np.where(distances.is_own, reserve.within_robot, reserve.distance)
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:

@@ -21,9 +21,9 @@ class NearPairs:
         Raises:
             TypeError: The distances are not those of ``distances_at``.
         """
-        if not isinstance(distances.found, NearPairs):
+        if not isinstance(distances.detail, NearPairs):
             raise TypeError("distance_derivatives: expected distances of this problem")
-        return distances.found
+        return distances.detail
 
 
 def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, within: float) -> Distances:
@@ -42,5 +42,5 @@ def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, with
         values=near.distances,
         demands=near.demands,
         is_own=near.is_own,
-        found=NearPairs(near=near, nodes=nodes),
+        detail=NearPairs(near=near, nodes=nodes),
     )

@@ -53,7 +53,7 @@ class Demands:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Room:
+class Reserve:
     """By how much more than demanded the rows of a program ask for, so that what a step bends does not break a demand.
 
     Half of it counts as kept at a point.
@@ -61,7 +61,7 @@ class Room:
 
     margin: float = float(np.radians(0.15))  # in [rad] or [m]
     distance: float = 0.0025  # in [m]
-    own: float = 0.0001  # likewise of a robot's own bodies: little, as their distances are often its design
+    within_robot: float = 0.0001  # likewise of a robot's own bodies: little, as their distances are often its design
     time: float = 0.002  # share of the duration
     singular: float = 0.02  # share of the singular values that are demanded
 
@@ -79,6 +79,6 @@ class Effort:
     also_at: tuple[float, ...] = ()  # times in [s] along the nodes at which they are asked as well
     within: float = 0.06  # distance in [m] above what is demanded, within which pairs become rows
     trust: float = 0.5  # first radius of the trust region, in usual steps of the variables
-    room: Room = field(default_factory=Room)  # what the rows ask for beyond the demands
+    reserve: Reserve = field(default_factory=Reserve)  # what the rows ask for beyond the demands
     least_gain: float = 3e-3  # share of the objective that ``LOOKS_BACK`` programs must gain to go on
     give_up_above: float | None = None

@@ -18,7 +18,7 @@ from cellplan.planning.timing.path_length import KINK, REST_SHARE
 from cellplan.planning.timing.speed_profile import largest_squares
 from cellplan.search.programs.problem import Point, Problem
 
-BESIDE: Final = ((0, 1, 2), (-1, -2, -3))  # the ends of a stretch and the nodes beside them
+END_NODES: Final = ((0, 1, 2), (-1, -2, -3))  # the ends of a stretch and the nodes beside them
 LEAST_STEP: Final = 1e-9  # [-] share of the longest step
 FEWEST_NODES: Final = 4  # [-] of a stretch: an end at rest takes its direction from the two nodes beside it
 
@@ -35,9 +35,9 @@ class Stretch:
 
     def directions(self, qd: Array) -> Array:
         """Derivatives of the joints by the length, of all (N, ...) the (M, ...); at a rest those beside it go on."""
-        directions = _each(qd[self.nodes], 1.0 / self.rates)
+        directions = _per_row(qd[self.nodes], 1.0 / self.rates)
         for is_resting, (end, near, far), steps in zip(
-            self.at_rest, BESIDE, (self.steps, self.steps[::-1]), strict=True
+            self.at_rest, END_NODES, (self.steps, self.steps[::-1]), strict=True
         ):
             if is_resting:
                 share = steps[0] / steps[1]
@@ -46,7 +46,7 @@ class Stretch:
 
     def curvatures(self, directions: Array, qdd: Array) -> Array:
         """Second derivatives by the length, shape (M, ...); 0 at a rest, where nothing comes of them."""
-        curvatures = _each(qdd[self.nodes] - _each(directions, self.bends), 1.0 / self.rates**2)
+        curvatures = _per_row(qdd[self.nodes] - _per_row(directions, self.bends), 1.0 / self.rates**2)
         curvatures[[end for end, is_resting in zip((0, -1), self.at_rest, strict=True) if is_resting]] = 0.0
         return curvatures
 
@@ -159,7 +159,9 @@ class Pace:
     def loads(self, qd: Array, qdd: Array, squares: Array) -> Array:
         """Loads of a path over the lengths of this one as shares of their limits, with signs, shape (E, nq)."""
         places, (directions, curvatures) = self.places(squares), self.shapes(qd, qdd)
-        loads = _each(directions[places.at], places.by_direction) + _each(curvatures[places.at], places.by_curvature)
+        loads = _per_row(directions[places.at], places.by_direction) + _per_row(
+            curvatures[places.at], places.by_curvature
+        )
         limits: Array = np.where(places.is_speed[:, None], self.velocity, self.acceleration)
         return loads / limits
 
@@ -185,8 +187,8 @@ class Pace:
         places, inner, count = self.places(self.squares), self.inner, by[0].shape[-1]
         at = places.at[rows]
         derivatives = np.zeros((len(rows), count + len(self.squares)))
-        derivatives[:, :count] = _each(by[0][at, joints], places.by_direction[rows])
-        derivatives[:, :count] += _each(by[1][at, joints], places.by_curvature[rows])
+        derivatives[:, :count] = _per_row(by[0][at, joints], places.by_direction[rows])
+        derivatives[:, :count] += _per_row(by[1][at, joints], places.by_curvature[rows])
         by_shape = np.stack([part[at, joints] for part in shapes], axis=1)
         per_square = np.einsum("rk,rks->rs", by_shape, places.changes[rows])
         for side in range(2):
@@ -226,7 +228,7 @@ def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ..
     return tuple(stretches)
 
 
-def _each(values: Array, factors: Array) -> Array:
+def _per_row(values: Array, factors: Array) -> Array:
     """Values (M, ...) times a factor of each row (M,)."""
     scaled: Array = values * factors.reshape(-1, *(1,) * (values.ndim - 1))
     return scaled

@@ -43,7 +43,7 @@ class Distances:
     values: Array  # signed distances in [m], shape (M,)
     demands: Array  # what the cell demands of them in [m], shape (M,)
     is_own: Flags  # whether both bodies belong to one robot, so that its design may set the distance, shape (M,)
-    found: object  # what the problem needs for their derivatives
+    detail: object  # what the problem needs for their derivatives
 
 
 class ArmValues(Protocol):

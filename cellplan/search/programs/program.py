@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.programs.measures import IN_ROOM
-from cellplan.search.programs.objective import Demands, Objective, Room
+from cellplan.search.programs.objective import Demands, Objective, Reserve
 from cellplan.search.programs.rows import Linear, Rows
 from cellplan.search.programs.solver import Solved, least
 
@@ -54,7 +54,7 @@ class Program:
     price: float = 1.0  # what a slack of one unit costs
 
     @classmethod
-    def of(cls, linear: Linear, demands: Demands, reserve: Room, trust: float) -> "Program":
+    def of(cls, linear: Linear, demands: Demands, reserve: Reserve, trust: float) -> "Program":
         """The program of a point, for a trust region of some radius in usual steps."""
         problem, x = linear.problem, linear.measures.point.x
         lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)

@@ -8,8 +8,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures, rooms
-from cellplan.search.programs.objective import Demands, Objective, Room
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures, reserves
+from cellplan.search.programs.objective import Demands, Objective, Reserve
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import PointDerivatives, Problem
 
@@ -100,7 +100,7 @@ class Linear:
             distances=problem.distance_derivatives(point, measures.distances, derivatives),
         )
 
-    def rows(self, demands: Demands, reserve: Room, box: Array) -> list[Rows]:
+    def rows(self, demands: Demands, reserve: Reserve, box: Array) -> list[Rows]:
         """All rows that a step within a box can bind; the ones that bound the objective first.
 
         Args:
@@ -120,14 +120,14 @@ class Linear:
             first = [] if duration is None else [self._lasting(pace, duration, demands, reserve), *self._paced(pace)]
         return [rows.that_can_bind(box) for rows in (*first, *parts) if len(rows.lacks)]
 
-    def _duration(self, demands: Demands, reserve: Room) -> float | None:
+    def _duration(self, demands: Demands, reserve: Reserve) -> float | None:
         """How many times as long as the nodes the motion may last; None where it may last as long as it takes."""
         if demands.objective is Objective.CYCLE:
             return self.measures.factor
         span = float(self.problem.times[-1] - self.problem.times[0])
         return None if demands.duration is None else demands.duration / span / (1.0 + reserve.time)
 
-    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Room) -> Rows:
+    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Reserve) -> Rows:
         """The duration of a retimed motion: the objective itself, or bounded by a given one."""
         is_aim = demands.objective is Objective.CYCLE
         share, unit, count = self.measures.factor / whole, 1.0 if is_aim else SHARE, len(self.problem.scale)
@@ -169,7 +169,7 @@ class Linear:
                 signs=signs,
             )
 
-    def _timing(self, whole: float, demands: Demands, reserve: Room) -> Iterator[Rows]:
+    def _timing(self, whole: float, demands: Demands, reserve: Reserve) -> Iterator[Rows]:
         """Speeds and accelerations under the laws: the objective itself, or bounds at a given duration."""
         measures, problem = self.measures, self.problem
         is_aim = demands.objective is Objective.CYCLE
@@ -195,7 +195,7 @@ class Linear:
                 aim=1.0 if is_aim else 0.0,
             )
 
-    def _margins(self, reserve: Room, box: Array) -> Iterator[Rows]:
+    def _margins(self, reserve: Reserve, box: Array) -> Iterator[Rows]:
         """Distances of the joints from their limits."""
         problem, dq = self.problem, self.derivatives.q
         reach = np.abs(dq) @ (problem.scale * box)
@@ -217,20 +217,20 @@ class Linear:
                 units=units[columns],
             )
 
-    def _apart(self, reserve: Room) -> Rows:
+    def _apart(self, reserve: Reserve) -> Rows:
         """Distances of near pairs."""
         distances = self.measures.distances
         return Rows(
             kind=Kind.DISTANCE,
             subjects=distances.pairs,
             nodes=distances.nodes,
-            lacks=(self.measures.lacks + rooms(distances, reserve)) / LENGTH,
+            lacks=(self.measures.lacks + reserves(distances, reserve)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
-            allowed=0.5 * rooms(distances, reserve) / LENGTH,
+            allowed=0.5 * reserves(distances, reserve) / LENGTH,
             units=np.full(len(distances.pairs), LENGTH),
         )
 
-    def _regular(self, demands: Demands, reserve: Room) -> Iterator[Rows]:
+    def _regular(self, demands: Demands, reserve: Reserve) -> Iterator[Rows]:
         """Least singular values of the arms."""
         arms, crests = self.measures.arms, self.measures.singular
         nodes, subjects = (part.astype(np.intp) for part in np.nonzero(crests.value > -NEAR_SINGULAR))
@@ -253,5 +253,5 @@ class Linear:
 
     def _aimed_apart(self) -> Rows:
         """Distances of near pairs but those of a robot's own bodies, as bounds of the objective."""
-        rows = self._apart(Room(distance=0.0)).of(~self.measures.distances.is_own)
+        rows = self._apart(Reserve(distance=0.0)).of(~self.measures.distances.is_own)
         return replace(rows, lacks=rows.lacks - self.measures.nearest / LENGTH, aim=1.0)

@@ -9,7 +9,7 @@ from cellplan.kinematics.batched import Placement
 from cellplan.search.spline_path.nodes import PathNodes
 
 MOST_STEPS: Final = 12  # of Newton's method: four from a motion nearby
-FOUND: Final = 1e-10  # [rad] and [m]: a step below this changes nothing any more
+CONVERGED: Final = 1e-10  # [rad] and [m]: a step below this changes nothing any more
 LONGEST: Final = 1.0  # [rad] or [m] of a step: beyond it another solution may be nearer
 TORN: Final = 0.1  # [rad] or [m] by which joints may leave their own speeds from node to node
 START_STEPS: Final = 30  # of Newton's method to bring the tools to the starts of their paths
@@ -40,7 +40,7 @@ def followed(nodes: PathNodes, placement: Placement, coefficients: Array, q: Arr
             if not longest <= LONGEST:
                 return None
             at = at + step
-            if longest <= FOUND:
+            if longest <= CONVERGED:
                 break
         else:
             return None
@@ -76,9 +76,9 @@ def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start
                 step = linear.correction(still)
                 longest = float(np.abs(step).max(initial=0.0))
                 at = at + step * min(1.0, LONGEST / max(longest, LONGEST))
-                if longest <= FOUND:
+                if longest <= CONVERGED:
                     break
-            if not longest <= FOUND:
+            if not longest <= CONVERGED:
                 return None
             positions[node] = at[:, 0]
             if node + 1 < len(times):

@@ -97,7 +97,7 @@ def _operators(job: Job) -> Indices:
     """
     operators = []
     for relation, is_constrained, operator in zip(
-        job.relations, job.constraints.kept, job.constraints.operators, strict=True
+        job.relations, job.constraints.constrained, job.constraints.operators, strict=True
     ):
         robot = job.cell.robots[operator]
         columns = job.cell.columns(robot.name)

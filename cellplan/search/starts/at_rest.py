@@ -22,7 +22,7 @@ GIVEN_BASE: Final = 0.5  # share of the draws with the holder's base where it is
 DRAWS: Final = 1500  # [-] bases of an operator
 CONFIGURATIONS: Final = 6  # [-] per base that are drawn; the best matching ones are taken
 TEMPLATES: Final = 100  # [-] of these with tools, tilts and heights of their own; places and yaws follow from the path
-KEPT: Final = 40  # [-] bases of an operator that are kept
+MOST_BASES: Final = 40  # [-] bases of an operator that are kept
 LOOKED_AT: Final = 0.0, 0.34, 0.67  # shares of a path at which contacts are asked
 CONTACTS_AT_ONCE: Final = 32
 FAR_AWAY: Final = 0.1  # [m] from the start of a path, where it is worth saying
@@ -113,7 +113,7 @@ def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
     """Variables with those of the holder, and those that place several robots, drawn, the given ones first."""
     cell, variables = problem.cell, problem.variables
     holder = 0 if cell.carrier is None else cell.carrier
-    x = drawn_within(variables, np.append(problem.freedom.own[holder], problem.freedom.shared), SETTINGS, rng)
+    x = drawn_within(variables, np.append(problem.freedom.by_robot[holder], problem.freedom.shared), SETTINGS, rng)
     places = problem.freedom.columns[cell.columns(cell.robots[holder].name)]
     joints = places[places != FIXED]
     middle = 0.5 * (np.maximum(variables.lower, -np.pi) + np.minimum(variables.upper, np.pi))[joints]
@@ -199,7 +199,7 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     rows = order[ranked[free]]
     return Pool(
         x=x[rows],
-        columns=problem.freedom.own[robot],
+        columns=problem.freedom.by_robot[robot],
         q=q[rows, 0],
         joints=np.arange(problem.cell.joint_count)[problem.cell.columns(goal.relation.robot)],
         cost=cost[ranked[free]],
@@ -231,7 +231,7 @@ def _costs(problem: StartProblem, robot: int, q: Array, margins: Array) -> Array
 
 
 def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: Array, drops: Counter[str]) -> Indices:
-    """The first ``KEPT`` of some draws that keep their distance from all but other operators."""
+    """The first ``MOST_BASES`` of some draws that keep their distance from all but other operators."""
     indices, columns = list[int](), problem.cell.columns(problem.cell.robots[robot].name)
     nodes = np.unique([round(share * (q.shape[1] - 1)) for share in LOOKED_AT])
     for first in range(0, len(q), CONTACTS_AT_ONCE):
@@ -249,9 +249,9 @@ def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: A
                 indices.append(index)
             else:
                 drops[f"{pair[0]} too near {pair[1]}"] += 1
-        if len(indices) >= KEPT:
+        if len(indices) >= MOST_BASES:
             break
-    return np.array(indices[:KEPT], dtype=np.intp)
+    return np.array(indices[:MOST_BASES], dtype=np.intp)
 
 
 def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, drawn: Array) -> Array:

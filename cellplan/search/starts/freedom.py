@@ -25,7 +25,7 @@ class Freedom:
     """The variables of a search, sorted by the robot that they place.
 
     Attributes:
-        own: Columns of the variables that move only this robot's base, tool or start posture, by robot; and those that
+        by_robot: Columns of the variables that move only this robot's base, tool or start posture; and those that
             move other operators after it as well.
         base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
             shape (robots, 4).
@@ -34,7 +34,7 @@ class Freedom:
         leaders: By robot, the one whose own variables move it too: equal or mirrored ones; itself without any.
     """
 
-    own: tuple[Indices, ...]
+    by_robot: tuple[Indices, ...]
     base: Indices
     columns: Indices  # column of the start position of each joint; ``FIXED`` where there is none, shape (nq,)
     shared: Indices
@@ -71,7 +71,7 @@ class Freedom:
         base = [_base_columns(robot.name, variables.names, led_columns[i]) for i, robot in enumerate(cell.robots)]
         led = [set(leader[moved[:, index] & ~is_part]) - {FIXED, index} for index in range(len(cell.robots))]
         return cls(
-            own=led_columns,
+            by_robot=led_columns,
             base=np.array(base, dtype=np.intp),
             columns=columns,
             shared=np.flatnonzero((leader == FIXED) & ~is_part & (moved.sum(axis=1) > 1)),

@@ -54,12 +54,12 @@ class Start:
 class Starts:
     """The starts of one number, the best first, each far from those before it where that could be had."""
 
-    found: tuple[Start, ...]
+    starts: tuple[Start, ...]
     reason: str  # why there is none, or why draws failed that were tried before
 
     def __iter__(self) -> Iterator[Start]:
         """The starts, the best first."""
-        return iter(self.found)
+        return iter(self.starts)
 
     @property
     def first(self) -> tuple[Array, Array]:
@@ -68,9 +68,9 @@ class Starts:
         Raises:
             NoSolutionError: There is none.
         """
-        if not self.found:
+        if not self.starts:
             raise NoSolutionError(self.reason)
-        return self.found[0].x, self.found[0].start
+        return self.starts[0].x, self.starts[0].start
 
 
 class StartGenerator:
@@ -126,18 +126,18 @@ class StartGenerator:
         problem = self._problem
         as_it_is = judged(problem, x[None], start[None])
         if len(as_it_is.x):
-            return Starts(found=self._starts(origin, text, as_it_is), reason="")
+            return Starts(starts=self._starts(origin, text, as_it_is), reason="")
         x, starts, reason = branch_starts(problem, x, start, generator(f"branches/{text}", self._seed))
         others = judged(problem, x, starts) if len(x) else as_it_is
         why = f"{text}: {reason or words(others.drops)}"
-        return Starts(found=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=why)
+        return Starts(starts=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=why)
 
     def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
         """Starts with the part at rest first, put together afterwards."""
         problem, reasons = self._problem, list[str]()
         places, drops = settings(problem, rng, SETTINGS_TRIED)
         if not places:
-            return Starts(found=(), reason=f"no configuration of the holder can be used: {words(drops)}")
+            return Starts(starts=(), reason=f"no configuration of the holder can be used: {words(drops)}")
         for setting in places:
             here = problem.with_part(setting.x)
             found_bases, reason = pools(here, setting, rng)
@@ -147,9 +147,9 @@ class StartGenerator:
             judgement = judged(here, *combined(here, setting, found_bases, rng))
             if len(judgement.x):
                 text = f"sampled with the part at rest, draw {number}"
-                return Starts(found=self._starts(Origin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
+                return Starts(starts=self._starts(Origin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
             reasons.append(f"no combination follows all paths: {words(judgement.drops)}")
-        return Starts(found=(), reason="".join(reasons[:1]))
+        return Starts(starts=(), reason="".join(reasons[:1]))
 
     def _random(self, rng: np.random.Generator, number: int) -> Starts:
         """Layouts drawn within the bounds, with all branches of inverse kinematics."""
@@ -159,11 +159,11 @@ class StartGenerator:
         parts = [branch_starts(problem, x, problem.start, rng) for x in drawn]
         x, start = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
         if not len(x):
-            return Starts(found=(), reason=_most_frequent([part[2] for part in parts]))
+            return Starts(starts=(), reason=_most_frequent([part[2] for part in parts]))
         judgement = judged(problem, x, start)
         text = f"drawn within the bounds, draw {number}"
         return Starts(
-            found=self._starts(Origin.RANDOM, text, judgement),
+            starts=self._starts(Origin.RANDOM, text, judgement),
             reason="" if len(judgement.x) else words(judgement.drops),
         )
 

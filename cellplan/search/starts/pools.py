@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.search.starts.at_rest import KEPT, Pool, Setting, pool
+from cellplan.search.starts.at_rest import MOST_BASES, Pool, Setting, pool
 from cellplan.search.starts.problem import StartProblem
 
 LEADING: Final = 12  # [-] bases of an operator beside which those that follow it are sought
@@ -27,7 +27,7 @@ def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> 
         together = _finer(problem, first, setting, rng)
         robot = first
         for other in others if len(together.q) else ():
-            robot, together = other, _beside(problem, together, other, setting, rng)
+            robot, together = other, _with_follower(problem, together, other, setting, rng)
             if not len(together.q):
                 break
         if not len(together.q):
@@ -45,7 +45,7 @@ def _finer(problem: StartProblem, robot: int, setting: Setting, rng: np.random.G
     return pool(replace(problem, at_rest=problem.at_rest_fine), robot, setting, rng)
 
 
-def _beside(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
+def _with_follower(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
     """A pool with one operator more, whose base follows from those of the pool."""
     x, q, cost, drops = list(led.x[:0]), list(led.q[:0]), list[float](), Counter[str]()
     follower = led
@@ -59,9 +59,9 @@ def _beside(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng:
         x += list(follower.x[first])
         q += [np.append(led.q[row], posture) for posture in follower.q[first]]
         cost += (led.cost[row] + follower.cost[first]).tolist()
-        if len(x) >= KEPT:
+        if len(x) >= MOST_BASES:
             break
-    order = np.argsort(cost, kind="stable")[:KEPT].astype(np.intp)
+    order = np.argsort(cost, kind="stable")[:MOST_BASES].astype(np.intp)
     return Pool(
         x=np.array(x).reshape(-1, led.x.shape[1])[order],
         columns=np.append(led.columns, follower.columns),

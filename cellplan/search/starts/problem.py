@@ -158,7 +158,7 @@ class StartProblem:
 
     def drawn_columns(self, robot: int) -> Indices:
         """Columns of what is drawn for an operator: all its own but the positions of its joints at the start."""
-        columns = self.freedom.own[robot]
+        columns = self.freedom.by_robot[robot]
         return columns[~np.isin(columns, self.freedom.columns)]
 
     def with_starts(self, x: Array, start: Array) -> Array:

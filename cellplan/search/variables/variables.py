@@ -10,11 +10,11 @@ from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.layout import LayoutSettings, VariableKind
-from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
-from cellplan.search.variables.beside import cells_beside
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
+from cellplan.search.variables.neighbours import neighbour_cells
 from cellplan.search.variables.pedestals import with_pedestals, with_room_below
 from cellplan.search.variables.state import State, concerned, pose_of
 from cellplan.search.variables.ties import Tied
@@ -138,14 +138,14 @@ class Variables:
         """What each variable does to each base: velocity of its origin in W, angular velocity, shape (robots, 6, n)."""
         return base_twists(self.state(x), self.base, self.tied.ranges) @ self.tied.factors
 
-    def beside(self, x: Array, step: float) -> Iterator[Beside]:
-        """Cells with the numbers of each tool and of the part a step to either side; see ``Beside``.
+    def neighbours(self, x: Array, step: float) -> Iterator[NeighbourCells]:
+        """Cells with the numbers of each tool and of the part a step to either side; see ``NeighbourCells``.
 
         Args:
             x: Values of the variables, shape (n,).
             step: In [m] or [rad].
         """
-        return cells_beside(self.state(x), self.base, self.tied, step)
+        return neighbour_cells(self.state(x), self.base, self.tied, step)
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the given cell file: values by address, rounded.

@@ -101,7 +101,7 @@ def test_a_tool_of_constant_speed_allows_its_tolerance_by_its_speed() -> None:
     assert by_kind[SkewLimit.DEPTH] == pytest.approx(1e-2 / SPEED)
     assert by_kind[SkewLimit.CLEARANCE] == MOST_SKEW
     assert found.allowed == pytest.approx(LIMIT / SPEED)
-    assert found.each == pytest.approx(0.5 * LIMIT / SPEED)
+    assert found.alone == pytest.approx(0.5 * LIMIT / SPEED)
 
 
 def test_bodies_limit_the_pair_that_comes_near() -> None:

@@ -75,7 +75,7 @@ def test_a_latency_that_is_not_stated_is_asked_for_where_times_are(run: Verified
 
     assert choose_promise(bare, URSCRIPT, ("right",)).promise is Promise.SEQUENCE_ONLY
     with pytest.raises(InputError, match=r"controllers\.other\.latency_ms: expected the time"):
-        choose_promise(bare, URSCRIPT, ("right",), asked=Promise.TIMED)
+        choose_promise(bare, URSCRIPT, ("right",), requested=Promise.TIMED)
 
 
 def test_robots_whose_waits_no_format_writes_are_named(run: VerifiedRun) -> None:

@@ -19,7 +19,7 @@ from cellplan.pipeline.export.compare_rows import other_rows
 from cellplan.pipeline.export.judge import judge
 from cellplan.pipeline.export.resample import lead_time, resampled
 from cellplan.pipeline.export.round_rows import stops_left, with_rounding
-from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.rows import essential_rows, full_rows
 from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
@@ -214,8 +214,8 @@ def test_a_cubic_is_judged_between_its_rows(run: VerifiedRun) -> None:
 def test_thinned_rows_without_times_are_judged_as_a_path(run: VerifiedRun) -> None:
     scene, names = Scene.from_cell(run.cell), [robot.name for robot in run.cell.robots]
     programs = [
-        thinned(scene, program, groups=[names], limits=LIMITS, kept=kept)
-        for program, kept in zip(full_rows(run), kept_rows(run), strict=True)
+        thinned(scene, program, groups=[names], limits=LIMITS, essential_rows=kept)
+        for program, kept in zip(full_rows(run), essential_rows(run), strict=True)
     ]
     job = job_of(run, programs, promise=Promise.SEQUENCE_ONLY)
     sparse = dialect(decimals=5, is_thinned=True)
@@ -282,8 +282,8 @@ def test_rounded_corners_count_with_what_they_may_be_off(
     """Half of each segment may be rounded where rows are dense; some rows stay stops where segments are long."""
     scene, names = Scene.from_cell(run.cell), [robot.name for robot in run.cell.robots]
     few = [
-        thinned(scene, program, groups=[names], limits=limits, kept=kept)
-        for program, kept in zip(full_rows(run), kept_rows(run), strict=True)
+        thinned(scene, program, groups=[names], limits=limits, essential_rows=kept)
+        for program, kept in zip(full_rows(run), essential_rows(run), strict=True)
     ]
     sparse, job = dialect(decimals=9, is_thinned=True), job_of(run, few, promise=Promise.SEQUENCE_ONLY)
 

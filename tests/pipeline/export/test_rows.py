@@ -16,7 +16,7 @@ from cellplan.model.exported import Promise
 from cellplan.model.motion import Schedule
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.judge import judge
-from cellplan.pipeline.export.rows import full_rows, kept_rows
+from cellplan.pipeline.export.rows import essential_rows, full_rows
 from cellplan.pipeline.export.schedule_at import schedule_at
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
@@ -96,12 +96,12 @@ def test_a_schedule_without_paths_is_refused(run: VerifiedRun) -> None:
 
 @pytest.mark.slow
 def test_all_phases_and_cycles_of_a_program_are_kept_and_judged(home: VerifiedRun) -> None:
-    (program,), (kept,) = full_rows(home), kept_rows(home)
+    (program,), (kept,) = full_rows(home), essential_rows(home)
     phases = home.motion.plan.program
     scene, names = Scene.from_cell(home.cell), [robot.name for robot in home.cell.robots]
     limits = ThinningLimits(turn=1e-3, slide=1e-3, tool=1e-4)
 
-    few = thinned(scene, program, groups=[names], limits=limits, kept=kept)
+    few = thinned(scene, program, groups=[names], limits=limits, essential_rows=kept)
 
     assert {home.motion.rows(phase).start for phase in phases} <= set(kept.rows)
     assert len(kept.work) == len(phases)

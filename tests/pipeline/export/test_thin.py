@@ -13,7 +13,7 @@ from cellplan.geometry.transforms import inverse, rotation_vector
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
 from cellplan.model.exported import ProgramRows
-from cellplan.pipeline.export.rows import KeptRows, WorkRows
+from cellplan.pipeline.export.rows import EssentialRows, WorkRows
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
 
@@ -21,9 +21,9 @@ LIMITS = ThinningLimits(turn=2e-3, slide=1e-3, tool=1e-4)
 BESIDE = 1e-5  # [m] by which a tool may leave its tolerance between two rows of the run
 
 
-def _work(cell: Cell, program: ProgramRows) -> KeptRows:
+def _work(cell: Cell, program: ProgramRows) -> EssentialRows:
     count = len(next(iter(program.robots.values())))
-    return KeptRows((), (WorkRows(slice(0, count), cell, tuple(task.name for task in cell.tasks)),))
+    return EssentialRows((), (WorkRows(slice(0, count), cell, tuple(task.name for task in cell.tasks)),))
 
 
 def _tool_errors(cell: Cell, one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> np.ndarray:
@@ -50,7 +50,7 @@ def test_joints_and_tools_keep_their_tolerances_between_rows_too(cells: Path, na
     program = smooth_rows(cell, seed=seed)
     names = [robot.name for robot in cell.robots]
 
-    found = thinned(Scene.from_cell(cell), program, groups=[names], limits=LIMITS, kept=_work(cell, program))
+    found = thinned(Scene.from_cell(cell), program, groups=[names], limits=LIMITS, essential_rows=_work(cell, program))
 
     times = np.linspace(0.0, 4.0, 371)
     full, fewer = linear_at(program.robots, times), linear_at(found.robots, times)
@@ -69,8 +69,12 @@ def test_robots_of_a_controller_share_rows_and_others_have_their_own(cells: Path
     cell = load_cell(cells / "turntable.yaml")
     program, scene = smooth_rows(cell, seed=14), Scene.from_cell(cell)
 
-    common = thinned(scene, program, groups=[["table", "kuka"]], limits=LIMITS, kept=_work(cell, program)).robots
-    apart = thinned(scene, program, groups=[["table"], ["kuka"]], limits=LIMITS, kept=_work(cell, program)).robots
+    common = thinned(
+        scene, program, groups=[["table", "kuka"]], limits=LIMITS, essential_rows=_work(cell, program)
+    ).robots
+    apart = thinned(
+        scene, program, groups=[["table"], ["kuka"]], limits=LIMITS, essential_rows=_work(cell, program)
+    ).robots
 
     np.testing.assert_array_equal(common["table"].times, common["kuka"].times)
     assert not np.array_equal(apart["table"].times, apart["kuka"].times)
@@ -83,7 +87,9 @@ def test_only_robots_of_a_group_are_written(cells: Path) -> None:
     cell = load_cell(cells / "turntable.yaml")
     program = smooth_rows(cell, seed=14)
 
-    found = thinned(Scene.from_cell(cell), program, groups=[["kuka"]], limits=LIMITS, kept=_work(cell, program))
+    found = thinned(
+        Scene.from_cell(cell), program, groups=[["kuka"]], limits=LIMITS, essential_rows=_work(cell, program)
+    )
 
     assert list(found.robots) == ["kuka"]
 
@@ -100,7 +106,11 @@ def test_what_must_stay_stays(cells: Path) -> None:
     loose = ThinningLimits(turn=0.5, slide=0.5, tool=1.0)
 
     found = thinned(
-        Scene.from_cell(cell), program, groups=[["table", "kuka"]], limits=loose, kept=KeptRows((33, 222), ())
+        Scene.from_cell(cell),
+        program,
+        groups=[["table", "kuka"]],
+        limits=loose,
+        essential_rows=EssentialRows((33, 222), ()),
     ).robots
 
     rows = found["kuka"]

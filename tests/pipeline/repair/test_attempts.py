@@ -25,7 +25,7 @@ from cellplan.pipeline.repair.attempts import (
 )
 from cellplan.pipeline.repair.neat import changed_values, neat, written_at
 from cellplan.pipeline.repair.prepare import ready_cell, start_posture, with_attempt
-from cellplan.pipeline.repair.solved import step_asked, time_asked
+from cellplan.pipeline.repair.solved import required_step, required_time
 from cellplan.pipeline.repair.wording import change_text
 from cellplan.search.programs.objective import Objective
 
@@ -109,12 +109,12 @@ def test_attempts_survive_as_plain_data(cell: Cell) -> None:
     ],
 )
 def test_the_time_that_a_check_asks_for(name: str, share: float, factor: float) -> None:
-    assert time_asked([{"name": name, "value": 5.0 * share, "limit": 5.0}]) == pytest.approx(factor)
+    assert required_time([{"name": name, "value": 5.0 * share, "limit": 5.0}]) == pytest.approx(factor)
 
 
 def test_rows_are_halved_until_their_errors_fit() -> None:
     errors = [{"name": "position_error_between_rows", "value": value, "limit": 0.01} for value in (0.02, 0.1)]
-    assert step_asked(errors, 0.02) == 0.005  # a quarter of the step, a sixteenth of the error: 0.00625
+    assert required_step(errors, 0.02) == 0.005  # a quarter of the step, a sixteenth of the error: 0.00625
 
 
 def test_changes_are_round_and_only_what_differs_is_written(cells: Path) -> None:

@@ -7,7 +7,7 @@ from builders.random_cells import make_task, random_pose
 
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.task import Frame
-from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows, kept_components
+from cellplan.planning.tracking.task_constraints import TaskConstraints, constrained_components, constraint_rows
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -36,7 +36,7 @@ def test_rows_are_orthonormal_and_as_many_as_components_kept() -> None:
     X_RT = np.array([random_pose(np.random.default_rng(seed)) for seed in range(5)])
     for task in (make_task("op0"), make_task("op0", is_spin_free=True), make_task("op0", axes=(0, 2, 4))):
         rows = constraint_rows(task, X_RT)
-        assert rows.shape[1] == kept_components(task).sum()
+        assert rows.shape[1] == constrained_components(task).sum()
         np.testing.assert_allclose(rows @ np.swapaxes(rows, 1, 2) - np.eye(rows.shape[1]), 0.0, atol=1e-15 * 10)
 
 

@@ -14,7 +14,7 @@ from cellplan.report.plots.svg import FINE, THINNING_TOL, inline_svg, svg_text
 
 TIMES = np.linspace(0.0, 2.0, 4001)
 X = Axis(low=0.0, high=2.0, label="time in s", unit="s", is_time=True)
-ROOM = 1.0 + THINNING_TOL  # [-] coordinates: rounding of a point, and how far a thinned curve may lie beside it
+HEADROOM = 1.0 + THINNING_TOL  # [-] coordinates: rounding of a point, and how far a thinned curve may lie beside it
 
 
 def drawn(*items: object, y: Axis, x: Axis = X):
@@ -32,7 +32,7 @@ def test_curves_limits_and_marks_lie_where_their_values_are() -> None:
     assert panel.forbidden == [pytest.approx((2.5, high), abs=fine), pytest.approx((low, -2.0), abs=fine)]
     assert panel.marks == [pytest.approx((0.25, 1.5), abs=fine)]
     at, shown = panel.curves["sine"].T
-    assert np.abs(np.interp(TIMES, at, shown) - values).max() <= ROOM * fine + np.ptp(values) * panel.resolution[0]
+    assert np.abs(np.interp(TIMES, at, shown) - values).max() <= HEADROOM * fine + np.ptp(values) * panel.resolution[0]
     assert len(at) < 200
 
 
@@ -47,7 +47,7 @@ def test_a_logarithmic_scale_shows_ratios_and_ends_at_its_lower_edge() -> None:
     at, shown = panel.curves["error"].T
     early = TIMES < 0.99
     found = 10.0 ** np.interp(TIMES[early], at, np.log10(shown))
-    assert np.abs(np.log(found / values[early])).max() <= ROOM * decade + panel.resolution[0]
+    assert np.abs(np.log(found / values[early])).max() <= HEADROOM * decade + panel.resolution[0]
     assert shown[at > 1.01] == pytest.approx(1e-6, rel=decade)
     height = np.log10(axis.high / axis.low)
     assert float(axis.share(1e-3) - axis.share(1e-4)) == pytest.approx(1.0 / height)
@@ -61,8 +61,8 @@ def test_a_thinned_curve_lies_within_a_tenth_of_a_point_of_every_kept_peak(value
     panel = drawn(Curve("c", np.arange(float(len(values))), values), y=y, x=x)
 
     shown = panel.curves["c"][:, 1]
-    assert shown.max() == pytest.approx(values.max(), abs=ROOM * panel.resolution[1])
-    assert shown.min() == pytest.approx(values.min(), abs=ROOM * panel.resolution[1])
+    assert shown.max() == pytest.approx(values.max(), abs=HEADROOM * panel.resolution[1])
+    assert shown.min() == pytest.approx(values.min(), abs=HEADROOM * panel.resolution[1])
 
 
 def test_a_gap_stays_a_gap() -> None:

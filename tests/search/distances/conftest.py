@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import Array, pose, rotation_exp
 from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Part, Tool
 from cellplan.scene.scene import Scene
-from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.distances.moving_bodies import NeighbourCells
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "four_robots.yaml"
 BASES = [("kuka", 0), ("kuka", 1), ("kuka", 2), ("kuka", 5), ("abb", 1), ("abb", 2), ("abb", 3)]  # robot, component
@@ -49,11 +49,11 @@ class SomeVariables:
         grasp = part.held_by[0]
         return replace(part, held_by=(replace(grasp, X_PT=grasp.X_PT @ pose((0.0, 0.0, -x[-1]))), *part.held_by[1:]))
 
-    def beside(self, x: Array, step: float) -> Iterator[Beside]:
+    def neighbours(self, x: Array, step: float) -> Iterator[NeighbourCells]:
         for unit in np.eye(len(x)):
             sides = (self.placed(x + step * unit), self.placed(x - step * unit))
             for robot in ("kuka", None):
-                yield Beside(robot=robot, by=unit, sides=sides)
+                yield NeighbourCells(robot=robot, by=unit, sides=sides)
 
     def placed(self, x: Array) -> Cell:
         tools, robots = self.tools(x), []

@@ -17,7 +17,7 @@ from cellplan.model.mounting import Pedestal
 from cellplan.model.robot import BASE
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.distances.moving_bodies import NeighbourCells
 
 COLUMN = Pedestal(radius=0.3, floor=0.0)
 HIGH, LOW = pose((0.0, 0.0, 0.5)), np.eye(4)
@@ -41,7 +41,7 @@ class BaseOfB:
         base[1, :3] = np.eye(3)
         return base
 
-    def beside(self, x: Array, step: float) -> Iterator[Beside]:
+    def neighbours(self, x: Array, step: float) -> Iterator[NeighbourCells]:
         return iter(())
 
     def placed(self, x: Array) -> Cell:

@@ -55,5 +55,5 @@ def assert_as_the_checks_have_them(job: Job, q: Array, found: SingularValues) ->
     schedule = Schedule(times=np.zeros(1), tasks=tasks)
     by_robot = conditioning(cell, schedule, chains, q=positions, X_WP=X_WP, moving=job.moving).robots
     for name, value, place in zip(found.names, found.values[0], arms(job), strict=True):
-        if len(cell.robot(name).model.joints) >= job.constraints.kept[place].sum():
+        if len(cell.robot(name).model.joints) >= job.constraints.constrained[place].sum():
             assert value == pytest.approx(by_robot[name][0], abs=1e-7)

@@ -137,7 +137,7 @@ def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace)
     assert len(found.corners) == found.worst_ones + found.ends + len(signs)
     assert found.nominal <= found.cycle < before.cycle
     finer = search.finer(GuardedProblem.like(pair.ready.problem(49)), found, Effort(iterations=1, keys=5))
-    assert finer.once(found.found.x, found.found.start) is not None
+    assert finer.once(found.improved.x, found.improved.start) is not None
 
 
 def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
@@ -167,7 +167,7 @@ def test_tolerances_are_where_a_demand_is_missed(pair: SimpleNamespace) -> None:
         unit = np.array([each.sign if name == each.name else 0.0 for name in pair.problem.names])
         inside, outside = judged(
             pair.problem,
-            np.array([each.kept * unit, each.missed * unit]),
+            np.array([each.extent * unit, each.missed * unit]),
             pair.point.start,
             pair.demands,
             effort,

@@ -9,9 +9,9 @@ from builders.toy_problem import Toy
 from cellplan.search.programs.explain import Explanation, explain
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.measures import Kind
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
 
-EXACT = Effort(within=20.0, room=Room(margin=0.0, distance=0.0, own=0.0, time=0.0))
+EXACT = Effort(within=20.0, reserve=Reserve(margin=0.0, distance=0.0, within_robot=0.0, time=0.0))
 
 
 def explained(toy: Toy, demands: Demands) -> Explanation:

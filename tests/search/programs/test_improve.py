@@ -8,10 +8,12 @@ from builders.toy_problem import DEMAND, Toy
 
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.measures import Measures
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room
+from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
 from cellplan.search.programs.problem import Point
 
-EXACT = Effort(iterations=40, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, own=0.0, time=0.0))
+EXACT = Effort(
+    iterations=40, within=20.0, least_gain=1e-7, reserve=Reserve(margin=0.0, distance=0.0, within_robot=0.0, time=0.0)
+)
 NONE = np.zeros(2)
 TOY = Toy()
 
@@ -49,7 +51,7 @@ def test_bodies_bind() -> None:
 
 def test_singular_values_bind() -> None:
     least = Demands(objective=Objective.CHANGE, margin=NONE, duration=5.0, singular=np.array([2.45]))
-    effort = replace(EXACT, room=replace(EXACT.room, singular=0.0))
+    effort = replace(EXACT, reserve=replace(EXACT.reserve, singular=0.0))
     found = improved(TOY, least, effort)
     assert found.is_conforming
     np.testing.assert_allclose(found.x, [1.75, 4.9], atol=1e-6)
@@ -87,7 +89,7 @@ def test_widest_clearance_at_a_duration() -> None:
 
 def test_rows_ask_for_room() -> None:
     near = replace(TOY, upper_limit=3.5)
-    effort = replace(EXACT, room=Room(margin=0.02, distance=0.0, own=0.0, time=0.0))
+    effort = replace(EXACT, reserve=Reserve(margin=0.02, distance=0.0, within_robot=0.0, time=0.0))
     found = improved(near, Demands(objective=Objective.CYCLE, margin=NONE), effort)
     assert found.x[0] == pytest.approx(1.74, abs=1e-3)
 

@@ -46,7 +46,7 @@ def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) 
     demands = Demands(objective=Objective.CYCLE, margin=np.full(24, 0.2), singular=np.full(3, 0.2))
     here = Measures.of(problem, point, demands, effort)
     count = len(problem.names)
-    rows = Linear.of(problem, here).rows(demands, effort.room, np.full(count, 0.5))
+    rows = Linear.of(problem, here).rows(demands, effort.reserve, np.full(count, 0.5))
     assert {each.kind for each in rows} == set(Kind) - {Kind.DURATION}
     z = np.random.default_rng(1).uniform(-1.0, 1.0, count)
     sides = []

@@ -11,12 +11,12 @@ from cellplan.planning.timing.speed_profile import fastest_profile
 from cellplan.search.programs.explain import explain
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.measures import Kind, Measures
-from cellplan.search.programs.objective import Demands, Effort, Objective, Room, Timing
+from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve, Timing
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import Point
 from cellplan.search.programs.rows import Linear
 
-EXACT = Effort(iterations=60, within=20.0, least_gain=1e-7, room=Room(margin=0.0, distance=0.0, time=0.0))
+EXACT = Effort(iterations=60, within=20.0, least_gain=1e-7, reserve=Reserve(margin=0.0, distance=0.0, time=0.0))
 NONE = np.zeros(2)
 DEMANDS = Demands(objective=Objective.CYCLE, margin=NONE, timing=Timing.RETIMED)
 STEP = 1e-6
@@ -148,6 +148,6 @@ def test_steps_of_rows_show_how_they_bend() -> None:
     box = np.full(2 + len(here.pace.inner), 0.5)
     z: Array = np.concatenate([[1e-4, 0.0], np.full(len(box) - 2, 1e-4)])
     there = Measures.of(toy, at(toy, 1.0 + 0.5e-4), DEMANDS, EXACT)
-    for rows in Linear.of(toy, here).rows(DEMANDS, EXACT.room, box):
+    for rows in Linear.of(toy, here).rows(DEMANDS, EXACT.reserve, box):
         if rows.kind in (Kind.SPEED, Kind.ACCELERATION):
             assert np.abs(rows.bends(here, there, z)).max() < 1e-7

@@ -55,14 +55,14 @@ def sampled(turntable):
 
 def test_a_sampled_start_without_violation_passes_solve_and_is_the_same_again(turntable, sampled):
     again, other = (StartGenerator(turntable, seed=seed).at(1) for seed in (3, 4))
-    best = sampled.found[0]
+    best = sampled.starts[0]
 
     assert best.origin is Origin.SAMPLED
     assert best.violation == 0.0
     assert solve(turntable.variables.cell(best.x, best.start)).passed
     assert [start.x.tobytes() for start in again] == [start.x.tobytes() for start in sampled]
     assert [start.start.tobytes() for start in again] == [start.start.tobytes() for start in sampled]
-    assert other.found[0].x.tobytes() != best.x.tobytes()
+    assert other.starts[0].x.tobytes() != best.x.tobytes()
 
 
 def test_the_given_layout_is_the_first_start(turntable):
@@ -96,7 +96,7 @@ def test_what_reaches_nothing_is_named_with_the_reason():
     problem = prepared(cell.with_values(away))
     found = StartGenerator(problem, seed=0).at(1)
 
-    assert found.found == ()
+    assert found.starts == ()
     reason, far = f"'{operator}' follows its path from none of {DRAWS} bases: ", "does not reach the start of its path"
     assert re.fullmatch(re.escape(reason + far) + rf", stays more than [6-8]\d00 mm away \({DRAWS}\)", found.reason)
 
@@ -106,7 +106,7 @@ def test_mirrored_operators_are_sampled_together(monkeypatch):
     cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | MIRRORED)
     problem = prepared(cell)
     assert problem.freedom.groups(problem.operators) == [(1, 2)]
-    found = StartGenerator(problem, seed=0).at(1).found[0]
+    found = StartGenerator(problem, seed=0).at(1).starts[0]
 
     assert found.violation == 0.0
     first, second = (problem.variables.placed(found.x).robot(name).X_WB for name in ("right", "other"))
@@ -116,7 +116,7 @@ def test_mirrored_operators_are_sampled_together(monkeypatch):
 def test_a_part_at_rest_is_sampled_where_it_can_be_reached():
     cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | AT_REST)
     problem = prepared(cell)
-    found = StartGenerator(problem, seed=0).at(1).found[0]
+    found = StartGenerator(problem, seed=0).at(1).starts[0]
 
     assert found.violation == 0.0
     assert solve(problem.variables.cell(found.x, found.start)).passed
@@ -159,12 +159,12 @@ def test_real_arms_find_a_layout_from_the_corners_of_the_floor(name, shared_robo
     problem = StartProblem.of(variables.base, variables, margin=variables.margin)
     starts = StartGenerator(problem, seed=2)
 
-    assert starts.at(0).found == ()
+    assert starts.at(0).starts == ()
     assert starts.at(0).reason.startswith("the given layout: 'abb' follows its path from no configuration")
     layout = LayoutProblem(
         job=problem.job, variables=variables, bodies=problem.distances, acceleration=problem.acceleration
     )
     demands = Demands(objective=Objective.CONFORMING, margin=variables.margin, duration=float(problem.job.times[-1]))
-    found = (start for index in range(1, 5) for start in starts.at(index).found[:2])
+    found = (start for index in range(1, 5) for start in starts.at(index).starts[:2])
     improved = (improve(layout, start.x, start.start, demands, Effort(iterations=25)) for start in found)
     assert any(each is not None and each.is_conforming for each in improved)

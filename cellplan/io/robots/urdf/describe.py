@@ -147,7 +147,7 @@ def _joints(
     structure: UrdfStructure, lacking: tuple[Lacking, ...], model: RobotModel | None
 ) -> Iterator[DescribedJoint]:
     """The driven joints, with the limits of those that follow them where none is missing."""
-    without = {each.joint.name: each for each in lacking}
+    without = {entry.joint.name: entry for entry in lacking}
     complete = {} if model is None else {joint.name: joint for joint in model.joints}
     for joint in structure.roles.driven:
         limits, gap = complete.get(joint.name, joint.limit), without.get(joint.name)
@@ -180,12 +180,12 @@ def _links(structure: UrdfStructure, bodies: tuple[Body, ...]) -> Iterator[LinkS
     """The links that have bodies; these come in the order of links and of their elements."""
     first = 0
     for link in links_in_order(structure.tree):
-        own = bodies[first : first + len(link.solids)]
-        first += len(own)
-        if own:
-            shapes = tuple(type(body.shape).__name__.lower() for body in own)
+        solids = bodies[first : first + len(link.solids)]
+        first += len(solids)
+        if solids:
+            shapes = tuple(type(body.shape).__name__.lower() for body in solids)
             X_BL = structure.configuration.X_BL[link.name]
-            yield LinkSize(link=link.name, shapes=shapes, size=size_along(own, X_BL))
+            yield LinkSize(link=link.name, shapes=shapes, size=size_along(solids, X_BL))
 
 
 def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, written: str, options: UrdfOptions) -> str:

@@ -152,13 +152,13 @@ def _leave_out_nameless_meshes(links: Iterable[Element], remarks: Remarks) -> No
 
 def _by_name(things: Iterable[Named]) -> dict[str, Named]:
     """Links or joints by name; a second one of the same name is refused."""
-    found: dict[str, Named] = {}
+    named: dict[str, Named] = {}
     for thing in things:
-        if thing.name in found:
-            first = found[thing.name].element
+        if thing.name in named:
+            first = named[thing.name].element
             raise thing.element.error(f"{first.tag} '{thing.name}': is already defined in line {first.line}")
-        found[thing.name] = thing
-    return found
+        named[thing.name] = thing
+    return named
 
 
 def _require_nothing_hidden(root: Element, links: dict[str, UrdfLink], joints: dict[str, UrdfJoint]) -> None:

@@ -126,7 +126,7 @@ def _leaders(tree: UrdfTree, flange: str, state: GripperState, locked: Collectio
         if name in locked:
             raise joint.error("is held by `gripper` and by `locked`: remove it from one of them")
         if joint not in beyond:
-            known = [each.name for each in beyond]
+            known = [joint.name for joint in beyond]
             hint = did_you_mean(name, known) or f": expected one of {listed(known)}"
             raise joint.error(f"is named under gripper.joints, but does not move beyond the flange '{flange}'{hint}")
     return [document.joints[name] for name in state.joints]

@@ -42,18 +42,18 @@ class Lacking:
 
 def lacking_limits(joints: Iterable[UrdfJoint], cell: Mapping[str, StatedLimits]) -> tuple[Lacking, ...]:
     """The joints that have no complete limits, neither by the URDF nor by the cell."""
-    found = (_lacking(joint, cell.get(joint.name, StatedLimits())) for joint in joints)
-    return tuple(lacking for lacking in found if lacking.keys)
+    entries = (_lacking(joint, cell.get(joint.name, StatedLimits())) for joint in joints)
+    return tuple(lacking for lacking in entries if lacking.keys)
 
 
 def lacking_error(lacking: Sequence[Lacking]) -> InputError:
     """What to write in the cell when limits are missing, in one line for all joints, at least one."""
     reasons: dict[str, list[str]] = {}
-    for each in lacking:
-        reasons.setdefault(each.reason, []).append(each.joint.name)
+    for entry in lacking:
+        reasons.setdefault(entry.reason, []).append(entry.joint.name)
     limits = with_blanks(flow_text(limits_to_state(lacking)))
     cure = f"state limits in the cell, with a number for each {BLANK}: `limits: {limits}`"
-    if any(each.joint.kind == "continuous" and len(each.keys) > 1 for each in lacking):
+    if any(entry.joint.kind == "continuous" and len(entry.keys) > 1 for entry in lacking):
         cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
     if len(lacking) == 1:
         return lacking[0].joint.error(f"{lacking[0].reason}: {cure}")
@@ -63,7 +63,7 @@ def lacking_error(lacking: Sequence[Lacking]) -> InputError:
 
 def limits_to_state(lacking: Iterable[Lacking]) -> dict[str, dict[str, str]]:
     """The limits that a cell has to state, with … for every number."""
-    return {each.joint.name: dict.fromkeys(each.keys, BLANK) for each in lacking}
+    return {entry.joint.name: dict.fromkeys(entry.keys, BLANK) for entry in lacking}
 
 
 def with_blanks(text: str) -> str:
@@ -77,10 +77,10 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     Raises:
         InputError: A limit is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
-    own = joint.limit.stated
-    for key, text in limit_findings(own, cell, is_revolute=joint.kind != "prismatic"):
+    stated = joint.limit.stated
+    for key, text in limit_findings(stated, cell, is_revolute=joint.kind != "prismatic"):
         raise joint.error(f"{key}: {text}")
-    limits = tightest(own, cell)
+    limits = tightest(stated, cell)
     if cell.wraps:
         lowest, highest = _endless(joint, cell)
         limits = replace(limits, lower=lowest, upper=highest)
@@ -100,7 +100,7 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
         velocity=velocity,
         acceleration=limits.acceleration,
         jerk=limits.jerk,
-        rated_velocity=None if cell.velocity is None else own.velocity,
+        rated_velocity=None if cell.velocity is None else stated.velocity,
     )
 
 

@@ -71,13 +71,13 @@ class Packages:
             if root in self.package_dirs:
                 places += [manifest.parent for manifest in sorted(root.glob(f"*/{MANIFEST}"))]
             yield from (
-                each for each in places if each.is_dir() and package in (_stated_name(each), each.resolve().name)
+                place for place in places if place.is_dir() and package in (_stated_name(place), place.resolve().name)
             )
 
     def _name_around(self, folder: Path) -> str:
         """Name of the package that a folder belongs to; empty for none."""
         above = [folder, *folder.resolve().parents][: LEVELS_UP + 1]
-        inside = (each for each in above if self.within is None or self.within.holds(each))
+        inside = (folder for folder in above if self.within is None or self.within.holds(folder))
         return next(filter(None, map(_stated_name, inside)), "")
 
     def _holds_file(self, place: Path) -> bool:

@@ -125,4 +125,6 @@ def _check_attributes(element: Element, owner: str, *, kind: str = "", remarks: 
 
 def _misspelt(name: str, missing: Iterable[str]) -> str:
     """Which missing name was probably meant; empty for none."""
-    return did_you_mean(name.lower(), [each for each in missing if abs(len(name) - len(each)) <= MOST_EXTRA])
+    return did_you_mean(
+        name.lower(), [candidate for candidate in missing if abs(len(name) - len(candidate)) <= MOST_EXTRA]
+    )

@@ -107,15 +107,15 @@ def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str]
     named = {link for pair in srdf.pairs for link in pair.links}
     if named and not named & links:
         raise InputError(f"{srdf.file}: expected the SRDF of '{model.name}', got one none of whose links it has")
-    found = []
+    bodies = []
     for pair in srdf.pairs:
         if pair.links[0] == pair.links[1]:
             continue
         first, second = ([body.name for body in model.bodies if body.link_name == link] for link in pair.links)
         why = f"as {shown(pair.reason)}" if pair.reason else "without a reason"
         reason = f"disabled in {srdf.file} {why}"
-        found += [(one, other, reason) for one in first for other in second]
-    return tuple(found)
+        bodies += [(one, other, reason) for one in first for other in second]
+    return tuple(bodies)
 
 
 def unknown_links(srdf: Srdf, model: RobotModel) -> str | None:
@@ -141,20 +141,24 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collect
     Raises:
         InputError: Joints are missing, several groups differ, or a value is no number or outside the joint's limits.
     """
-    named = [each for each in srdf.configurations if name in (each.name, f"{each.group}/{each.name}")]
+    named = [
+        configuration
+        for configuration in srdf.configurations
+        if name in (configuration.name, f"{configuration.group}/{configuration.name}")
+    ]
     if not named:
         return None
-    own = [joint for joint in model.joint_names if joint not in added]
-    complete = [each for each in named if set(own) <= set(each.joints)]
+    driven = [joint for joint in model.joint_names if joint not in added]
+    complete = [entry for entry in named if set(driven) <= set(entry.joints)]
     if not complete:
-        missing = [joint for joint in own if joint not in named[0].joints]
+        missing = [joint for joint in driven if joint not in named[0].joints]
         text = f"expected a value of every joint between base and flange, missing: {listed(missing)}"
         raise named[0].element.error(f"group_state '{name}': {text}")
-    found = [_positions(each, model, added) for each in complete]
-    if any(not np.array_equal(q, found[0]) for q in found):
-        names = listed(f"{each.group}/{each.name}" for each in complete)
+    postures = [_positions(configuration, model, added) for configuration in complete]
+    if any(not np.array_equal(q, postures[0]) for q in postures):
+        names = listed(f"{configuration.group}/{configuration.name}" for configuration in complete)
         raise complete[1].element.error(f"group_state '{name}': expected one configuration of this name, got {names}")
-    return found[0]
+    return postures[0]
 
 
 def _configuration(state: Element) -> NamedConfiguration:

@@ -29,9 +29,9 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
         InputError: The file is no URDF.
     """
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
-    found: list[Visual] = []
+    visuals: list[Visual] = []
     for link in read_document(path, options.xacro).links.values():
         if link.element.all("collision"):
             drawn = drawn_solids(link, shelf)
-            found += [Visual(link=link.name, shape=shape, X_LS=X_LS) for shape, X_LS in drawn]
-    return tuple(found)
+            visuals += [Visual(link=link.name, shape=shape, X_LS=X_LS) for shape, X_LS in drawn]
+    return tuple(visuals)

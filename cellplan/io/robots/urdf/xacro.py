@@ -185,7 +185,7 @@ class _Expansion:
         symbols = dict(substitution._eval_dict)
         symbols |= {"find": _find, "env": _no_environment, "optenv": self._default_of}
         namespace = xacro._global_symbols["python"]
-        kept = {name: namespace[name] for name in REFUSED_SYMBOLS if name in namespace}
+        refused = {name: namespace[name] for name in REFUSED_SYMBOLS if name in namespace}
         changes: list[tuple[Any, str, Any]] = [
             (xacro, "parse", self._parse),
             (xacro, "abs_filename_spec", self._absolute),
@@ -206,7 +206,7 @@ class _Expansion:
             for owner, name, value in changes:
                 stack.callback(_restore, owner, name, vars(owner).get(name, _restore))
                 setattr(owner, name, value)
-            for name, value in kept.items():
+            for name, value in refused.items():
                 stack.callback(dict.__setitem__, namespace, name, value)
                 dict.__delitem__(namespace, name)
             yield
@@ -225,7 +225,7 @@ class _Expansion:
             raise self._xacro.XacroException(str(error), exc=FileNotFoundError("")) from None  # may be optional
         root = parse_xml(data, path.name)
         elements = list(root.walk(frozenset()))
-        self._declared |= {each.attributes.get("name", "") for each in elements if each.tag == "xacro:arg"}
+        self._declared |= {element.attributes.get("name", "") for element in elements if element.tag == "xacro:arg"}
         self._declared |= {name.decode(errors="replace") for name in ARGUMENT.findall(data)}
         try:
             document: minidom.Document = minidom.parseString(data)  # noqa: S318 - there is no document type
@@ -248,17 +248,17 @@ class _Expansion:
             empty = [name for name, value in self._settings.arguments.items() if not value.strip()]
             cure = f"state it as `xacro_args: {{{empty[0] if len(empty) == 1 else 'NAME'}: …}}`"
             raise InputError(f"expected the path of a file, got an empty one: {cure}, counted from the cell file")
-        beside = Path(self._xacro.filestack[-1] or ".").parent / filename
+        path = Path(self._xacro.filestack[-1] or ".").parent / filename
         values = [value for value in self._settings.arguments.values() if value]
         if not any(f"{filename}/".startswith(f"{value}/") for value in values) or Path(filename).is_absolute():
-            return str(beside)
+            return str(path)
         within = self._settings.within
         place = (Path() if within is None else within.folder).absolute() / filename
-        if place.exists() or not self._files.path_of(str(beside)).exists():
+        if place.exists() or not self._files.path_of(str(path)).exists():
             return str(place)
-        text = f"no {shown(filename)} beside the cell file: it was read from the folder {shown(beside.parent.name)}"
+        text = f"no {shown(filename)} beside the cell file: it was read from the folder {shown(path.parent.name)}"
         self._remarks.add(text, f"{self._path.name}: xacro_args: {text}")
-        return str(beside)
+        return str(path)
 
     def _open(self, filename: str) -> io.StringIO:
         """Text of a YAML file; stands in for the function of Python."""
@@ -285,17 +285,17 @@ class _Expansion:
         node = _innermost_node(error)
         file, line = (node and node.getUserData(PLACE)) or (self._path.name, 0)
         where = f"{file}:{line}" if line else file
-        for each in chain:
-            if isinstance(each, MemoryError):
-                raise each
-            if isinstance(each, RecursionError):
+        for call in chain:
+            if isinstance(call, MemoryError):
+                raise call
+            if isinstance(call, RecursionError):
                 what = "expected macros, includes and expressions that end, got some that call themselves"
                 return InputError(f"{where}: {what}")
-            if isinstance(each, InputError):
-                is_located = str(each).startswith(tuple(f"{path.name}:" for path in self._files.known))
-                return each if is_located else InputError(f"{where}: {each}")
-            if isinstance(each, self._substitution.ArgException):
-                return self._missing_argument(where, str(each))
+            if isinstance(call, InputError):
+                is_located = str(call).startswith(tuple(f"{path.name}:" for path in self._files.known))
+                return call if is_located else InputError(f"{where}: {call}")
+            if isinstance(call, self._substitution.ArgException):
+                return self._missing_argument(where, str(call))
         if node is not None and node.tagName == "xacro:arg" and not node.hasAttribute("default"):
             return self._missing_argument(where, node.getAttribute("name"))
         reason = " ".join(str(error).split())[:LONGEST_REASON] or type(error).__name__
@@ -354,11 +354,11 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 def _innermost_node(error: BaseException) -> minidom.Element | None:
     """The element that was being expanded when an error was raised, if its place is known."""
-    found = None
+    innermost = None
     for frame, _ in traceback.walk_tb(error.__traceback__):
         for name in ("node", "elt", "tag"):
             node = frame.f_locals.get(name)
             node = node.parentNode if isinstance(node, minidom.Text) else node
             if isinstance(node, minidom.Element) and node.getUserData(PLACE):
-                found = node
-    return found
+                innermost = node
+    return innermost

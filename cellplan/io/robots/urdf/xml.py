@@ -42,10 +42,10 @@ class Element:
 
     def one(self, tag: str, owner: str) -> "Element | None":
         """The child with this tag, if there is one; two are refused."""
-        found = self.all(tag)
-        if len(found) > 1:
-            raise found[1].error(f"{owner}: expected one <{tag}>, got {len(found)}")
-        return found[0] if found else None
+        elements = self.all(tag)
+        if len(elements) > 1:
+            raise elements[1].error(f"{owner}: expected one <{tag}>, got {len(elements)}")
+        return elements[0] if elements else None
 
     def text(self, name: str, owner: str) -> str:
         """An attribute that must be there and not be empty."""

@@ -24,7 +24,7 @@ MARGIN: Final = 1e-9  # [-] of a number of steps: rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeptRate:
+class FixedRate:
     """A stretch of nominal time whose rate is demanded."""
 
     begin: float  # its begin in [s]
@@ -63,7 +63,7 @@ class AtRest:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AtKeptRate:
+class AtFixedRate:
     """Motion of a stretch between two rests at one rate of the nominal time in all that is demanded."""
 
     piece: Stretch
@@ -72,7 +72,7 @@ class AtKeptRate:
     step: float  # time between two rows in [s]
 
     @property
-    def kept_seconds(self) -> float:
+    def fixed_seconds(self) -> float:
         """Time in [s] that all spans take together."""
         return float(np.diff(self.spans, axis=1).sum()) / self.rate
 
@@ -123,13 +123,13 @@ class AtKeptRate:
         return np.append(0.0, np.cumsum(np.diff(grid) * (at[:-1] + 4.0 * between + at[1:]) / 6.0))
 
 
-def least_steps(motion: AtKeptRate, is_allowed: Callable[[Array], bool]) -> int | None:
+def least_steps(motion: AtFixedRate, is_allowed: Callable[[Array], bool]) -> int | None:
     """The fewest steps found with which a motion keeps all limits; None when slower rates beside it do not help.
 
     Args:
         is_allowed: Whether rows keep all limits, by their nominal times in [s].
     """
-    low = whole_steps(motion.kept_seconds, motion.step)
+    low = whole_steps(motion.fixed_seconds, motion.step)
     if motion.is_fixed:
         return low if is_allowed(motion.rows(low)) else None
     nominal = float(motion.piece.sigma[-1] - motion.piece.sigma[0]) / motion.rate
@@ -144,7 +144,7 @@ def least_steps(motion: AtKeptRate, is_allowed: Callable[[Array], bool]) -> int 
     return high
 
 
-def spans_within(fixed_rates: Sequence[KeptRate], begin: float, end: float) -> Array:
+def spans_within(fixed_rates: Sequence[FixedRate], begin: float, end: float) -> Array:
     """What is demanded between two nominal times in [s]: stretches in their order that do not overlap, shape (n, 2)."""
     spans: list[list[float]] = []
     for fixed_rate in sorted(fixed_rates, key=lambda one: one.begin):

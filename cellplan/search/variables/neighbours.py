@@ -5,12 +5,12 @@ from dataclasses import replace
 
 from cellplan.model.cell import Cell
 from cellplan.model.layout import VariableKind
-from cellplan.search.distances.moving_bodies import Beside
+from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.variables.state import State
 from cellplan.search.variables.ties import Tied
 
 
-def cells_beside(state: State, cell: Cell, tied: Tied, step: float) -> Iterator[Beside]:
+def neighbour_cells(state: State, cell: Cell, tied: Tied, step: float) -> Iterator[NeighbourCells]:
     """All that numbers do to the solids of tools and to the place of the part.
 
     Args:
@@ -26,10 +26,10 @@ def cells_beside(state: State, cell: Cell, tied: Tied, step: float) -> Iterator[
         sides = [state.changed(cell, [variable], values + change) for change in (step, -step)]
         if variable.kind is VariableKind.TOOL:
             forward, back = (_with_tool(side, cell, cell.index(variable.name)) for side in sides)
-            yield Beside(robot=variable.name, by=by, sides=(forward, back))
+            yield NeighbourCells(robot=variable.name, by=by, sides=(forward, back))
         if variable.kind is not VariableKind.TOOL or cell.index(variable.name) == cell.carrier:
             forward, back = (side.cell(cell, tied.ranges) for side in sides)
-            yield Beside(robot=None, by=by, sides=(forward, back))
+            yield NeighbourCells(robot=None, by=by, sides=(forward, back))
 
 
 def _with_tool(state: State, cell: Cell, index: int) -> Cell:

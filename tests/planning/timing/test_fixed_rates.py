@@ -10,7 +10,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.joint_path import JointPath
 from cellplan.model.task import TimeLaw, TimeLawKind
 from cellplan.model.time_law import advance, reached_at
-from cellplan.planning.timing.kept_rates import AtKeptRate, KeptRate
+from cellplan.planning.timing.fixed_rates import AtFixedRate, FixedRate
 from cellplan.planning.timing.path_length import stretches
 from cellplan.planning.timing.retime import JointBounds, Retimer
 
@@ -38,18 +38,18 @@ def moving(breaks: Array) -> JointPath:
     return JointPath(np.zeros(1), breaks, nodes)
 
 
-def retimer(velocity: float, *kept: KeptRate) -> Retimer:
+def retimer(velocity: float, *kept: FixedRate) -> Retimer:
     bounds = JointBounds(velocity=np.array([velocity]), acceleration=np.full(1, 1e3), jerk=np.full(1, np.inf))
 
     def slower(sigma: Array, q: Array) -> float:
         return float(np.abs(np.diff(q[:, 0])).max() / STEP / velocity)
 
-    return Retimer(bounds=bounds, step=STEP, feed_share=lambda s: np.zeros(len(s)), slower=slower, kept=kept)
+    return Retimer(bounds=bounds, step=STEP, feed_share=lambda s: np.zeros(len(s)), slower=slower, fixed_rates=kept)
 
 
 def test_the_rate_is_one_where_it_is_demanded_and_faster_beside_it() -> None:
     path = moving(np.linspace(0.0, 4.0, 9))
-    found = retimer(2.0, KeptRate(begin=0.5, end=1.5, tolerance=0.05)).fastest(path)
+    found = retimer(2.0, FixedRate(begin=0.5, end=1.5, tolerance=0.05)).fastest(path)
     rate, middle = np.diff(found.sigma) / STEP, 0.5 * (found.sigma[1:] + found.sigma[:-1])
 
     inside = (found.sigma[:-1] >= 0.5) & (found.sigma[1:] <= 1.5)
@@ -61,7 +61,7 @@ def test_the_rate_is_one_where_it_is_demanded_and_faster_beside_it() -> None:
 
 def test_a_limit_lowers_the_rate_within_its_tolerance_and_no_further() -> None:
     """The joint has 0.785 rad/s at 1 s: 0.76 rad/s ask for 3 % less, 0.5 rad/s for more than 5 %."""
-    whole = KeptRate(begin=0.0, end=4.0, tolerance=0.05)
+    whole = FixedRate(begin=0.0, end=4.0, tolerance=0.05)
     path = moving(np.linspace(0.0, 4.0, 9))
     found = retimer(0.76, whole).fastest(path)
     slow = retimer(0.5, whole).fastest(path)
@@ -79,7 +79,7 @@ def test_a_rest_of_all_joints_lasts_as_long_as_is_demanded_of_it() -> None:
     path = JointPath(
         np.zeros(1), np.array([0.0, 1.0, 3.0, 4.0]), [np.array([[0.0, 1.0]]), rest, np.array([[1.0, 0.0]])]
     )
-    found = retimer(10.0, KeptRate(begin=1.25, end=2.0), KeptRate(begin=1.75, end=2.5)).fastest(path)
+    found = retimer(10.0, FixedRate(begin=1.25, end=2.0), FixedRate(begin=1.75, end=2.5)).fastest(path)
 
     waits = (found.sigma >= 1.25) & (found.sigma <= 2.5)
     assert np.count_nonzero(waits) == 124  # 1.25 s: the rows at its ends are those at 1 s and at 3 s
@@ -92,7 +92,7 @@ def test_a_rest_of_all_joints_lasts_as_long_as_is_demanded_of_it() -> None:
 
 def test_rows_of_any_number_of_steps_take_that_number() -> None:
     piece = stretches(moving(np.linspace(0.0, 4.0, 9)), np.ones(1))[0]
-    motion = AtKeptRate(piece, np.array([[0.5, 1.0]]), 1.0, STEP)
+    motion = AtFixedRate(piece, np.array([[0.5, 1.0]]), 1.0, STEP)
     for count in (60, 100, 200, 400):
         sigma = motion.rows(count)
         assert len(sigma) == count + 1
