@@ -48,7 +48,7 @@ PlotFormats = Annotated[
     tuple[str, ...],
     option(
         "--plots FORMAT",
-        "Write the plots as png or pdf too; SVG is always written. May be repeated. Needs cellplan[plots].",
+        "Write the plots as png or pdf too; SVG is always written. May be repeated.",
     ),
 ]
 TaskName = Annotated[str | None, option("--task NAME", "Plan this task only.", autocompletion=task_names)]

@@ -3,6 +3,7 @@
 import json
 import os
 import queue
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from cellplan.cli.watch.watch import watch
 from cellplan.errors import ExitStatus, InputError
 from cellplan.io.cell.load import load_cell
 
+PROGRESS = re.compile(r"[\w -]+: \d+ %")
 LIMIT_S = 60.0  # [s] for a line to come on a slow machine
 
 
@@ -43,7 +45,8 @@ class Watching:
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            self._lines.put(line.rstrip("\n"))
+            if not PROGRESS.fullmatch(line.rstrip("\n")):  # on a slow machine only
+                self._lines.put(line.rstrip("\n"))
 
     def until(self, begin: str) -> list[str]:
         """Lines up to and with the first one that begins so."""
