@@ -1,4 +1,4 @@
-"""A command as typer takes it: its options as parameters, its result shown, its failures told to machines too."""
+"""A command as typer takes it: its options as parameters, its result shown, its failures as JSON too."""
 
 import functools
 import inspect

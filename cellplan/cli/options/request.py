@@ -12,7 +12,7 @@ Request = TypeVar("Request")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """What a command is told; each field of a subclass is an argument or an option, in the order of the help."""
+    """The arguments and options of a command: the fields of a subclass, in the order of the help."""
 
     SCHEMA: ClassVar[str] = ""  # of the JSON object that the command prints
 

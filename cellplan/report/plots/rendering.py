@@ -31,7 +31,7 @@ def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> di
 
 
 def require_formats(formats: Collection[str]) -> None:
-    """Refuse formats that nobody writes.
+    """Refuse formats that are not known.
 
     Raises:
         InputError: A format is unknown.
