@@ -77,13 +77,13 @@ class ClockedPath:
     @property
     def jumps(self) -> Array:
         """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
-        instants = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
+        breaks = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
         if self.task.approach is not None:
-            instants.append(np.array([self.task.start - self.task.approach.duration]))
+            breaks.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
             ramp = ramp_shares(self.task, self.corners) * np.diff(self.corners)
-            instants += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
-        return distinct(np.concatenate(instants))
+            breaks += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
+        return distinct(np.concatenate(breaks))
 
     def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
         """Reference poses and twists at times of a smooth stretch of time, its ends seen from inside.

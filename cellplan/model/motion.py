@@ -99,10 +99,10 @@ class Schedule:
         nominal = times if self.clock is None else self.clock.at(times)
         return tuple(path.poses(nominal) for path in self.paths)
 
-    def _within_clock(self, instants: Sequence[Array]) -> Array:
+    def _within_clock(self, nominal_times: Sequence[Array]) -> Array:
         """Times of all paths within the clock, and its ends."""
         end = float(self.times[-1])
-        nominal = np.concatenate([np.zeros(0), *instants])
+        nominal = np.concatenate([np.zeros(0), *nominal_times])
         times = nominal if self.clock is None else self.clock.reached_at(nominal)
         every = np.concatenate([self.extra_breaks, times])
         inner = distinct(every[(every > TIME_TOLERANCE) & (every < end - TIME_TOLERANCE)])

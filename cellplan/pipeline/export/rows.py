@@ -137,12 +137,12 @@ def _own_stops(plan: Plan, tasks: Sequence[str]) -> list[float]:
 
 def _all_stop(plan: Plan, nominal: NominalRows) -> tuple[float, ...]:
     """Nominal times at which no tool moves along its path: phases meet, or all tasks that are on have a stop there."""
-    instants = list(nominal.begins)
+    stops_of_all = list(nominal.begins)
     for time in {stop for stops in plan.stops.values() for stop in stops}:
         on = [task for task, stretches in plan.process.items() if np.any(_is_within(np.array([time]), stretches))]
         if all(np.any(np.abs(np.array(plan.stops.get(task, ())) - time) <= TIME_TOLERANCE) for task in on):
-            instants.append(time)
-    return tuple(instants)
+            stops_of_all.append(time)
+    return tuple(stops_of_all)
 
 
 def _is_at(sigma: Array, times: Sequence[float]) -> Flags:

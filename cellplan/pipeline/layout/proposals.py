@@ -150,7 +150,7 @@ def _branches(ready: Prepared) -> list[dict[str, list[float]]]:
         x, start = ready.starts.branches(robots, ready.given_start)
     except NoSolutionError:
         return []
-    return [{"x": values.tolist(), "start": posture.tolist()} for values, posture in zip(x, start, strict=True)]
+    return [{"x": values.tolist(), "start": q.tolist()} for values, q in zip(x, start, strict=True)]
 
 
 def _leads_nowhere(trial: Trial) -> bool:

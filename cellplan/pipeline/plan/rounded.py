@@ -29,10 +29,10 @@ def with_rounded_starts(cell: Cell, given: Cell) -> Cell:
 
 
 def with_start(cell: Cell, start: Array) -> Cell:
-    """The cell with every start posture filled in; what is not as given is rounded to what is written of it."""
+    """The cell with every start configuration filled in; what is not as given is rounded to what is written of it."""
     robots = []
     for robot in cell.robots:
-        posture = start[cell.columns(robot.name)]
-        is_given = robot.start is not None and np.array_equal(robot.start, posture)
-        robots.append(robot if is_given else replace(robot, start=rounded(robot, posture)))
+        configuration = start[cell.columns(robot.name)]
+        is_given = robot.start is not None and np.array_equal(robot.start, configuration)
+        robots.append(robot if is_given else replace(robot, start=rounded(robot, configuration)))
     return replace(cell, robots=tuple(robots))

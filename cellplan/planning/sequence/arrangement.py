@@ -98,8 +98,8 @@ def _holder_configuration(cell: Cell, task: Task) -> Array | None:
     """Configuration of the first holder at the start of a task; None for its start posture, when it is to be found."""
     if cell.carrier is None:
         return None
-    posture = task.start_posture if task.robot == cell.robots[cell.carrier].name else task.holder_posture
-    return cell.robots[cell.carrier].start if posture is None else posture
+    start = task.start_posture if task.robot == cell.robots[cell.carrier].name else task.holder_posture
+    return cell.robots[cell.carrier].start if start is None else start
 
 
 def _require_names(cell: Cell) -> None:

@@ -58,8 +58,8 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
     tasks = []
     for path in schedule.paths:
         nominal = _on_clock(clock.sigma, path)
-        instants = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
-        start, end, *rest = clock.reached_at(np.array(instants)).tolist()
+        nominal_times = [path.task.start, nominal.end, *nominal.cycle_ends, *nominal.stops]
+        start, end, *rest = clock.reached_at(np.array(nominal_times)).tolist()
         cycles, demanded = len(nominal.cycle_ends), np.array(nominal.demanded).reshape(-1, 2)
         tasks.append(
             replace(

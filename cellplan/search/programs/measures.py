@@ -220,5 +220,5 @@ def reserves(distances: Distances, reserve: Reserve) -> Array:
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
     """Nodes at which distances are asked: the ones nearest to even times, and to the times given."""
     times = problem.times
-    instants = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
-    return np.unique(np.abs(times[:, None] - instants).argmin(axis=0)).astype(np.intp)
+    key_times = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
+    return np.unique(np.abs(times[:, None] - key_times).argmin(axis=0)).astype(np.intp)

@@ -57,7 +57,7 @@ def _with_follower(problem: StartProblem, led: Pool, robot: int, setting: Settin
         drops += follower.drops
         first = slice(0, FOLLOWING)
         x += list(follower.x[first])
-        q += [np.append(led.q[row], posture) for posture in follower.q[first]]
+        q += [np.append(led.q[row], start) for start in follower.q[first]]
         cost += (led.cost[row] + follower.cost[first]).tolist()
         if len(x) >= MOST_BASES:
             break

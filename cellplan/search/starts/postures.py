@@ -70,11 +70,11 @@ def branch_starts(
         operator for operator in problem.operators if robots is None or problem.cell.robots[operator].name in robots
     ]
     for robot in operators:
-        postures = branches(problem, robot, x, start, rng)
-        if not len(postures):
+        configurations = branches(problem, robot, x, start, rng)
+        if not len(configurations):
             name = problem.cell.robots[robot].name
             return *nothing, f"'{name}' follows its path from no configuration with the part at rest"
-        choices.append(postures)
+        choices.append(configurations)
     while np.prod([len(choice) for choice in choices]) > COMBINATIONS:
         longest = max(range(len(choices)), key=lambda place: len(choices[place]))
         choices[longest] = choices[longest][:-1]

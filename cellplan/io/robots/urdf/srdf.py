@@ -154,11 +154,11 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collect
         missing = [joint for joint in driven if joint not in named[0].joints]
         text = f"expected a value of every joint between base and flange, missing: {listed(missing)}"
         raise named[0].element.error(f"group_state '{name}': {text}")
-    postures = [_positions(configuration, model, added) for configuration in complete]
-    if any(not np.array_equal(q, postures[0]) for q in postures):
+    positions = [_positions(configuration, model, added) for configuration in complete]
+    if any(not np.array_equal(q, positions[0]) for q in positions):
         names = listed(f"{configuration.group}/{configuration.name}" for configuration in complete)
         raise complete[1].element.error(f"group_state '{name}': expected one configuration of this name, got {names}")
-    return postures[0]
+    return positions[0]
 
 
 def _configuration(state: Element) -> NamedConfiguration:
