@@ -1,6 +1,7 @@
 """Names say what they hold: words that fit anything are no names of the package."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,3 +61,28 @@ def test_no_name_of_the_package_is_a_word_that_fits_anything() -> None:
 )
 def test_every_way_to_bind_a_name_is_seen(source: str) -> None:
     assert "found" in {name.lower() for _, name in bound_names(ast.parse(source))}
+
+
+ENTRY = re.compile(r"^    \*{0,2}(\w+):", re.MULTILINE)
+
+
+def described_without_a_parameter(node: ast.FunctionDef) -> list[str]:
+    """Names below ``Args:`` that are no parameters of a function."""
+    _, _, section = (ast.get_docstring(node) or "").partition("Args:\n")
+    taken = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
+    return sorted({*ENTRY.findall(section.partition("\n\n")[0])} - {arg.arg for arg in taken if arg is not None})
+
+
+def test_docstrings_describe_parameters_by_their_names() -> None:
+    functions = [
+        (path.name, node)
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    ]
+    wrong = {f"{file}: {node.name}": described_without_a_parameter(node) for file, node in functions}
+
+    assert {place: names for place, names in wrong.items() if names} == {}
+    (node,) = ast.parse('def f(a):\n    """One.\n\n    Args:\n        b: Two.\n    """').body
+    assert isinstance(node, ast.FunctionDef)
+    assert described_without_a_parameter(node) == ["b"]

@@ -107,7 +107,7 @@ def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputErr
         file: Its name in messages.
         line: The line, from 1.
         expected: What should be there.
-        found: What is there, in words.
+        actual: What is there, in words.
     """
     return InputError(f"{file}:{line}: expected {expected}, got {actual}")
 

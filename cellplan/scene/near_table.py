@@ -92,7 +92,7 @@ class NearTable:
         It is the same at both points, as the normal goes through both.
 
         Args:
-            found: The pairs.
+            nearby: The pairs.
             screws: Of all axes, shape (axes, K, 6).
         """
         links, forces, count = self.links_of(nearby), wrenches(nearby), screws.shape[1]

@@ -63,7 +63,7 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, minimum: C
     Args:
         bound: What is proved of all pairs.
         times: Times of the samples in [s], shape (N,).
-        found: Its smallest distance; zero where a pair touches.
+        minimum: Its smallest distance; zero where a pair touches.
     """
     checks, pairs = bound.scene.cell.checks, [pair for pair in bound.of_class(kind) if pair.is_compared]
     names, at_s, distance = minimum.pair or ("", ""), minimum.at_s or 0.0, float(minimum.minimum or 0.0)

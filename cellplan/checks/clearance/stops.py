@@ -81,7 +81,7 @@ def check_stops(cell: Cell, report: StopReport | None) -> list[Check]:
     """Depth and distance against what the cell demands of stops; none where it demands nothing.
 
     Args:
-        found: What happens at worst; None where it is not known, which fails every demand.
+        report: What happens at worst; None where it is not known, which fails every demand.
     """
     demand = cell.checks.stop
     if demand is None:

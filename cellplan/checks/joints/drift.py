@@ -56,7 +56,7 @@ def check_joint_drift(repeatability: Repeatability | None, *, is_demanded: bool)
     """Whether every joint comes back in every cycle; nothing is checked when the cell does not demand it.
 
     Args:
-        found: Drift of the run; a run without a cycle cannot meet the demand.
+        repeatability: Drift of the run; a run without a cycle cannot meet the demand.
         is_demanded: Whether the cell demands a closed joint motion.
     """
     if not is_demanded:

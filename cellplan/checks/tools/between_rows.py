@@ -263,7 +263,7 @@ class ErrorsBetweenRows:
         Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
 
         Args:
-            found: The tool.
+            measured: The tool.
             kind: 0 for its position, 1 for its orientation.
             errors: Errors between the rows, shape (M,).
             rows: Larger error of both rows of the step of each, shape (M,).

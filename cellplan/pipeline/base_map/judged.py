@@ -71,7 +71,7 @@ def finished_record(
 
     Args:
         ready: What the map is made of.
-        found: The verdict of every place.
+        verdicts: The verdict of every place.
         certify: How many of the best places are solved and verified.
         progress: Called with the stage and the fraction done.
     """

@@ -57,8 +57,8 @@ def map_record(
     """The map in printed units.
 
     Args:
-        asked: The job and the places.
-        found: The verdict of every place.
+        job: The job and the places.
+        verdicts: The verdict of every place.
         best: The best places with their settings, best first.
         certified: What came of the first of them when they were solved.
         drawn: Outlines and paths.

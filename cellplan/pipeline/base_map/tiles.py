@@ -39,7 +39,7 @@ class Tiles:
         """The tiles of a map.
 
         Args:
-            asked: The job and the places.
+            job: The job and the places.
             q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
             at: Their places, shape (S,).
         """
@@ -76,7 +76,7 @@ def judged(job: MapJob, values: Mapping[str, Any]) -> Outcome:
     """What becomes of the places of a tile.
 
     Args:
-        asked: The job and the places.
+        job: The job and the places.
         values: See ``Tiles``.
     """
     verdicts = judge(job, np.array(values["starts"]), np.array(values["places"], dtype=np.intp))

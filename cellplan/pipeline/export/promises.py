@@ -68,7 +68,7 @@ def choose_promise(
         dialect: The format.
         robots: Names of the robots that are exported.
         skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
-        asked: The only promise that will do; None for the best.
+        requested: The only promise that will do; None for the best.
 
     Raises:
         InputError: None can be kept, as something is not stated in the cell.

@@ -58,7 +58,7 @@ def thinned(
         program: Rows of all robots of the cell on one clock; those that are in no group are left out of the result.
         groups: Names of the robots of each controller; one group for all robots of a synchronised export.
         limits: The tolerances.
-        kept: Further rows that stay, and the phases in which tools are judged.
+        essential_rows: Further rows that stay, and the phases in which tools are judged.
 
     Raises:
         InputError: A tolerance cannot be kept with rows as far apart as the limits say.

@@ -366,7 +366,7 @@ def write_fastest(cycles: ShortestCycles, folder: Path, *, progress: Progress = 
     it loads from the folder of that cell.
 
     Args:
-        found: As ``fastest`` returns it.
+        cycles: As ``fastest`` returns it.
         folder: The folder; an earlier one is replaced.
         progress: Called with the stage and the fraction done.
 

@@ -83,7 +83,7 @@ def from_both_sides(
     Args:
         number: Steps that the first program is said to take.
         at: The program in a number of steps; a ``TooFewStepsError`` says that a task needs more of them.
-        asked: How many times as long a program must last, at most 1 where it keeps its limits.
+        demanded_share: How many times as long a program must last, at most 1 where it keeps its limits.
     """
     best, now, bracket = None, first, Bracket()
     share = demanded_share(first)

@@ -79,7 +79,7 @@ def with_homes(cell: Cell, homes: Mapping[str, Array], *, given: Cell) -> Cell:
 
     Args:
         cell: The cell, every start posture filled in.
-        found: Homes that were searched for, by robot.
+        homes: Homes that were searched for, by robot.
         given: The cell as it was written. A robot without any work whose start was left open starts at its home.
     """
     never_at_work = idle_robots(cell, [task.name for task in cell.tasks])

@@ -171,7 +171,7 @@ def write_repair(repair: Repair, request: LayoutRequest, folder: Path) -> Advice
     the first remedy, and the files beside it that it names.
 
     Args:
-        found: As ``repair`` returns it.
+        repair: As ``repair`` returns it.
         request: What was repaired.
         folder: The folder; an earlier one is replaced.
 

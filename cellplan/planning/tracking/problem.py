@@ -49,7 +49,7 @@ class FirstOrder:
 
         Args:
             null_space_projection: What the tasks leave of the secondary goals, shape (nq,).
-            beside: Joint speeds that the tasks need, shape (nq,).
+            velocities: Joint speeds that the tasks need, shape (nq,).
         """
         if self.bounds is None:
             return null_space_projection

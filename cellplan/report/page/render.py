@@ -55,7 +55,7 @@ def report_page(
         record: Result of ``run_record``.
         checks: The checks of the run.
         plots: SVG pictures by file name, which lie in ``plots/`` beside the page; others are ignored.
-        **beside: What lies beside it, and its pictures.
+        **pictures: What lies beside it, and its pictures.
     """
     drawings = [name for name in plots if name.endswith(".svg")]
     parts = {
@@ -75,7 +75,7 @@ def overview_page(record: Record, *, cell: Cell, **pictures: Unpack[PageFiles]) 
 
     Args:
         record: Result of ``summary_record``.
-        **beside: What lies beside it, and its pictures.
+        **pictures: What lies beside it, and its pictures.
     """
     parts = {"links": _links(record, (), pictures), "errors": phase_errors(record)}
     return cell_page("overview.html", record, cell, parts | _shared_parts(record, cell, pictures))

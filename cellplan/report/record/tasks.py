@@ -159,7 +159,7 @@ def _task_record(
         "max_orientation_error_with_settling_deg": number(largest(orientation)[0]),
         "settle_s": number(task.settle),
         "judged_from_s": number(task.judged_from),
-        "tolerance": entry_record(task.tolerance, without=() if accuracy.between else BETWEEN_ROWS),
+        "tolerance": entry_record(task.tolerance.filled, without=() if accuracy.between else BETWEEN_ROWS),
         "axes": [AXES[index] for index in task.axes],
         "path_length_mm": number(MM * accuracy.path_length),
         "path_bulge_mm": None if accuracy.path_bulge is None else number(MM * accuracy.path_bulge),

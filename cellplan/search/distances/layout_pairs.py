@@ -88,7 +88,7 @@ def are_own(pairs: Sequence[LayoutPair]) -> Flags:
 
 
 def among(pairs: WatchedPairs, is_selected: Flags) -> WatchedPairs:
-    """Some of the pairs, by what they are called: ``kept`` has an entry for each row."""
+    """Some of the pairs, by what they are called: ``is_selected`` has an entry for each row."""
     count = len(pairs.solids)
     is_kept = is_selected[pairs.rows]
     solids, above = is_kept[:count], is_kept[count:]

@@ -22,7 +22,7 @@ class JacobianChanges:
         Args:
             job: The tasks at their nodes.
             screws: The screws at all nodes.
-            own: Rates of the own axes of each relation, shape (N, T, levels).
+            local: Rates of the own axes of each relation, shape (N, T, levels).
             shared: Rates of the axes of the positioner, shape (N, levels).
             at_tips: Whether all twists are taken at the tips.
         """

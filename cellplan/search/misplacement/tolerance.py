@@ -21,7 +21,7 @@ class Tolerance:
     name: str  # address of what is displaced
     sign: float  # direction, -1 or 1
     unit: Array  # the displacement by 1 [m] or [rad] in this direction, shape (m,)
-    start: Array  # start posture at ``kept`` in [rad] or [m], shape (nq,)
+    start: Array  # start configuration at the extent in [rad] or [m], shape (nq,)
     extent: float  # largest displacement found in [m] or [rad] at which all demands are kept, not negative
     missed: float  # smallest one found at which a demand is missed; inf where none was missed as far as was asked
     first: str  # the demand that is missed there; empty without one

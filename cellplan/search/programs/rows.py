@@ -105,7 +105,7 @@ class Linear:
 
         Args:
             demands: What is demanded.
-            room: What is asked for beyond it.
+            reserve: What is asked for beyond it.
             box: Largest steps of the variables, then of the squares of a retimed motion, relative, (n + m,).
         """
         count = len(self.problem.scale)

@@ -105,7 +105,7 @@ def test_no_program_is_released_for_many_real_cells(pair):
 def test_noise_bounds_what_feedback_can_reach(pair):
     """The last correction puts one measurement's noise onto the part: its largest of all samples stays."""
     sigma = 2e-6
-    made = rehearse(pair, replace(SMALL, position_noise=sigma), feedback=True)
+    made = rehearse(pair, replace(SMALL, measurement=MeasurementEntry(position_noise_mm=1e3 * sigma)), feedback=True)
 
     (trial,) = made.runs[0].trials
     error = trial.final[0].position_error[:, :2]
@@ -114,7 +114,7 @@ def test_noise_bounds_what_feedback_can_reach(pair):
 
 
 def test_noise_above_the_tolerance_stalls(pair):
-    made = rehearse(pair, replace(SMALL, position_noise=2e-4), feedback=True, rounds=6)
+    made = rehearse(pair, replace(SMALL, measurement=MeasurementEntry(position_noise_mm=0.2)), feedback=True, rounds=6)
 
     (trial,) = made.runs[0].trials
     assert trial.correction.outcome is Outcome.STALLED

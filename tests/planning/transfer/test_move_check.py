@@ -36,7 +36,7 @@ def test_moves_are_free_where_the_certificate_says_so(among_posts: Scene) -> Non
         is_free, q = check.is_free(*ends), straight(*ends)
         found.append(is_free)
         # what is refused lacks the reserve at a sample: it may keep the demand, but not much more
-        demand = CHECKS.clearance if is_free else CHECKS.clearance + 2.0 * RESERVE
+        demand = CHECKS.clearance_mm.si if is_free else CHECKS.clearance_mm.si + 2.0 * RESERVE
         assert certify(among_posts, q, demand, with_minimum=False).is_kept is is_free
 
     assert 2 <= sum(found) <= 8

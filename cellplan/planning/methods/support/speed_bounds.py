@@ -91,7 +91,7 @@ def braking_speed(distance: Array, acceleration: Array, dt: float) -> Array:
               n = \left\lfloor \tfrac12 \left(\sqrt{1 + 8 room / (a dt^2)} - 1\right) \right\rfloor
 
     Args:
-        room: Distances in [rad] or [m], 0 or more, shape (nq,); may be infinite.
+        distance: Distances in [rad] or [m], 0 or more, shape (nq,); may be infinite.
         acceleration: Accelerations in [rad/s^2] or [m/s^2], shape (nq,); infinite where a joint may stop at once.
         dt: Length of a step in [s].
     """
