@@ -17,7 +17,7 @@ import numpy as np
 from sections import Section, table
 
 from cellplan import LayoutRequest, Stop, load_cell, search_layout
-from cellplan.search.programs.objective import Timing
+from cellplan.search.programs.objective import CycleTiming
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells" / "four_robots.yaml"
 FREE: Final = (("start",), ("weights",), ("start", "weights"), ("path",), ("start", "weights", "path"))
@@ -32,7 +32,7 @@ TOOL: Final = {"length_mm": [100, 250], "tilt_deg": [0, 60], "roll_deg": [-180, 
 THIN: Final = {"radius_mm": 1, "stick_out_mm": 90}  # of a rod in place of a tool without bodies
 
 
-def asked(cell: Path, limits: str, timing: Timing, free: tuple[str, ...]) -> LayoutRequest:
+def asked(cell: Path, limits: str, timing: CycleTiming, free: tuple[str, ...]) -> LayoutRequest:
     """A search with bases and tools as they are."""
     rules = [f"robots.{robot.name}.acceleration={RULES[limits]}" for robot in load_cell(cell).robots]
     return LayoutRequest(
@@ -47,7 +47,7 @@ def asked(cell: Path, limits: str, timing: Timing, free: tuple[str, ...]) -> Lay
 
 def together(cell: Path) -> LayoutRequest:
     """A search of bases, tools and the path of the positioner; tools without bodies become thin rods."""
-    given, request = load_cell(cell), asked(cell, "none", Timing.LAWS, ())
+    given, request = load_cell(cell), asked(cell, "none", CycleTiming.LAWS, ())
     settings, vary = list(request.settings), [f"{given.positioners[0]}.path"]
     for name in dict.fromkeys(task.robot for task in given.tasks):
         tool, tip = given.robot(name).tool, given.robot(name).tool.X_FT
@@ -76,7 +76,7 @@ def measured(request: LayoutRequest, words: str, limits: str, trials: int) -> li
     return [words, limits, str(request.timing), *figures, str(trials), f"{spent:.0f}"]
 
 
-def section(cell: Path, trials: int, timings: tuple[Timing, ...], *, with_layout: bool) -> Section:
+def section(cell: Path, trials: int, timings: tuple[CycleTiming, ...], *, with_layout: bool) -> Section:
     """The whole table."""
     head = ("free", "accelerations", "timing", "certified, s", "margin, deg", "clearance, mm", "trials", "finish, s")
     rows = [
@@ -99,7 +99,7 @@ def main() -> None:
     parser.add_argument("--retimed", action="store_true", help="with the best common speed as well")
     parser.add_argument("--layout", action="store_true", help="bases, tools and path together as well")
     chosen = parser.parse_args()
-    timings = (Timing.LAWS, Timing.RETIMED) if chosen.retimed else (Timing.LAWS,)
+    timings = (CycleTiming.LAWS, CycleTiming.RETIMED) if chosen.retimed else (CycleTiming.LAWS,)
     print(section(chosen.cell, chosen.trials, timings, with_layout=chosen.layout).text())
 
 

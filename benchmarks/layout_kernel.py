@@ -25,7 +25,7 @@ from cellplan.geometry.transforms import Array, pose, rotation_exp
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
 from cellplan.scene.scene import Scene
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.figures import Figures
+from cellplan.search.kernel.figures import MotionFigures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import Motions, run, run_near
 from cellplan.search.kernel.screws import Directions
@@ -92,7 +92,7 @@ class Bench:
             return screen_layouts(self.cell, self.schedule, candidates, moving=self.moving, accuracy=FINE)
 
         exact, found = accurate(), run(self.job, layouts.of_places(few))
-        kept, figures = exact.is_followed & found.is_followed, Figures.of(self.job, found)
+        kept, figures = exact.is_followed & found.is_followed, MotionFigures.of(self.job, found)
         fastest, expected = figures.speeds.value[kept].max(axis=1), exact.speed_ratios[kept].max(axis=1)
         nodes = (np.abs(found.qd[kept]) / self.job.limits.velocity).max(axis=(1, 2))
         ratio, at_nodes = float(np.abs(fastest / expected - 1.0).max()), float(np.abs(nodes / expected - 1.0).max())

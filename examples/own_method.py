@@ -12,7 +12,7 @@ import numpy as np
 import cellplan.planning.methods
 from cellplan import load_cell, solve
 from cellplan.model.solver import Integrator
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 CELL = Path(__file__).resolve().parent / "plate.yaml"
 
@@ -20,10 +20,10 @@ CELL = Path(__file__).resolve().parent / "plate.yaml"
 def own_method(problem: TrackingProblem):
     """One Euler step of ``qdot = J^+ (xdot_d + K e)`` with the Moore-Penrose inverse of the cooperation Jacobian."""
 
-    def advance(k: int, q: np.ndarray) -> Advance:
+    def advance(k: int, q: np.ndarray) -> StepResult:
         tasks = problem.first_order(k, q)
         velocity = np.linalg.pinv(tasks.J) @ (tasks.twist + problem.gain * tasks.error)
-        return Advance(q=q + velocity * problem.step(k))
+        return StepResult(q=q + velocity * problem.step(k))
 
     return advance
 

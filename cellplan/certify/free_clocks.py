@@ -135,7 +135,7 @@ def band(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WatchedPairs:
+class RobotPairs:
     """The pairs of the bodies of two robots."""
 
     rows: Indices  # their places in ``Scene.pairs``, shape (P,)
@@ -144,7 +144,7 @@ class WatchedPairs:
     keeps: Flags  # whether the clearance is demanded, not only that nothing touches, shape (P,)
 
 
-def watched_pairs(scene: Scene, first: str, second: str) -> WatchedPairs:
+def watched_pairs(scene: Scene, first: str, second: str) -> RobotPairs:
     """All pairs of which the one body is carried by the first robot and the other by the second."""
     rows, ends, demands = list[int](), list[tuple[int, int]](), list[float]()
     robots = [scene.carrier(index).robot for index in range(len(scene.engine.bodies))]
@@ -156,7 +156,7 @@ def watched_pairs(scene: Scene, first: str, second: str) -> WatchedPairs:
             rows.append(row)
             ends.append((u, v) if carriers[0] == first else (v, u))
             demands.append(max(APART_TOL, pair.demand) if pair.rule is Rule.CLEARANCE else APART_TOL)
-    return WatchedPairs(
+    return RobotPairs(
         np.array(rows, dtype=np.intp),
         np.array(ends, dtype=np.intp).reshape(-1, 2),
         np.array(demands),

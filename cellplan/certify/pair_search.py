@@ -18,7 +18,7 @@ import numpy as np
 
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_state import PairState, StepBounds
-from cellplan.collision.continuous.motion_bound import Motion, Pair, PairMotion
+from cellplan.collision.continuous.motion_bound import BodyMotion, Pair, PairMotion
 from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
 from cellplan.collision.distance import APART_TOL, TIGHT_TOL, Reading, exact_reading, quick_reading
 from cellplan.collision.engine import Engine
@@ -156,7 +156,7 @@ class SolidSearch(Search):
         self,
         engine: Engine,
         pair: Pair,
-        motion: Motion,
+        motion: BodyMotion,
         *,
         state: PairState | None = None,
         begin: float = 0.0,

@@ -10,7 +10,7 @@ from cellplan.certify.curves import CurveRefiner
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import GroundSearch, Search, SolidSearch
 from cellplan.certify.survey import Survey
-from cellplan.collision.continuous.motion_bound import Motion, Pair
+from cellplan.collision.continuous.motion_bound import BodyMotion, Pair
 from cellplan.collision.distance import Reading, measure
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Indices
@@ -188,7 +188,7 @@ def _ends(pair: ScenePair) -> Pair:
     return pair.solids
 
 
-def _surface_span(engine: Engine, pair: Pair, motion: Motion) -> tuple[int, int] | None:
+def _surface_span(engine: Engine, pair: Pair, motion: BodyMotion) -> tuple[int, int] | None:
     """First and last sample at which two bodies touch, or very nearly so; None when there is none."""
     search = SolidSearch(engine, pair, motion)
     first = _at_surface(search, backwards=False)

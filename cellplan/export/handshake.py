@@ -14,7 +14,7 @@ from cellplan.model.exported import ExportFrame
 from cellplan.model.settings.controllers import HandshakeEntry
 
 
-class Step(NamedTuple):
+class HandshakeStep(NamedTuple):
     """One instruction of a handshake."""
 
     waits: bool  # whether it waits for an input, or else sets the output
@@ -22,7 +22,7 @@ class Step(NamedTuple):
     is_on: bool  # the state to wait for, or to set
 
 
-def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
+def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]:
     """Instructions of a robot at a mark; none in a cell of one robot.
 
     Args:
@@ -39,13 +39,23 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[Step, ...]:
     signals = _signals(frame, robot)
     if robot != leader:
         output, go = str(signals.output), _input(signals, robot, leader)
-        return (Step(False, output, True), Step(True, go, True), Step(False, output, False), Step(True, go, False))
+        return (
+            HandshakeStep(False, output, True),
+            HandshakeStep(True, go, True),
+            HandshakeStep(False, output, False),
+            HandshakeStep(True, go, False),
+        )
     inputs = [_input(signals, robot, other) for other in others]
-    up, down = ([Step(True, signal, is_on) for signal in inputs] for is_on in (True, False))
-    return (*up, Step(False, str(signals.output), True), *down, Step(False, str(signals.output), False))
+    up, down = ([HandshakeStep(True, signal, is_on) for signal in inputs] for is_on in (True, False))
+    return (
+        *up,
+        HandshakeStep(False, str(signals.output), True),
+        *down,
+        HandshakeStep(False, str(signals.output), False),
+    )
 
 
-def lowering_step(frame: ExportFrame, robot: str) -> Step:
+def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:
     """The instruction before the first motion of a program with marks: the output of the robot is lowered.
 
     A program that was aborted at a mark may have left it raised, which would release others at the next start.

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from cellplan.errors import CellplanError, OverrunError
-from cellplan.guard.worker import Answer, Job
+from cellplan.guard.worker import Answer, WorkerJob
 from cellplan.guard.worker_process import ChildProcess, Guard
 
 Value = TypeVar("Value")
@@ -43,12 +43,12 @@ def value_of(answer: Answer, guard: Guard) -> Any:
     return answer.value
 
 
-def job_here(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> Job:
+def job_here(function: Callable[..., object], arguments: tuple[object, ...], guard: Guard) -> WorkerJob:
     """A job for the child, in the working directory of this process."""
     folder = None
     with contextlib.suppress(OSError):  # it may have been removed
         folder = os.getcwd()  # noqa: PTH109 - a text crosses
-    return Job(function, arguments, folder, guard.seconds, guard.megabytes)
+    return WorkerJob(function, arguments, folder, guard.seconds, guard.megabytes)
 
 
 _lock = threading.Lock()

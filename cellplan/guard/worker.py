@@ -15,7 +15,7 @@ from cellplan.errors import CellplanError
 MEGABYTE: Final = 1 << 20  # [bytes]
 
 
-class Job(NamedTuple):
+class WorkerJob(NamedTuple):
     """A job of the parent: a function of a module, its arguments, its folder and its limits."""
 
     function: Callable[..., Any]
@@ -63,7 +63,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _done(job: Job) -> Answer:
+def _done(job: WorkerJob) -> Answer:
     """Answer to a job."""
     try:
         if job.folder is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cellplan.errors import OverrunError, TimeLimitError
-from cellplan.guard.worker import Answer, Job
+from cellplan.guard.worker import Answer, WorkerJob
 
 # The child starts without its working directory on the path, or a file named pickle.py there would be run.
 WORKER_PROGRAM: Final = (
@@ -53,7 +53,7 @@ class ChildProcess:
         """Whether the process runs and belongs to this one; a fork has pipes that are not its own."""
         return self.owner == os.getpid() and self._process.poll() is None
 
-    def ask(self, job: Job, guard: Guard) -> Answer:
+    def ask(self, job: WorkerJob, guard: Guard) -> Answer:
         """Answer to a job; the process is ended when there is none, and after an interruption."""
         late = threading.Event()
         clock = threading.Timer(guard.patience * guard.seconds, self._end_late, [late])
@@ -89,7 +89,7 @@ class ChildProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(KILL_TIMEOUT_S)
 
-    def _exchange(self, job: Job) -> Answer:
+    def _exchange(self, job: WorkerJob) -> Answer:
         """Send a job and wait for its answer."""
         if self._process.stdin is None or self._process.stdout is None:
             raise EOFError

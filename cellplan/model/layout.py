@@ -72,7 +72,7 @@ class PathRange:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
+class LayoutChoice:
     """A discrete choice.
 
     Attributes:
@@ -135,7 +135,7 @@ class LayoutSettings:
 
     ranges: tuple[VaryRange, ...]
     paths: tuple[PathRange, ...] = ()
-    choices: tuple[Choice, ...] = ()
+    choices: tuple[LayoutChoice, ...] = ()
     equal: tuple[tuple[str, ...], ...] = ()
     mirrored: tuple[Mirrored, ...] = ()
     keep_out: tuple[KeepOut, ...] = ()

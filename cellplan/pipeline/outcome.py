@@ -9,7 +9,7 @@ from cellplan.pipeline.overrides import require_task
 from cellplan.pipeline.solution import Solution
 from cellplan.pipeline.solve import solve
 from cellplan.pipeline.write_run import write_run
-from cellplan.study.trial import Outcome, TrialStatus
+from cellplan.study.trial import TrialOutcome, TrialStatus
 
 
 def solved_outcome(
@@ -19,7 +19,7 @@ def solved_outcome(
     file: Path,
     task: str | None = None,
     folder: Path | None = None,
-) -> Outcome:
+) -> TrialOutcome:
     """Solve one variant; what is wrong with it becomes its reason.
 
     Args:
@@ -39,7 +39,7 @@ def solved_outcome(
     except (InputError, NoSolutionError) as error:
         status = TrialStatus.BAD_INPUT if isinstance(error, InputError) else TrialStatus.NO_SOLUTION
         reason = str(error).splitlines()[0].replace(str(file), file.name)  # the same wherever the cell file lies
-        return Outcome(status=status, reason=reason, figures={})
+        return TrialOutcome(status=status, reason=reason, figures={})
     if folder is not None:
         try:
             write_run(solution, folder)
@@ -47,4 +47,4 @@ def solved_outcome(
             raise StudyStoppedError(str(error)) from error
     failed = [check.message for run in solution.runs for check in run.report.checks if not check.passed]
     status = TrialStatus.FAILED if failed else TrialStatus.PASSED
-    return Outcome(status=status, reason=failed[0] if failed else "", figures=figures(solution))
+    return TrialOutcome(status=status, reason=failed[0] if failed else "", figures=figures(solution))

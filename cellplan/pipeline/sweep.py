@@ -21,7 +21,7 @@ from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.figures import KEY, figures_of
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome, Variant
+from cellplan.study.trial import TrialOutcome, Variant
 from cellplan.study.variants import Axis, combinations
 
 
@@ -100,7 +100,7 @@ def sweep(
     return record
 
 
-def evaluate_variant(job: SweepJob, variant: Variant) -> Outcome:
+def evaluate_variant(job: SweepJob, variant: Variant) -> TrialOutcome:
     """Solve one variant; what is wrong with it becomes its reason.
 
     Args:

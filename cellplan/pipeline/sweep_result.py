@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.model.report import CAUTION
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
-from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Limit, Mark, Panel, value_axis
+from cellplan.report.plots.figure import Figure, Item, Limit, PlotAxis, PlotCurve, PlotMark, PlotPanel, value_axis
 from cellplan.report.plots.palette import LIMIT, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
@@ -93,14 +93,14 @@ def study_figures(record: Record) -> dict[str, Figure]:
     shown = [key for key in COLUMNS[1:] if any(figures[key] is not None for figures in solved)]
     figure = Figure(
         title=f"{record['cell']}: key figures over {address}; failed variants in red",
-        x=Axis(low=min(x), high=max(x), label=address),
+        x=PlotAxis(low=min(x), high=max(x), label=address),
         panels=[_panel(key, curves, address) for key in shown],
         columns=2,
     )
     return {"study": figure}
 
 
-def _panel(key: str, curves: Mapping[str, Entries], address: str) -> Panel:
+def _panel(key: str, curves: Mapping[str, Entries], address: str) -> PlotPanel:
     """One figure: a curve for each combination of the other values, a dot for each variant, red if it failed."""
     shown = SHOWN[key]
     known = {others: [it for it in trials if it["figures"][key] is not None] for others, trials in curves.items()}
@@ -109,10 +109,10 @@ def _panel(key: str, curves: Mapping[str, Entries], address: str) -> Panel:
     for colour, (others, trials) in zip(ROBOTS, known.items(), strict=False):
         at = [float(trial["values"][address]) for trial in trials]
         values = [shown.percent * trial["figures"][key] for trial in trials]
-        items.append(Curve(others, np.array(at), np.array(values), colour))
+        items.append(PlotCurve(others, np.array(at), np.array(values), colour))
         pens = [colour if trial["status"] == "passed" else LIMIT for trial in trials]
-        items += [Mark(*point) for point in zip(at, values, pens, strict=True)]
-    return Panel(
+        items += [PlotMark(*point) for point in zip(at, values, pens, strict=True)]
+    return PlotPanel(
         title=shown.plot,
         y=value_axis(min(shown_values), max(*shown_values, shown.limit or max(shown_values))),
         items=items,
@@ -167,7 +167,7 @@ def study_tables(record: Record) -> Tables:
     return {"trials": lambda: columns_of(map(flat, record["trials"]), names)}
 
 
-STUDY: Final = Kind(
+STUDY: Final = ResultKind(
     name="study",
     title="Sweep",
     tables=study_tables,

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from cellplan.checks.tools.tracking import part_poses
-from cellplan.export.wide.columns import PhaseRows, ProgramRows
+from cellplan.export.wide.columns import PhaseRows, WideRows
 from cellplan.export.wide.writer import file_name, read_wide, render_wide
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
@@ -15,13 +15,13 @@ from cellplan.pipeline.solution import Solution
 Checked = tuple[Cell, Schedule, Report]  # a phase: the cell as it is in it, its schedule and its report
 
 
-def solution_rows(solution: Solution) -> ProgramRows:
+def solution_rows(solution: Solution) -> WideRows:
     """All rows of a solution, gaps between its phases included."""
     checked = [(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
     return _program_rows(solution.cell, solution.motion, checked)
 
 
-def verified_rows(run: VerifiedRun) -> ProgramRows:
+def verified_rows(run: VerifiedRun) -> WideRows:
     """All rows of a verified run, gaps between its phases included."""
     return _program_rows(run.cell, run.motion, [_checked(motion) for motion in run.motions])
 
@@ -48,7 +48,7 @@ def read_wide_tables(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[s
     return run.by_phase([read_wide(run.cell, files[path], path) for path in map(file_name, run.programs)])
 
 
-def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, ProgramRows]]:
+def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, WideRows]]:
     """The rows of every program of a run, by its name."""
     if run.cell.program is not None:
         yield None, verified_rows(run)
@@ -58,16 +58,16 @@ def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, ProgramRows]]:
         times, sigma = motion.schedule.times, run.motion.sigma[rows]
         process = run.motion.plan.process
         phase_rows = _phase_rows(phase.name, slice(0, len(times)), _checked(motion))
-        yield motion.name, ProgramRows(cell=run.cell, times=times, sigma=sigma, phases=[phase_rows], process=process)
+        yield motion.name, WideRows(cell=run.cell, times=times, sigma=sigma, phases=[phase_rows], process=process)
 
 
-def _program_rows(cell: Cell, motion: Motion, checked: Sequence[Checked]) -> ProgramRows:
+def _program_rows(cell: Cell, motion: Motion, checked: Sequence[Checked]) -> WideRows:
     """All rows of a program; cycles after the first one repeat the phases of the first."""
     phases = [
         _phase_rows(phase.name, motion.rows(phase), checked[place % len(checked)])
         for place, phase in enumerate(motion.plan.program)
     ]
-    return ProgramRows(cell=cell, times=motion.times, sigma=motion.sigma, phases=phases, process=motion.plan.process)
+    return WideRows(cell=cell, times=motion.times, sigma=motion.sigma, phases=phases, process=motion.plan.process)
 
 
 def _phase_rows(name: str, rows: slice, checked: Checked) -> PhaseRows:

@@ -52,7 +52,7 @@ class ScenePair:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StraightMove:
+class StraightMotion:
     """A straight move of a tool to a place or away from it, in which some pairs are watched on a part of the way only.
 
     Attributes:

@@ -22,7 +22,7 @@ from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
 from cellplan.scene.grips import GRIP_TOL
 from cellplan.scene.mounting import Mount, MountedPair, is_rigid_with_flange
-from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMove
+from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMotion
 from cellplan.scene.scene import Scene
 
 WAY_TOL: Final = 1e-4  # [m] by which the tool of a straight move may be off it: contact ends no sooner
@@ -53,7 +53,9 @@ class PartContact:
             if self.is_lying and (cut := self._cut(scene, pair, limit.limit, len(scene.engine.bodies) + len(cuts))):
                 cuts += cut[1]
                 spans.append((cut[0], 0.0, near))
-        move = StraightMove(robot=self.grasp.robot, p_WT=(self.place.X_WP @ self.grasp.X_PT)[:3, 3], pairs=tuple(spans))
+        move = StraightMotion(
+            robot=self.grasp.robot, p_WT=(self.place.X_WP @ self.grasp.X_PT)[:3, 3], pairs=tuple(spans)
+        )
         reason = "the part is taken from it here or put on it: may touch near its place only"
         if self.is_lying:
             reason = f"{self.grasp.robot} grips the part here or lets it go: may touch near the grip only"

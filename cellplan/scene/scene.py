@@ -24,7 +24,7 @@ from cellplan.scene.left_out import left_out
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.moved import placed_columns, stands_by_link, with_bases
 from cellplan.scene.near import NearPairs, near_pairs, near_table_of
-from cellplan.scene.pairs import Excluded, ScenePair, StraightMove
+from cellplan.scene.pairs import Excluded, ScenePair, StraightMotion
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,7 +43,7 @@ class Scene:
     mounted: tuple[MountedPair, ...]  # pairs that may touch and of which the depth is judged
     engine: Engine
     cut_from: tuple[int, ...]  # the tool body that each of these last ones is cut from
-    straight: StraightMove | None = None  # pairs that are watched on a part of a straight move only, not in ``pairs``
+    straight: StraightMotion | None = None  # pairs that are watched on a part of a straight move only, not in ``pairs``
     solid_rows: Indices = field(init=False)  # indices of the pairs that the engine watches, shape (S,), ascending
     solid_pairs: Indices = field(init=False)  # ``ScenePair.solids`` of each of them, shape (S, 2)
     ground_rows: Indices = field(init=False)  # indices of the pairs of a solid and a half-space, shape (G,)

@@ -13,7 +13,7 @@ from cellplan.errors import InputError, StudyStoppedError
 from cellplan.io.input.files import read_regular_file
 from cellplan.io.run.whole_file import write_whole
 from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA
-from cellplan.study.trial import Trial, Variant
+from cellplan.study.trial import StudyTrial, Variant
 
 MAX_BYTES: Final = 500_000_000
 
@@ -41,8 +41,8 @@ class Journal:
         self._header = json.dumps({"schema": SCHEMA, **header}, ensure_ascii=False, allow_nan=False)
         self._files: dict[Path, IO[bytes]] = {}
         self._written = f"{self._header}\n".encode()
-        self.trials: list[Trial] = []
-        self.ahead: dict[int, Trial] = {}
+        self.trials: list[StudyTrial] = []
+        self.ahead: dict[int, StudyTrial] = {}
         if resume:
             self._read()
 
@@ -59,7 +59,7 @@ class Journal:
             raise self._cannot_write(error) from error
         return self
 
-    def append(self, trial: Trial) -> None:
+    def append(self, trial: StudyTrial) -> None:
         """Record the next trial.
 
         Raises:
@@ -69,7 +69,7 @@ class Journal:
         self.trials.append(trial)
         self.ahead.pop(trial.variant.number, None)
 
-    def park(self, trial: Trial) -> None:
+    def park(self, trial: StudyTrial) -> None:
         """Record a trial before which another is missing.
 
         Raises:
@@ -101,7 +101,7 @@ class Journal:
         if not self.ahead:
             self._ahead.unlink(missing_ok=True)
 
-    def _write(self, path: Path, trial: Trial) -> None:
+    def _write(self, path: Path, trial: StudyTrial) -> None:
         """Append a line and have it on the disk."""
         try:
             file = self._files.get(path) or self._files.setdefault(path, path.open("ab"))
@@ -123,10 +123,10 @@ class Journal:
             self._written = complete
         self.ahead = {number: trial for number, trial in read_ahead(self._ahead).items() if number >= len(lines) - 1}
 
-    def _trial(self, line: str, number: int) -> Trial:
+    def _trial(self, line: str, number: int) -> StudyTrial:
         """The trial of a line."""
         try:
-            trial = Trial.from_record(json.loads(line))
+            trial = StudyTrial.from_record(json.loads(line))
         except (ValueError, KeyError, TypeError, RecursionError):
             raise InputError(
                 f"{self._path}:{number + 2}: expected a trial of a study, got something else; begin anew without "
@@ -158,12 +158,12 @@ def whole_lines(path: Path) -> tuple[bytes, list[str]]:
     return complete, complete.decode("utf-8", "replace").split("\n")[:-1]
 
 
-def read_ahead(path: Path) -> dict[int, Trial]:
+def read_ahead(path: Path) -> dict[int, StudyTrial]:
     """Trials that wait for others, by number; a line that cannot be read is none."""
-    trials: dict[int, Trial] = {}
+    trials: dict[int, StudyTrial] = {}
     for line in whole_lines(path)[1]:
         try:
-            trial = Trial.from_record(json.loads(line))
+            trial = StudyTrial.from_record(json.loads(line))
         except (ValueError, KeyError, TypeError, RecursionError):
             continue
         trials[trial.variant.number] = trial

@@ -9,9 +9,9 @@ from cellplan.model.progress import Progress
 from cellplan.study.journal import Journal
 from cellplan.study.running import RunningState, seconds_since
 from cellplan.study.status import Best, StudyStatus
-from cellplan.study.trial import Outcome, Trial, Variant
+from cellplan.study.trial import StudyTrial, TrialOutcome, Variant
 
-Again = Callable[[Variant], Outcome]  # works out a trial a second time
+Again = Callable[[Variant], TrialOutcome]  # works out a trial a second time
 
 
 class Recorder:
@@ -28,7 +28,7 @@ class Recorder:
         progress: Progress,
         *,
         compared: Best | None,
-        enough: Callable[[Trial], bool] | None,
+        enough: Callable[[StudyTrial], bool] | None,
         noun: str,
     ) -> None:
         """Begin with what the journal holds.
@@ -42,7 +42,7 @@ class Recorder:
         """
         self.journal, self._state, self._progress = journal, state, progress
         self._compared, self._enough, self._noun = compared, enough, noun
-        self._best: Trial | None = None  # of those in the journal
+        self._best: StudyTrial | None = None  # of those in the journal
         self._is_enough = False
         for trial in journal.trials:
             self._count(trial)
@@ -61,7 +61,7 @@ class Recorder:
         """Time since the study was begun or continued, in s."""
         return seconds_since(self._state)
 
-    def add(self, variant: Variant, outcome: Outcome, again: Again | None) -> None:
+    def add(self, variant: Variant, outcome: TrialOutcome, again: Again | None) -> None:
         """Record a trial, in its place once those before it are there.
 
         Args:
@@ -70,7 +70,7 @@ class Recorder:
             again: Works out a trial that counts again, so that its figures are those of this machine; None where they
                 are anyway.
         """
-        trial = Trial(variant=variant, outcome=outcome)
+        trial = StudyTrial(variant=variant, outcome=outcome)
         if variant.number == len(self.journal.trials):
             self._append(trial, again)
             self.follow(again)
@@ -84,25 +84,25 @@ class Recorder:
         while not self.is_enough() and (trial := self.journal.ahead.get(len(self.journal.trials))) is not None:
             self._append(trial, again)
 
-    def keep(self, arrived: Iterable[tuple[Variant, Outcome]]) -> None:
+    def keep(self, arrived: Iterable[tuple[Variant, TrialOutcome]]) -> None:
         """Record outcomes that came while the study was interrupted."""
         for variant, outcome in arrived:
             if variant.number >= len(self.journal.trials) and variant.number not in self.journal.ahead:
-                self.journal.park(Trial(variant=variant, outcome=outcome))
+                self.journal.park(StudyTrial(variant=variant, outcome=outcome))
 
-    def _append(self, trial: Trial, again: Again | None) -> None:
+    def _append(self, trial: StudyTrial, again: Again | None) -> None:
         if again is not None and self._counts(trial):
-            trial = Trial(variant=trial.variant, outcome=again(trial.variant))
+            trial = StudyTrial(variant=trial.variant, outcome=again(trial.variant))
         with _deferred_interruptions():
             self.journal.append(trial)
         self._count(trial)
 
-    def _counts(self, trial: Trial) -> bool:
+    def _counts(self, trial: StudyTrial) -> bool:
         """Whether a trial would be the best or end the study."""
         best = self._compared.better(trial, self._best) if self._compared else None
         return best is trial or (self._enough is not None and self._enough(trial))
 
-    def _count(self, trial: Trial) -> None:
+    def _count(self, trial: StudyTrial) -> None:
         if self._compared is not None:
             self._best = self._compared.better(trial, self._best)
         self._is_enough = self._is_enough or (self._enough is not None and self._enough(trial))

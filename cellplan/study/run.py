@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Final
 
 from cellplan.errors import StudyStoppedError
-from cellplan.study.trial import Outcome, Variant
+from cellplan.study.trial import TrialOutcome, Variant
 from cellplan.study.workers import Evaluate, Limits, Lost, Workers, crashed, outcome_in_child, packed
 
 BEGUN: Final = 256  # trials that are begun at once on an executor of the caller
@@ -38,7 +38,7 @@ class Flight:
         self._flying: dict[Future[str | Lost], Variant] = {}
         self._is_alone = False
 
-    def outcomes(self, variants: Iterable[Variant]) -> Iterator[tuple[Variant, Outcome]]:
+    def outcomes(self, variants: Iterable[Variant]) -> Iterator[tuple[Variant, TrialOutcome]]:
         """Variants and their outcomes, in the order in which these come.
 
         Raises:
@@ -55,7 +55,7 @@ class Flight:
                 )
             yield from self.ended()
 
-    def ended(self) -> Iterator[tuple[Variant, Outcome]]:
+    def ended(self) -> Iterator[tuple[Variant, TrialOutcome]]:
         """Those whose outcomes have come, without waiting for others."""
         done = [future for future in self._flying if future.done()]
         for future in sorted(done, key=lambda future: self._flying[future].number):
@@ -64,7 +64,7 @@ class Flight:
                 yield self._flying[future], outcome
             del self._flying[future]
 
-    def arrived(self) -> list[tuple[Variant, Outcome]]:
+    def arrived(self) -> list[tuple[Variant, TrialOutcome]]:
         """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
         done = [future for future in self._flying if future.done() and not future.cancelled()]
         answers = [
@@ -93,7 +93,7 @@ class Flight:
         self._is_alone = alone
         self._flying[self._executor.submit(outcome_in_child, self._evaluate, variant, self._limits)] = variant
 
-    def _outcome(self, variant: Variant, answer: str | Lost) -> Outcome | None:
+    def _outcome(self, variant: Variant, answer: str | Lost) -> TrialOutcome | None:
         """The outcome of an answer; None when the trial is to be repeated."""
         if isinstance(answer, str):
             return self._read(answer)
@@ -104,12 +104,12 @@ class Flight:
         return None
 
     @staticmethod
-    def _read(answer: str) -> Outcome:
-        return Outcome.from_record(json.loads(answer))
+    def _read(answer: str) -> TrialOutcome:
+        return TrialOutcome.from_record(json.loads(answer))
 
 
 @contextmanager
-def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> Iterator[Iterator[Outcome]]:
+def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> Iterator[Iterator[TrialOutcome]]:
     """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself.
 
     Args:
@@ -124,9 +124,9 @@ def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> I
             yield _in_order(Flight(evaluate, executor, Limits()).outcomes(variants))
 
 
-def _in_order(outcomes: Iterator[tuple[Variant, Outcome]]) -> Iterator[Outcome]:
+def _in_order(outcomes: Iterator[tuple[Variant, TrialOutcome]]) -> Iterator[TrialOutcome]:
     """Outcomes by the numbers of their variants, which begin with 0."""
-    early: dict[int, Outcome] = {}
+    early: dict[int, TrialOutcome] = {}
     following = 0
     for variant, outcome in outcomes:
         early[variant.number] = outcome

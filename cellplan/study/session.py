@@ -12,10 +12,10 @@ from typing import Self
 
 from cellplan.study.record import Recorder
 from cellplan.study.run import Flight
-from cellplan.study.trial import Outcome, Trial, Variant
+from cellplan.study.trial import StudyTrial, TrialOutcome, Variant
 from cellplan.study.workers import Evaluate, Limits, Workers
 
-Propose = Callable[[Sequence[Trial]], Sequence[Mapping[str, object]]]
+Propose = Callable[[Sequence[StudyTrial]], Sequence[Mapping[str, object]]]
 
 
 class StoppedBy(StrEnum):
@@ -76,15 +76,15 @@ class Crew:
         return self._flights["all"]
 
     @property
-    def again(self) -> Callable[[Variant], Outcome] | None:
+    def again(self) -> Callable[[Variant], TrialOutcome] | None:
         """What works out a trial a second time on this machine; None where the first time was on it."""
         return self._again if getattr(self._workers, "is_remote", False) else None
 
-    def arrived(self) -> list[tuple[Variant, Outcome]]:
+    def arrived(self) -> list[tuple[Variant, TrialOutcome]]:
         """Outcomes that have come and were perhaps not taken, when the study is interrupted."""
         return self._flights["all"].arrived() if "all" in self._flights else []
 
-    def _again(self, variant: Variant) -> Outcome:
+    def _again(self, variant: Variant) -> TrialOutcome:
         if "again" not in self._flights:
             self._begin("again", Workers(1))
         ((_, outcome),) = self._flights["again"].outcomes([variant])

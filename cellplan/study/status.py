@@ -11,7 +11,7 @@ from cellplan.errors import InputError
 from cellplan.study.folder import AHEAD, JOURNAL
 from cellplan.study.journal import read_ahead, whole_lines
 from cellplan.study.running import RunningState, read_state, seconds_since
-from cellplan.study.trial import Trial, TrialStatus
+from cellplan.study.trial import StudyTrial, TrialStatus
 
 MINUTE: Final = 60.0  # [s]
 HOUR: Final = 3600.0  # [s]
@@ -35,23 +35,23 @@ class Best:
         """Plain data for the header of a study."""
         return {"figure": self.figure, "of": "largest" if self.is_largest else "smallest"}
 
-    def value(self, trial: Trial) -> float | None:
+    def value(self, trial: StudyTrial) -> float | None:
         """The figure of a trial; None where it did not pass or has none."""
         value = trial.outcome.figures.get(self.figure)
         if trial.outcome.status is not TrialStatus.PASSED or isinstance(value, bool):
             return None
         return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
-    def of(self, trials: Iterable[Trial]) -> Trial | None:
+    def of(self, trials: Iterable[StudyTrial]) -> StudyTrial | None:
         """The best trial, the first of equals; None where none passed."""
-        latest: tuple[float, Trial] | None = None
+        latest: tuple[float, StudyTrial] | None = None
         for trial in trials:
             value = self.value(trial)
             if value is not None and (latest is None or self.is_better(value, latest[0])):
                 latest = value, trial
         return latest[1] if latest else None
 
-    def better(self, trial: Trial, other: Trial | None) -> Trial | None:
+    def better(self, trial: StudyTrial, other: StudyTrial | None) -> StudyTrial | None:
         """The better one of a trial and another that passed, which stays where they are equal; None where none did."""
         return self.of([other, trial] if other else [trial])
 
@@ -66,7 +66,7 @@ class StudyStatus:
 
     done: int  # number of trials whose outcome is recorded
     trials: int | None = None  # number at which it ends; None where only its budget or the search itself ends it
-    best: Trial | None = None  # the best trial so far; None where none passed or trials are not compared
+    best: StudyTrial | None = None  # the best trial so far; None where none passed or trials are not compared
     best_value: float | None = None  # its figure
     figure: str = ""  # name of that figure
     rate: float | None = None  # trials in a second since it was begun or continued; None where that is not known
@@ -75,7 +75,7 @@ class StudyStatus:
 
     @classmethod
     def of(
-        cls, done: int, best: Trial | None, compared: Best | None, state: RunningState | None, *, is_running: bool
+        cls, done: int, best: StudyTrial | None, compared: Best | None, state: RunningState | None, *, is_running: bool
     ) -> Self:
         """The status of a study.
 
@@ -126,7 +126,7 @@ def read_status(folder: Path) -> StudyStatus:
     lines = whole_lines(folder / JOURNAL)[1]
     try:
         header = json.loads(lines[0]) if lines else None
-        trials = [Trial.from_record(json.loads(line)) for line in lines[1:]]
+        trials = [StudyTrial.from_record(json.loads(line)) for line in lines[1:]]
         compared = Best.from_header(header) if isinstance(header, Mapping) else None
     except (ValueError, KeyError, TypeError, RecursionError):
         header = None

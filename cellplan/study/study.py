@@ -14,7 +14,7 @@ from cellplan.study.record import Recorder
 from cellplan.study.running import RunningState, running
 from cellplan.study.session import Crew, Propose, Stop, StoppedBy, run_rounds
 from cellplan.study.status import Best
-from cellplan.study.trial import Trial, Variant
+from cellplan.study.trial import StudyTrial, Variant
 from cellplan.study.workers import Evaluate, Limits
 
 __all__ = ["Finished", "Stop", "StoppedBy", "Study"]
@@ -24,7 +24,7 @@ __all__ = ["Finished", "Stop", "StoppedBy", "Study"]
 class Finished:
     """What a study has come to."""
 
-    trials: tuple[Trial, ...]  # in their order; their number repeats the study byte for byte
+    trials: tuple[StudyTrial, ...]  # in their order; their number repeats the study byte for byte
     rounds: int  # number of whole rounds
     stopped_by: StoppedBy  # why it has ended
 
@@ -50,7 +50,7 @@ class Study:
     size: int  # number of trials in a round
     propose: Propose
     best: Best | None = None  # what makes one trial better than another; part of the header. None for nothing
-    enough: Callable[[Trial], bool] | None = None
+    enough: Callable[[StudyTrial], bool] | None = None
     noun: str = "trial"  # what a trial is called in texts
     total: int | None = None
 
@@ -58,7 +58,7 @@ class Study:
     def of_variants(cls, folder: Path, header: Mapping[str, Any], variants: Sequence[Variant]) -> Self:
         """A study of one round with given variants, numbered from 0."""
 
-        def propose(finished: Sequence[Trial]) -> Sequence[Mapping[str, object]]:
+        def propose(finished: Sequence[StudyTrial]) -> Sequence[Mapping[str, object]]:
             return [] if finished else [variant.values for variant in variants]
 
         count = len(variants)

@@ -31,7 +31,7 @@ STATUS_TEXTS: Final = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class TrialOutcome:
     """What came of a variant."""
 
     status: TrialStatus  # its verdict
@@ -56,11 +56,11 @@ class Outcome:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
+class StudyTrial:
     """A variant and its outcome: one line of a study."""
 
     variant: Variant
-    outcome: Outcome
+    outcome: TrialOutcome
 
     @property
     def number(self) -> int:
@@ -97,4 +97,4 @@ class Trial:
             ValueError: The status is unknown.
         """
         variant = Variant(int(record["trial"]), dict(record["values"]))
-        return cls(variant=variant, outcome=Outcome.from_record(record))
+        return cls(variant=variant, outcome=TrialOutcome.from_record(record))

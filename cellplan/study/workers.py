@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 from cellplan.errors import CellplanError, NotFiniteError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 ADDRESS: Final = re.compile(r" at 0x[0-9a-fA-F]+")  # of an object in an error text: another one in each process
 PATIENCE: Final = 4.0  # [-] clock over processor: trials may share a processor with others
@@ -25,7 +25,7 @@ START: Final = Guard(
 )
 LONGEST_S: Final = 2.0 * PATIENCE * START.seconds  # [s] of the clock for a piece of work, that before it included
 
-Evaluate = Callable[[Variant], Outcome]
+Evaluate = Callable[[Variant], TrialOutcome]
 Value = TypeVar("Value")
 
 
@@ -185,9 +185,9 @@ def prepared(evaluate: bytes) -> None:
         _unpacked(evaluate)
 
 
-def crashed(reason: str) -> Outcome:
+def crashed(reason: str) -> TrialOutcome:
     """Outcome of a trial that has none of its own."""
-    return Outcome(status=TrialStatus.CRASHED, reason=reason, figures={})
+    return TrialOutcome(status=TrialStatus.CRASHED, reason=reason, figures={})
 
 
 @lru_cache(maxsize=1)
@@ -197,7 +197,7 @@ def _unpacked(evaluate: bytes) -> Evaluate:
     return unpacked
 
 
-def _text(outcome: Outcome) -> str:
+def _text(outcome: TrialOutcome) -> str:
     try:
         return json.dumps(outcome.record, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError):

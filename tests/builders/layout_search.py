@@ -5,13 +5,13 @@ from pathlib import Path
 
 from builders.study_trials import InThisProcess
 from cellplan import LayoutRequest, LayoutResult, Stop, search_layout
-from cellplan.search.programs.objective import Timing
+from cellplan.search.programs.objective import CycleTiming
 
 CELL = Path(__file__).resolve().parents[2] / "cells" / "planar_pair.yaml"
 SETTINGS = ("motion.duration_s=2", "motion.step_s=0.02", "checks.clearance_mm=10")
 
 
-def searched_pair(folder: Path, *settings: str, timing: Timing = Timing.LAWS) -> LayoutResult:
+def searched_pair(folder: Path, *settings: str, timing: CycleTiming = CycleTiming.LAWS) -> LayoutResult:
     """Search a layout of ``given.yaml`` into ``study``, both in a folder, without a process of its own.
 
     Args:

@@ -13,7 +13,7 @@ from typing import Any
 from cellplan.errors import NotFiniteError, StudyStoppedError
 from cellplan.study.status import Best
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
+from cellplan.study.trial import StudyTrial, TrialOutcome, TrialStatus, Variant
 from cellplan.study.workers import evaluated
 
 HEADER = {"kind": "try", "seed": 3}
@@ -39,39 +39,39 @@ class InThisProcess(Executor):
         return future
 
 
-def product(variant: Variant) -> Outcome:
+def product(variant: Variant) -> TrialOutcome:
     """A figure that can be computed by hand; odd numbers fail."""
     x, y = variant.values["x"], variant.values["y"]
     assert isinstance(x, int)
     assert isinstance(y, float)
     status = TrialStatus.FAILED if x % 2 else TrialStatus.PASSED
-    return Outcome(status=status, reason="odd" if x % 2 else "", figures={"product": x * y})
+    return TrialOutcome(status=status, reason="odd" if x % 2 else "", figures={"product": x * y})
 
 
-def product_until_5(variant: Variant) -> Outcome:
+def product_until_5(variant: Variant) -> TrialOutcome:
     """As ``product``; the disk is full from number 5 on."""
     if variant.number == 5:
         raise StudyStoppedError("no more")
     return product(variant)
 
 
-def not_finite_at_5(variant: Variant) -> Outcome:
+def not_finite_at_5(variant: Variant) -> TrialOutcome:
     """As ``product``; a figure that number 5 compares is no number."""
     if variant.number == 5:
         raise NotFiniteError("table/turn: expected a finite speed in the search, got nan")
     return product(variant)
 
 
-def halved(variant: Variant) -> Outcome:
+def halved(variant: Variant) -> TrialOutcome:
     """A figure below that of the trial it begins with; those whose number ends in 7 fail."""
     number, base = variant.number, variant.values["base"]
     assert isinstance(base, float)
     if number % 10 == 7:
-        return Outcome(status=TrialStatus.FAILED, reason="seven", figures={"length": 0.0})
-    return Outcome(status=TrialStatus.PASSED, figures={"length": base * (1.0 - 0.1 / (1 + number % 5))})
+        return TrialOutcome(status=TrialStatus.FAILED, reason="seven", figures={"length": 0.0})
+    return TrialOutcome(status=TrialStatus.PASSED, figures={"length": base * (1.0 - 0.1 / (1 + number % 5))})
 
 
-def accident(variant: Variant) -> Outcome:
+def accident(variant: Variant) -> TrialOutcome:
     """As ``halved``, but some end their process, raise an error or never end."""
     number = variant.number
     if number == 1:
@@ -84,10 +84,10 @@ def accident(variant: Variant) -> Outcome:
         ctypes.string_at(0)
     if number == 6:
         threading.Event().wait()
-    return Outcome(status=TrialStatus.PASSED, figures={"length": float("nan")}) if number == 8 else halved(variant)
+    return TrialOutcome(status=TrialStatus.PASSED, figures={"length": float("nan")}) if number == 8 else halved(variant)
 
 
-def from_the_best(finished: Sequence[Trial]) -> list[dict[str, object]]:
+def from_the_best(finished: Sequence[StudyTrial]) -> list[dict[str, object]]:
     """Trials of a round that begin with the best one of the rounds before."""
     best = Best("length").of(finished)
     length = best.outcome.figures["length"] if best else 1.0
@@ -110,7 +110,7 @@ class Killer:
 
     mark: Path
 
-    def __call__(self, variant: Variant) -> Outcome:
+    def __call__(self, variant: Variant) -> TrialOutcome:
         if variant.number == 5 and not self.mark.exists():
             self.mark.touch()
             os.kill(os.getppid(), signal.SIGKILL)
@@ -127,11 +127,11 @@ class Wrong:
 
     honest: int
 
-    def __call__(self, variant: Variant) -> Outcome:
+    def __call__(self, variant: Variant) -> TrialOutcome:
         right = halved(variant)
         if os.getppid() == self.honest or right.status is not TrialStatus.PASSED:
             return right
-        return Outcome(status=TrialStatus.PASSED, figures={"length": 0.001 * variant.number})
+        return TrialOutcome(status=TrialStatus.PASSED, figures={"length": 0.001 * variant.number})
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class Noted:
 
     pids: Path
 
-    def __call__(self, variant: Variant) -> Outcome:
+    def __call__(self, variant: Variant) -> TrialOutcome:
         (self.pids / str(os.getpid())).touch()
         assert sum(range(20_000 * (1 + 9 * (variant.number % 4 == 0)))) > 0
         return halved(variant)

@@ -12,7 +12,7 @@ from builders.run_jobs import job_of_run
 from cellplan import Solution, VerifiedRun, export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
 from cellplan.export.csv import render_csv
-from cellplan.export.wide.columns import ProgramRows, wide_columns
+from cellplan.export.wide.columns import WideRows, wide_columns
 from cellplan.export.wide.writer import read_wide
 from cellplan.geometry.transforms import inverse, roll_pitch_yaw, rotation_from_rpy
 from cellplan.kinematics.pinocchio_model import CombinedModel
@@ -158,7 +158,7 @@ def test_two_columns_of_the_same_name_are_refused(in_turns: Solution) -> None:
     rows = solution_rows(in_turns)
     task = rows.phases[0].schedule.tasks[0]
 
-    class Renamed(ProgramRows):
+    class Renamed(WideRows):
         """Its task has the name of a robot with a joint that slides along x."""
 
         @property

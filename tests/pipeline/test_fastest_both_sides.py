@@ -15,7 +15,7 @@ from cellplan.model.progress import silent
 from cellplan.pipeline.fastest.result import fastest_lines, fastest_record
 from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.shortest import fastest
-from cellplan.pipeline.fastest.time_laws import Bracket
+from cellplan.pipeline.fastest.time_laws import RootBracket
 from cellplan.pipeline.fastest.timed_program import Binding, Law, TimedProgram
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"
@@ -31,7 +31,7 @@ def cell_of(folder: Path, text: str) -> Cell:
 @pytest.mark.parametrize("begin", [30, 400])
 def test_a_bracket_closes_where_a_step_less_fails(load: object, begin: int) -> None:
     """Loads of any slope; the last one is flat above its limit, as that of a start that is off its path."""
-    bracket, number = Bracket(), begin
+    bracket, number = RootBracket(), begin
     for trial in range(40):
         bracket.note(number, holds=load(number) <= 1.0)
         if bracket.is_closed:

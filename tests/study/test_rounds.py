@@ -14,7 +14,7 @@ from cellplan.study.folder import AHEAD, JOURNAL
 from cellplan.study.running import STATE, RunningState, running
 from cellplan.study.status import Best, StudyStatus, read_status
 from cellplan.study.study import Finished, Stop, StoppedBy
-from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
+from cellplan.study.trial import StudyTrial, TrialOutcome, TrialStatus, Variant
 from cellplan.study.workers import Limits, Workers
 
 SHORT = Limits(seconds=0.5)
@@ -81,7 +81,7 @@ def test_a_budget_ends_after_a_whole_round_and_its_number_of_trials_repeats_the_
 
 
 def test_the_first_trial_that_is_enough_is_the_last_one(tmp_path: Path) -> None:
-    def enough(trial: Trial) -> bool:
+    def enough(trial: StudyTrial) -> bool:
         return trial.outcome.figures["length"] == pytest.approx(LENGTHS[5])
 
     for resume in (False, True):
@@ -93,7 +93,7 @@ def test_the_first_trial_that_is_enough_is_the_last_one(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("count", "trials"), [(0, 4), (3, 7)])
 def test_a_round_that_is_not_full_is_the_last_one(tmp_path: Path, count: int, trials: int) -> None:
-    def propose(finished: Sequence[Trial]) -> list[dict[str, object]]:
+    def propose(finished: Sequence[StudyTrial]) -> list[dict[str, object]]:
         return from_the_best(finished)[: count if finished else None]
 
     finished = run(tmp_path / "study", propose=propose)
@@ -127,7 +127,7 @@ def test_accidents_are_the_same_for_one_worker(tmp_path: Path) -> None:
 
 def test_an_evaluator_that_cannot_be_sent_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="expected a function of a module, bound to plain data"):
-        rounds(tmp_path / "study").run(lambda variant: Outcome(status=TrialStatus.PASSED, figures=variant.values))
+        rounds(tmp_path / "study").run(lambda variant: TrialOutcome(status=TrialStatus.PASSED, figures=variant.values))
 
 
 def test_the_status_of_a_study_that_was_killed_counts_trials_that_wait_for_others(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_the_status_of_a_study_that_was_killed_counts_trials_that_wait_for_other
 
 
 def test_the_status_of_a_running_study_has_rate_and_time_left(tmp_path: Path) -> None:
-    best = Trial(variant=Variant(2, {}), outcome=Outcome(status=TrialStatus.PASSED, figures={"length": 0.25}))
+    best = StudyTrial(variant=Variant(2, {}), outcome=TrialOutcome(status=TrialStatus.PASSED, figures={"length": 0.25}))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("time.time", lambda: 1050.0)
         state = RunningState(began=1000.0, done_before=5, trials=105, budget=None)

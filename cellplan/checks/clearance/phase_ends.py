@@ -172,7 +172,7 @@ def _demands(end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Predicate]
         yield f"clearance of {pair[0]} and {pair[1]}", partial(_keeps_clearance, end, pair)
     for phase in (end.before, end.after):
         for relation, limits, depth in _relations(phase):
-            tool = _Tool(end=end, phase=phase, relation=relation, is_before=phase is end.before)
+            tool = _ReachingTool(end=end, phase=phase, relation=relation, is_before=phase is end.before)
             if {relation.robot, tool.carrier} == set(pair):
                 yield f"tool of {relation.robot}", partial(tool.is_kept, limits=limits, depth=depth)
 
@@ -212,7 +212,7 @@ def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Tool:
+class _ReachingTool:
     """A tool that is on the part in a phase which ends, or begins, at an end of phases."""
 
     end: _End

@@ -17,7 +17,7 @@ from cellplan.certify.free_motion import FreeMotion
 from cellplan.certify.free_shift import ShiftBound, free_shift
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_reach
-from cellplan.checks.tools.skew import Mover, ShiftedTool, ToolWays, Way
+from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolWays
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Schedule
@@ -103,14 +103,14 @@ def _stated(cell: Cell, first: str, second: str) -> float | None:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Tool:
+class _SkewedTool:
     """One tool on a part that another clock carries."""
 
     name: str
     robot: str
     carrier: str
     ways: ToolWays
-    depth: Way | None
+    depth: ErrorGrowth | None
 
     def limits(self) -> Iterator[AllowedSkew]:
         """What tolerance and depth allow."""
@@ -153,7 +153,9 @@ def _shortest_cycle(stated: float, allowed: float, duration: float) -> float:
     return float(np.inf) if allowed == 0.0 else duration * stated / allowed
 
 
-def _tools(scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tuple[ToolDepth, ...]) -> Iterator[_Tool]:
+def _tools(
+    scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tuple[ToolDepth, ...]
+) -> Iterator[_SkewedTool]:
     """The tools that work on, or hold, a part that another clock carries."""
     cell, times = scene.cell, schedule.times
     if cell.carrier is None:
@@ -175,10 +177,10 @@ def _tools(scene: Scene, schedule: Schedule, q: Mapping[str, Array], depths: tup
         depth = by_task.get(task.name)
         reach = tool_reach(cell, task.robot)
         deep = None if depth is None else tool.depth_way(times, depth.depth, depth.limit, reach=reach)
-        yield _Tool(name=task.name, robot=task.robot, carrier=carrier, ways=tool.ways(times), depth=deep)
+        yield _SkewedTool(name=task.name, robot=task.robot, carrier=carrier, ways=tool.ways(times), depth=deep)
     for grasp in cell.closures:
         if {grasp.robot, carrier} in apart:
             desired = np.broadcast_to(grasp.X_PT, (len(times), 4, 4))
             limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
             tool = shifted(relation=grasp, mover=movers[grasp.robot], desired=desired, limits=limits)
-            yield _Tool(name=grasp.name, robot=grasp.robot, carrier=carrier, ways=tool.ways(times), depth=None)
+            yield _SkewedTool(name=grasp.name, robot=grasp.robot, carrier=carrier, ways=tool.ways(times), depth=None)

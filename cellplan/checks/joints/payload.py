@@ -32,7 +32,7 @@ class _Mass:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Carried:
+class _CarriedLoad:
     """A mass on its way."""
 
     mass: float  # in [kg]
@@ -113,12 +113,12 @@ def _masses(cell: Cell, robot: Robot, grasp: Grasp | None, use: LoadUse) -> list
     return masses
 
 
-def _carried(mass: _Mass, X_WF: Array, times: Array) -> _Carried:
+def _carried(mass: _Mass, X_WF: Array, times: Array) -> _CarriedLoad:
     """A mass that moves with a flange of poses of shape (N, 4, 4)."""
     R = X_WF[:, :3, :3]
     points = R @ mass.centre_F + X_WF[:, :3, 3]
     force = mass.mass * (point_accelerations(times, points) + GRAVITY * UP)
-    return _Carried(mass=mass.mass, points=points, force=force, inertia=R @ mass.inertia_F @ R.transpose(0, 2, 1))
+    return _CarriedLoad(mass=mass.mass, points=points, force=force, inertia=R @ mass.inertia_F @ R.transpose(0, 2, 1))
 
 
 def _wrist(robot: Robot) -> list[Joint]:
@@ -133,7 +133,7 @@ def _wrist(robot: Robot) -> list[Joint]:
     return joints[::-1]
 
 
-def _axis_use(joint: Joint, D: Array, carried: Sequence[_Carried], times: Array) -> AxisUse:
+def _axis_use(joint: Joint, D: Array, carried: Sequence[_CarriedLoad], times: Array) -> AxisUse:
     r"""What the load does to one axis: moments ``s . ((p - s0) x f)`` with ``f = m (a - g)``, and its inertia.
 
     Args:

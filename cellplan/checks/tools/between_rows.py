@@ -42,7 +42,7 @@ ROTATIONS: Final = (3, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Tool:
+class _MeasuredTool:
     """A tool that is to be somewhere relative to the part, or to the world.
 
     Attributes:
@@ -126,10 +126,10 @@ class ErrorsBetweenRows:
         results = [BetweenRows(position=a, orientation=b) for a, b in zip(every[::2], every[1::2], strict=True)]
         return results[: len(accuracy)], results[len(accuracy) :]
 
-    def _task_tools(self, accuracy: Sequence[TaskAccuracy]) -> list[_Tool]:
+    def _task_tools(self, accuracy: Sequence[TaskAccuracy]) -> list[_MeasuredTool]:
         times = self._schedule.times
         return [
-            _Tool(
+            _MeasuredTool(
                 relation=scheduled.task,
                 at_rows=_lengths(errors),
                 allowed=scheduled.task.tolerance.between,
@@ -139,15 +139,15 @@ class ErrorsBetweenRows:
             for place, (scheduled, errors) in enumerate(zip(self._schedule.tasks, accuracy, strict=True))
         ]
 
-    def _closure_tools(self, closures: Sequence[ClosureAccuracy]) -> list[_Tool]:
+    def _closure_tools(self, closures: Sequence[ClosureAccuracy]) -> list[_MeasuredTool]:
         checks = self._scene.cell.checks
         allowed = checks.closure_mm.si, checks.closure_deg.si
         return [
-            _Tool(relation=grasp, at_rows=_lengths(errors), allowed=allowed, place=None, first=0)
+            _MeasuredTool(relation=grasp, at_rows=_lengths(errors), allowed=allowed, place=None, first=0)
             for grasp, errors in zip(self._scene.cell.closures, closures, strict=True)
         ]
 
-    def _middles(self, tools: Sequence[_Tool], count: int) -> tuple[Array, Array]:
+    def _middles(self, tools: Sequence[_MeasuredTool], count: int) -> tuple[Array, Array]:
         """Errors in the middle of each step, and sags of the desired tip and axes there, shape (count, tools, 2)."""
         errors, sags = np.empty((count, len(tools), 2)), np.zeros((count, len(tools), 2))
         for begin in range(0, count, MAX_TIMES):
@@ -161,7 +161,7 @@ class ErrorsBetweenRows:
                     sags[k, place] = _sag(poses_desired[tool.place] - chord, tool.relation)
         return errors, sags
 
-    def _errors(self, tools: Sequence[_Tool], k: Indices, s: Array) -> Array:
+    def _errors(self, tools: Sequence[_MeasuredTool], k: Indices, s: Array) -> Array:
         """Errors at shares s of steps k, shape (M, tools, 2)."""
         errors = np.empty((len(k), len(tools), 2))
         for begin in range(0, len(k), MAX_TIMES):
@@ -174,7 +174,7 @@ class ErrorsBetweenRows:
         times = self._schedule.times
         return self._schedule.poses(times[k] + s * (times[k + 1] - times[k]))
 
-    def _errors_of(self, tools: Sequence[_Tool], k: Indices, s: Array, poses_desired: Sequence[Array]) -> Array:
+    def _errors_of(self, tools: Sequence[_MeasuredTool], k: Indices, s: Array, poses_desired: Sequence[Array]) -> Array:
         """Errors of all tools against desired poses, shape (M, tools, 2)."""
         cell, chains = self._scene.cell, self._scene.chains
         q = {name: rows[k] + s[:, None] * (rows[k + 1] - rows[k]) for name, rows in self._q.items()}
@@ -193,7 +193,7 @@ class ErrorsBetweenRows:
             errors[:, place] += tool.more(k, s)
         return errors
 
-    def _bounds(self, tool: _Tool, middle: Array, sag: Array) -> Array:
+    def _bounds(self, tool: _MeasuredTool, middle: Array, sag: Array) -> Array:
         """No error in a step is larger, in [m] and [rad], shape (N - 1, 2)."""
         cell, relation = self._scene.cell, tool.relation
         in_world = isinstance(relation, Task) and relation.relative_to is Frame.WORLD
@@ -211,7 +211,7 @@ class ErrorsBetweenRows:
             bound[:, 1] = np.inf
         return bound
 
-    def _corners(self, tools: Sequence[_Tool]) -> tuple[Array, Array]:
+    def _corners(self, tools: Sequence[_MeasuredTool]) -> tuple[Array, Array]:
         """Times at which tools may change their speed at once, and the error of each tool there.
 
         A change of speed by v at a share s of a step of length h makes an error of ``v h s (1 - s)``. Where the rows of
@@ -289,7 +289,7 @@ class ErrorsBetweenRows:
 class _ToolErrors:
     """What was found of one tool."""
 
-    tool: _Tool
+    tool: _MeasuredTool
     middle: Array  # errors in the middle of all steps, shape (N - 1, 2)
     bounds: Array  # no error in a step is larger, shape (N - 1, 2)
     chosen: NDArray[np.bool_]  # steps that were subdivided, shape (N - 1,)
@@ -328,7 +328,7 @@ def _subdivided(steps: Indices, jumped: Indices, share: Array) -> tuple[Indices,
     return k, np.concatenate([np.tile(inner, len(steps)), share])
 
 
-def _stops_at_once(tools: Sequence[_Tool], corners: Array) -> bool:
+def _stops_at_once(tools: Sequence[_MeasuredTool], corners: Array) -> bool:
     """Whether tools end at a speed that would be an error to be seen, were the end no row; corners there, (J, T, 2)."""
     return bool(np.any(corners > KINK_FRACTION * np.array([tool.allowed for tool in tools])))
 

@@ -29,7 +29,7 @@ ALL_AXES: Final = (0, 1, 2, 3, 4, 5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Way:
+class ErrorGrowth:
     """What one error grows by: a bound of it at some times, and what is allowed."""
 
     times: Array  # times in [s], ascending, shape (K,)
@@ -104,8 +104,8 @@ def _crossing(sums: Array, times: Array, goals: Array) -> Array:
 class ToolWays:
     """How a tool moves on the part when its clock is shifted."""
 
-    position: Way  # in [m]
-    orientation: Way  # in [rad]
+    position: ErrorGrowth  # in [m]
+    orientation: ErrorGrowth  # in [rad]
     speed: float  # bound of the largest speed of the tool in the constrained components in [m/s]
 
 
@@ -174,12 +174,16 @@ class ShiftedTool:
         lengths, angles = np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
         still = np.zeros(len(at))
         return ToolWays(
-            position=Way(sums=constrained, turns=turns, whole=whole, errors=lengths, limit=self.limits[0], **common),
-            orientation=Way(sums=turned, turns=still, whole=turned, errors=angles, limit=self.limits[1], **common),
+            position=ErrorGrowth(
+                sums=constrained, turns=turns, whole=whole, errors=lengths, limit=self.limits[0], **common
+            ),
+            orientation=ErrorGrowth(
+                sums=turned, turns=still, whole=turned, errors=angles, limit=self.limits[1], **common
+            ),
             speed=float((np.diff(constrained) / np.diff(at)).max(initial=0.0)),
         )
 
-    def depth_way(self, times: Array, depth: float, limit: float, *, reach: float) -> Way:
+    def depth_way(self, times: Array, depth: float, limit: float, *, reach: float) -> ErrorGrowth:
         """What the depth of the tool grows by: no more than its points move on the part.
 
         Args:
@@ -192,7 +196,9 @@ class ShiftedTool:
         speeds = np.linalg.norm(np.diff(X_WT[:, :3, 3], axis=0), axis=1) + 0.5 * mover.bend
         speeds += reach * (_norms(np.diff(X_WT[:, :3, :3], axis=0)) + 0.5 * mover.turn_bend)
         sums, still = _summed(speeds), np.zeros(len(times))
-        return Way(times=times, sums=sums, turns=still, whole=sums, rows=times, errors=still + depth, limit=limit)
+        return ErrorGrowth(
+            times=times, sums=sums, turns=still, whole=sums, rows=times, errors=still + depth, limit=limit
+        )
 
     def _constrained(self, nodes: Array, moved: Array, bend: Array, whole: Array) -> tuple[Array, Array]:
         """Way of the tool in the constrained components at the nodes, and how far the part has turned, (K,) each.

@@ -23,7 +23,7 @@ from cellplan.pipeline.layout.workers import layout_workers
 from cellplan.pipeline.repair.record import SCHEMA
 from cellplan.pipeline.repair.repair import repair
 from cellplan.pipeline.repair.result import advice_lines, write_repair
-from cellplan.search.programs.objective import Objective, Timing
+from cellplan.search.programs.objective import CycleTiming, Objective
 from cellplan.study.session import Stop
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def layout_request(options: SearchOptions, *, objective: str, **others: Any) -> 
     return options.to(
         LayoutRequest,
         objective=_word("--objective", objective, Objective),
-        timing=_word("--timing", options.timing, Timing),
+        timing=_word("--timing", options.timing, CycleTiming),
         clearance=_quantity("--clearance", options.clearance, read_length),
         margin=_quantity("--margin", options.margin, read_angle),
         misplacement=_quantity("--misplacement", options.misplacement, read_misplacement),

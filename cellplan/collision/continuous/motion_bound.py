@@ -54,7 +54,7 @@ class Bends:
     reach: Array  # no point of the one travels farther than this seen from the other, in [m], shape (n - 1,)
 
 
-class Motion(Protocol):
+class BodyMotion(Protocol):
     """Bodies that move through n samples, joints moving linearly from each to the next."""
 
     @property
@@ -70,14 +70,14 @@ class Motion(Protocol):
     def sphere_bounds(self, pair: Pair) -> Array:
         """Lower bound of the distance of two bounding spheres in each step in [m], shape (n - 1,)."""
 
-    def finer(self, pair: Pair, step: int, *, parts: int) -> "Motion":
+    def finer(self, pair: Pair, step: int, *, parts: int) -> "BodyMotion":
         """One step cut into equal parts; where other bodies than the pair are remains unsaid."""
 
 
 class PairMotion:
     """Two bodies over all samples, each seen from the other."""
 
-    def __init__(self, engine: Engine, pair: Pair, motion: Motion) -> None:
+    def __init__(self, engine: Engine, pair: Pair, motion: BodyMotion) -> None:
         """Work out the pose of the second body seen from the first at each sample."""
         first, second = pair
         self._a, self._b = engine.bodies[first], engine.bodies[second]

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.collision.bodies import BodyPoses, CollisionBody
-from cellplan.collision.continuous.motion_bound import ROUNDING_TOL, Bends, Motion, Pair
+from cellplan.collision.continuous.motion_bound import ROUNDING_TOL, Bends, BodyMotion, Pair
 from cellplan.collision.distance import APART_TOL, TIGHT_TOL, Reading, quick_reading
 from cellplan.collision.engine import Engine
 from cellplan.collision.separation import separation
@@ -25,7 +25,7 @@ PIECE_COUNT: Final = 4  # [-] pieces that a body is taken apart into at once; th
 class PieceMotion:
     """The motion of one body and of the pieces of another, which move like the body they are pieces of."""
 
-    whole: Motion  # the motion of the two bodies
+    whole: BodyMotion  # the motion of the two bodies
     pair: Pair  # the two bodies in that motion
     engine: Engine  # the one body first, then the pieces of the other
     is_first_split: bool  # whether it is the first of the pair that was taken apart
@@ -34,7 +34,7 @@ class PieceMotion:
     seen: tuple[Array, Array]  # rotations and positions of the second of the pair seen from the first
 
     @classmethod
-    def of(cls, whole: Motion, pair: Pair, engine: Engine, *, is_first_split: bool) -> "PieceMotion":
+    def of(cls, whole: BodyMotion, pair: Pair, engine: Engine, *, is_first_split: bool) -> "PieceMotion":
         """Give every piece the poses of its body."""
         split, other = pair if is_first_split else pair[::-1]
         bodies = [other] + [split] * (len(engine.bodies) - 1)

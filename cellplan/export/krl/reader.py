@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.joints import Axes, from_numbers
 from cellplan.export.krl.names import WHOLE
-from cellplan.export.krl.text import Module, Statement, located, read_module
+from cellplan.export.krl.text import KrlModule, KrlStatement, located, read_module
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
 
 MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
@@ -42,10 +42,10 @@ def read_krl(
     return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
-def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_Player":
+def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_KrlPlayer":
     """A main module and its pages, from begin to end; takes their files out of those that are left."""
     main = read_module(left, path)
-    player = _Player(frame=frame, robot=robot, path=path)
+    player = _KrlPlayer(frame=frame, robot=robot, path=path)
     for statement in main.statements:
         if statement.kind == "CALL":
             page = read_module(left, player.called(main, statement))
@@ -65,7 +65,7 @@ def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> 
     return player
 
 
-def _refuse_other_declarations(main: Module, player: "_Player") -> None:
+def _refuse_other_declarations(main: KrlModule, player: "_KrlPlayer") -> None:
     """Make sure that what is declared is called, and that a main module of pages has no points."""
     source = f"{main.path}.src"
     name = main.path.rpartition("/")[2]
@@ -78,7 +78,7 @@ def _refuse_other_declarations(main: Module, player: "_Player") -> None:
     player.require_setup(source, main.end)
 
 
-def _rows(frame: ExportFrame, robot: str, player: "_Player") -> RobotRows:
+def _rows(frame: ExportFrame, robot: str, player: "_KrlPlayer") -> RobotRows:
     """Rows of the model from the numbers of the points."""
     placed = frame.robot(robot)
     axes, numbers = Axes.of(placed), np.array(player.rows, dtype=np.float64)
@@ -94,7 +94,7 @@ def _rows(frame: ExportFrame, robot: str, player: "_Player") -> RobotRows:
 
 
 @dataclass(slots=True, kw_only=True)
-class _Player:
+class _KrlPlayer:
     """Follows a program statement by statement."""
 
     frame: ExportFrame  # which robots
@@ -112,7 +112,7 @@ class _Player:
     lowered: int = 0  # line at which its output was lowered before the first motion, 0 if it was not
     names: list[str] | None = None  # points of the module that are still to come
 
-    def play(self, module: Module, statement: Statement) -> None:
+    def play(self, module: KrlModule, statement: KrlStatement) -> None:
         """Follow one statement."""
         if self.step and statement.kind not in {"OUT", "WAIT"}:
             expected = f"the rest of the handshake ({self._expected()})"
@@ -130,7 +130,7 @@ class _Player:
         else:
             self._set(module, statement)
 
-    def called(self, main: Module, statement: Statement) -> str:
+    def called(self, main: KrlModule, statement: KrlStatement) -> str:
         """Path of the page that a call is for."""
         source, name = f"{main.path}.src", main.path.rpartition("/")[2]
         expected = f"{name}_{self.calls + 1:03d}"
@@ -148,11 +148,11 @@ class _Player:
         if missing:
             raise located(source, line, f"{missing[0]} to be set before the first motion", "none")
 
-    def begin(self, module: Module) -> None:
+    def begin(self, module: KrlModule) -> None:
         """Begin with the points of a module."""
         self.names = list(module.points)[::-1]
 
-    def finish(self, module: Module) -> None:
+    def finish(self, module: KrlModule) -> None:
         """Make sure that a module with motions ends in order."""
         source = f"{module.path}.src"
         if self.step:
@@ -165,7 +165,7 @@ class _Player:
         if self.rounded:
             raise located(source, module.end, "an exact stop at the last row", "C_PTP")
 
-    def _set(self, module: Module, statement: Statement) -> None:
+    def _set(self, module: KrlModule, statement: KrlStatement) -> None:
         """What is set once, before the first motion."""
         source, value = f"{module.path}.src", statement.words[0] if statement.words else None
         if self.rows or module.path != self.path:
@@ -191,7 +191,7 @@ class _Player:
             return 0
         return (control.tool_number if kind == "TOOL" else control.base_number) or 0
 
-    def _move(self, module: Module, statement: Statement) -> None:
+    def _move(self, module: KrlModule, statement: KrlStatement) -> None:
         """A motion to the next point of the module."""
         source = f"{module.path}.src"
         self.require_setup(source, statement.line)
@@ -214,7 +214,7 @@ class _Player:
         self.rounding.append(self.share if self.rounded else 0)
         self.rows.append(self._values(module, name))
 
-    def _values(self, module: Module, name: str) -> Sequence[float]:
+    def _values(self, module: KrlModule, name: str) -> Sequence[float]:
         """Components of a point, as many as the robot has axes; unused external ones have to be at zero."""
         values, axes = module.points[name], Axes.of(self.frame.robot(self.robot))
         count = len(axes.arm) + len(axes.external)
@@ -223,7 +223,7 @@ class _Player:
             raise located(f"{module.path}.dat", module.lines[name], expected, name.upper())
         return values[:count]
 
-    def _signal(self, module: Module, statement: Statement) -> None:
+    def _signal(self, module: KrlModule, statement: KrlStatement) -> None:
         """An instruction of a handshake."""
         source, expected = f"{module.path}.src", self._steps()
         row = len(self.rows) - 1
@@ -243,7 +243,7 @@ class _Player:
         if self.step == 0:
             self.marks.append(row)
 
-    def _steps(self) -> tuple[Step, ...]:
+    def _steps(self) -> tuple[HandshakeStep, ...]:
         """Instructions at a mark."""
         return handshake_steps(self.frame, self.robot)
 
@@ -254,7 +254,7 @@ class _Player:
         return f"WAIT FOR $IN[{step.signal}]=={state}" if step.waits else f"$OUT[{step.signal}]={state}"
 
 
-def _share(module: Module, statement: Statement) -> int:
+def _share(module: KrlModule, statement: KrlStatement) -> int:
     """How far the rows that follow are rounded, in [%]."""
     share = int(statement.words[0] or 0)
     if not 1 <= share <= 100:
@@ -262,10 +262,10 @@ def _share(module: Module, statement: Statement) -> int:
     return share
 
 
-def _step(statement: Statement) -> Step:
+def _step(statement: KrlStatement) -> HandshakeStep:
     """A signal statement as a step of a handshake."""
     words = statement.words
     if statement.kind == "OUT":
-        return Step(False, str(int(words[0] or 0)), str(words[1]).upper() == "TRUE")
+        return HandshakeStep(False, str(int(words[0] or 0)), str(words[1]).upper() == "TRUE")
     is_on = words[0] is None and str(words[3] or "TRUE").upper() == "TRUE"
-    return Step(True, str(int(words[1] or words[2] or 0)), is_on)
+    return HandshakeStep(True, str(int(words[1] or words[2] or 0)), is_on)

@@ -32,14 +32,14 @@ _COMPONENT: Final = re.compile(rf"([AE][1-6])\s+({_NUMBER})", re.IGNORECASE)
 _FIRST: Final = re.compile(r"(DEF|DEFDAT)\s+(\w+)\s*(\(\s*\)|)(?:\s+PUBLIC)?", re.IGNORECASE)
 
 
-class _Line(NamedTuple):
+class _KrlLine(NamedTuple):
     """A line without its comment."""
 
     number: int  # from 1
     text: str  # what it says; never empty
 
 
-class Statement(NamedTuple):
+class KrlStatement(NamedTuple):
     """A statement of a source file."""
 
     line: int  # number of its line
@@ -49,18 +49,18 @@ class Statement(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Module:
+class KrlModule:
     """What both files of a module hold."""
 
     path: str  # path without the ending
     externals: Mapping[str, int]  # lines of the declarations of other modules, by their names
-    statements: Sequence[Statement]  # statements in their order
+    statements: Sequence[KrlStatement]  # statements in their order
     end: int  # number of the line of ``END``
     points: Mapping[str, Sequence[float]]  # values of all components of each point, by name in small letters
     lines: Mapping[str, int]  # lines of the points
 
 
-def read_module(left: dict[str, str], path: str) -> Module:
+def read_module(left: dict[str, str], path: str) -> KrlModule:
     """Read both files of a module.
 
     Args:
@@ -76,13 +76,13 @@ def read_module(left: dict[str, str], path: str) -> Module:
             raise InputError(f"{file}: expected a file, got none")
     externals, statements, end = _source(source, _lines(left.pop(source), source), path.rpartition("/")[2])
     points, lines = _data(data, _lines(left.pop(data), data), path.rpartition("/")[2])
-    return Module(path=path, externals=externals, statements=statements, end=end, points=points, lines=lines)
+    return KrlModule(path=path, externals=externals, statements=statements, end=end, points=points, lines=lines)
 
 
-def _source(file: str, lines: Sequence[_Line], name: str) -> tuple[dict[str, int], list[Statement], int]:
+def _source(file: str, lines: Sequence[_KrlLine], name: str) -> tuple[dict[str, int], list[KrlStatement], int]:
     """Declarations and statements of a source file, and the line of its end."""
     externals: dict[str, int] = {}
-    statements: list[Statement] = []
+    statements: list[KrlStatement] = []
     for line in _body(file, lines, ("DEF", name, "END")):
         external = _EXT.fullmatch(line.text)
         if external is None:
@@ -99,16 +99,16 @@ def _source(file: str, lines: Sequence[_Line], name: str) -> tuple[dict[str, int
     return externals, statements, lines[-1].number
 
 
-def _statement(file: str, line: _Line) -> Statement:
+def _statement(file: str, line: _KrlLine) -> KrlStatement:
     """The statement of a line."""
     for kind, pattern in _PATTERNS.items():
         match = pattern.fullmatch(line.text)
         if match is not None:
-            return Statement(line.number, kind, line.text, match.groups())
+            return KrlStatement(line.number, kind, line.text, match.groups())
     raise located(file, line.number, "a statement that these programs have", line.text)
 
 
-def _data(file: str, lines: Sequence[_Line], name: str) -> tuple[dict[str, Sequence[float]], dict[str, int]]:
+def _data(file: str, lines: Sequence[_KrlLine], name: str) -> tuple[dict[str, Sequence[float]], dict[str, int]]:
     """Points of a data file and their lines, by name in small letters."""
     points: dict[str, Sequence[float]] = {}
     numbers: dict[str, int] = {}
@@ -131,7 +131,7 @@ def _data(file: str, lines: Sequence[_Line], name: str) -> tuple[dict[str, Seque
     return points, numbers
 
 
-def _components(file: str, line: _Line, text: str) -> tuple[list[float], int]:
+def _components(file: str, line: _KrlLine, text: str) -> tuple[list[float], int]:
     """Values of all axes of a point, not a number for absent external ones, and how many are present."""
     components: dict[str, float] = {}
     for part in text.split(","):
@@ -144,7 +144,7 @@ def _components(file: str, line: _Line, text: str) -> tuple[list[float], int]:
     return [components.get(axis, nan) for axis in AXES], len(components)
 
 
-def _body(file: str, lines: Sequence[_Line], words: tuple[str, str, str]) -> Sequence[_Line]:
+def _body(file: str, lines: Sequence[_KrlLine], words: tuple[str, str, str]) -> Sequence[_KrlLine]:
     """The lines between the first and the last one, which are as they have to be."""
     first, name, last = words
     begin = _FIRST.fullmatch(lines[0].text) if lines else None
@@ -157,12 +157,12 @@ def _body(file: str, lines: Sequence[_Line], words: tuple[str, str, str]) -> Seq
     return lines[1:-1]
 
 
-def _lines(text: str, file: str) -> list[_Line]:
+def _lines(text: str, file: str) -> list[_KrlLine]:
     """Lines without comments, empty ones and the header; refuses what no such file has."""
     parts = split_lines(text, file)
     if parts[-1]:
         raise located(file, len(parts), "a last line that is ended", parts[-1])
-    lines = list[_Line]()
+    lines = list[_KrlLine]()
     for number, part in enumerate(parts[:-1], start=1):
         bad = re.search(r"[^ -~\t]", part)
         if bad:
@@ -171,7 +171,7 @@ def _lines(text: str, file: str) -> list[_Line]:
             raise located(file, number, f"at most {LINE} characters", f"{len(part)}")
         said = part.partition(";")[0].strip()
         if said and not (said.startswith("&") and not lines):
-            lines.append(_Line(number, said))
+            lines.append(_KrlLine(number, said))
     return lines
 
 

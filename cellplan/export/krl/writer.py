@@ -11,7 +11,7 @@ import numpy as np
 from cellplan.errors import raise_findings, refusals
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.head import head_notes
 from cellplan.export.joints import to_numbers
 from cellplan.export.krl.names import AXES, EXTERNAL, POINT, WHOLE, module_paths, require_numbers
@@ -29,7 +29,7 @@ LINE_END: Final = "\r\n"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Program:
+class _KrlProgram:
     """What is written of one robot in one program."""
 
     path: str  # path of the main module without its ending
@@ -39,7 +39,7 @@ class _Program:
     decimals: int  # of these
     speeds: Sequence[int]  # share of the top speed with which each row is approached in [%]
     rounding: Sequence[int]  # value of ``$APO.CPTP`` with which each row is rounded in [%], 0 for a stop
-    steps: Sequence[Step]  # instructions at a mark
+    steps: Sequence[HandshakeStep]  # instructions at a mark
     pages: Sequence[range]  # rows of each page
 
 
@@ -67,7 +67,7 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
 
 
-def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Program:
+def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _KrlProgram:
     """All that the files of one robot in one program are made of."""
     placed = job.frame.robot(rows.robot)
     control_decimals = None if placed.control is None else placed.control.decimals
@@ -78,7 +78,7 @@ def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -
     numbers[:, :6] = written[:, axes.arm]
     numbers[:, 6 : 6 + len(axes.external)] = written[:, axes.external]
     pages = pages_of(len(rows), job.frame, KRL)
-    return _Program(
+    return _KrlProgram(
         path=path,
         head=[line for note in head_notes(job, rows.robot) for line in comment(note, ";")],
         rows=rows,
@@ -96,7 +96,7 @@ def _rounding(shares: Array) -> list[int]:
     return [min(floor(WHOLE * share + 1e-9), 100) for share in shares.tolist()]
 
 
-def _files(job: ExportJob, program: _Program) -> dict[str, str]:
+def _files(job: ExportJob, program: _KrlProgram) -> dict[str, str]:
     """The module of a program, or its main module and those of its pages."""
     setup = _setup(job, program)
     if len(program.pages) == 1:
@@ -110,7 +110,7 @@ def _files(job: ExportJob, program: _Program) -> dict[str, str]:
     return files
 
 
-def _setup(job: ExportJob, program: _Program) -> list[str]:
+def _setup(job: ExportJob, program: _KrlProgram) -> list[str]:
     """What is set before the first motion. Targets are joint positions: neither tool nor base moves them."""
     control = job.frame.robot(program.rows.robot).control
     tool, base = (None, None) if control is None else (control.tool_number, control.base_number)
@@ -125,7 +125,7 @@ def _setup(job: ExportJob, program: _Program) -> list[str]:
     return lines
 
 
-def _moves(program: _Program, page: range) -> list[str]:
+def _moves(program: _KrlProgram, page: range) -> list[str]:
     """The motions of a page, each with its speed and rounding where these change, and the handshakes after them."""
     lines, marks, speed, rounding = list[str](), set(program.rows.marks), None, None
     for row in page:
@@ -141,7 +141,7 @@ def _moves(program: _Program, page: range) -> list[str]:
     return lines
 
 
-def _instruction(step: Step) -> str:
+def _instruction(step: HandshakeStep) -> str:
     """One step of a handshake. Both kinds stop the advance run: they are done when the robot stands at the row."""
     if step.waits:
         return f"WAIT FOR {'' if step.is_on else 'NOT '}$IN[{step.signal}]"
@@ -149,7 +149,7 @@ def _instruction(step: Step) -> str:
 
 
 def _module(
-    program: _Program, path: str, statements: Sequence[str], page: range, calls: Sequence[str] = ()
+    program: _KrlProgram, path: str, statements: Sequence[str], page: range, calls: Sequence[str] = ()
 ) -> dict[str, str]:
     """Both files of a module; points are declared in the order of their rows."""
     name = path.rpartition("/")[2]

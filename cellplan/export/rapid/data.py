@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.export.rapid.text import Datum, Module, Statement, value_of
+from cellplan.export.rapid.text import Datum, RapidModule, RapidStatement, value_of
 from cellplan.export.rapid.units import PartFrame, RapidUnit, rapid_units
 from cellplan.geometry.transforms import Array, pose, pose_from, quaternion_to_rotation
 from cellplan.model.exported import ExportFrame, Promise
@@ -35,7 +35,7 @@ class RapidData:
         """Keep the declarations by name in lower case."""
         self._data, self.part = data, part
 
-    def require(self, statement: Statement, name: str, kind: str) -> Datum:
+    def require(self, statement: RapidStatement, name: str, kind: str) -> Datum:
         """The declaration of a name that a statement refers to.
 
         Raises:
@@ -46,7 +46,7 @@ class RapidData:
             statement.refuse(f"{kind} that is declared", name if get is None else f"{name}, which is {get.kind}")
         return get
 
-    def target(self, statement: Statement, name: str, *, is_cartesian: bool) -> str:
+    def target(self, statement: RapidStatement, name: str, *, is_cartesian: bool) -> str:
         """Text of a target that is declared.
 
         Raises:
@@ -60,7 +60,7 @@ class RapidData:
 
 
 def read_data(
-    frame: ExportFrame, unit: RapidUnit, modules: list[tuple[str, Module]], part: PartFrame | None
+    frame: ExportFrame, unit: RapidUnit, modules: list[tuple[str, RapidModule]], part: PartFrame | None
 ) -> RapidData:
     """Declarations of a robot, their values compared with the cell.
 

@@ -4,7 +4,7 @@ import re
 from typing import Final, NamedTuple
 
 from cellplan.export.rapid.data import RapidData
-from cellplan.export.rapid.text import Statement, value_of
+from cellplan.export.rapid.text import RapidStatement, value_of
 from cellplan.export.rapid.units import RapidUnit
 
 _NUMBER: Final = r"-?[0-9]{1,9}(?:\.[0-9]{1,12})?"
@@ -42,7 +42,7 @@ class Zone(NamedTuple):
 STOP: Final = Zone(0.0, 0.0, 0.0)
 
 
-class Move(NamedTuple):
+class RapidMove(NamedTuple):
     r"""A move of a program.
 
     Attributes:
@@ -54,7 +54,7 @@ class Move(NamedTuple):
         zone: How it is rounded.
     """
 
-    statement: Statement
+    statement: RapidStatement
     target: str
     is_cartesian: bool
     number: int | None
@@ -67,7 +67,7 @@ class Move(NamedTuple):
         return self.zone == STOP
 
 
-def read_move(statement: Statement, unit: RapidUnit, data: RapidData, place: Place) -> Move:
+def read_move(statement: RapidStatement, unit: RapidUnit, data: RapidData, place: Place) -> RapidMove:
     """One move; everything that it refers to is declared.
 
     Raises:
@@ -89,10 +89,10 @@ def read_move(statement: Statement, unit: RapidUnit, data: RapidData, place: Pla
         data.require(statement, speed, "speeddata")
     own_zone = STOP if is_fine else _zone(statement, zone, data)
     _require_frames(statement, unit, data, tool=tool, work_object=work_object, is_cartesian=is_cartesian)
-    return Move(statement, target, is_cartesian, own_number, own_duration, own_zone)
+    return RapidMove(statement, target, is_cartesian, own_number, own_duration, own_zone)
 
 
-def _zone(statement: Statement, name: str, data: RapidData) -> Zone:
+def _zone(statement: RapidStatement, name: str, data: RapidData) -> Zone:
     """A zone of the language, or one that is declared; what is rounded most of tool, orientation and axes counts."""
     if name.lower().startswith("z") and name[1:].isdigit() and int(name[1:]) in _EXTENDED:
         size = _EXTENDED[int(name[1:])]
@@ -103,7 +103,7 @@ def _zone(statement: Statement, name: str, data: RapidData) -> Zone:
     return Zone(max(sizes[:3]), sizes[5], sizes[4])
 
 
-def _require_kind(statement: Statement, kind: str, unit: RapidUnit, data: RapidData, place: Place) -> None:
+def _require_kind(statement: RapidStatement, kind: str, unit: RapidUnit, data: RapidData, place: Place) -> None:
     """A positioner moves its external axes; an arm its joints, or its tool on the part while robots are in step."""
     allowed = ["MoveAbsJ"] if unit.has_tool else ["MoveExtJ"]
     if unit.has_tool and data.part is not None and place.is_between:
@@ -112,7 +112,7 @@ def _require_kind(statement: Statement, kind: str, unit: RapidUnit, data: RapidD
         statement.refuse(f"{' or '.join(allowed)} of robot '{unit.robot.name}' here", kind)
 
 
-def _number(statement: Statement, number: str | None, place: Place) -> int | None:
+def _number(statement: RapidStatement, number: str | None, place: Place) -> int | None:
     r"""The ``\ID`` of a move, which it has if and only if other tasks move with it."""
     if place.is_synchronised and not place.is_first and not place.is_between:
         statement.refuse("further moves between SyncMoveOn and SyncMoveOff")
@@ -124,7 +124,7 @@ def _number(statement: Statement, number: str | None, place: Place) -> int | Non
     return identifier
 
 
-def _duration(statement: Statement, duration: str | None, place: Place) -> float:
+def _duration(statement: RapidStatement, duration: str | None, place: Place) -> float:
     r"""The ``\T`` of a move in [s], which all have but the first, whose way is not known."""
     if place.is_first is not (duration is None):
         statement.refuse(r"\T with every move but the first")
@@ -135,7 +135,7 @@ def _duration(statement: Statement, duration: str | None, place: Place) -> float
 
 
 def _require_frames(
-    statement: Statement,
+    statement: RapidStatement,
     unit: RapidUnit,
     data: RapidData,
     *,

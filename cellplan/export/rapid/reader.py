@@ -9,11 +9,11 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from cellplan.errors import InputError
-from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.rapid.data import RapidData, read_data
-from cellplan.export.rapid.moves import Move, Place, read_move
+from cellplan.export.rapid.moves import Place, RapidMove, read_move
 from cellplan.export.rapid.rows import rows_of
-from cellplan.export.rapid.text import Module, Statement, read_module
+from cellplan.export.rapid.text import RapidModule, RapidStatement, read_module
 from cellplan.export.rapid.units import WORDS, PartFrame, RapidUnit, part_frame, rapid_units, works_on_part
 from cellplan.model.exported import ExportFrame, ProgramRows, Promise, RobotRows
 
@@ -29,7 +29,7 @@ _PROGRAM: Final = re.compile(
 class _Sync(NamedTuple):
     """A statement that begins or ends synchronised moves: its names in lower case."""
 
-    statement: Statement
+    statement: RapidStatement
     is_on: bool
     ident: str
     tasks: str
@@ -40,7 +40,7 @@ class _Task(NamedTuple):
 
     unit: RapidUnit
     data: RapidData
-    moves: list[Move]
+    moves: list[RapidMove]
     syncs: list[_Sync]
     marks: tuple[int, ...]
 
@@ -82,7 +82,7 @@ def _read_task(
     data = read_data(frame, unit, modules, part if works_on_part(frame, unit.robot.name) else None)
     statements = _flat(modules)
     is_synchronised = frame.promise is Promise.SYNCHRONISED
-    moves: list[Move] = []
+    moves: list[RapidMove] = []
     syncs: list[_Sync] = []
     marks: list[int] = []
     handshake = () if is_synchronised else handshake_steps(frame, unit.robot.name)
@@ -110,7 +110,7 @@ def _read_task(
     return _Task(unit, data, moves, syncs, tuple(marks))
 
 
-def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tuple[str, Module]]:
+def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tuple[str, RapidModule]]:
     """The modules that the program file of a robot names, the first of which has its name."""
     path = f"{folder}{unit.module}.pgf"
     text = left.pop(path, None)
@@ -134,9 +134,9 @@ def _modules_of(unit: RapidUnit, left: dict[str, str], folder: str) -> list[tupl
     return modules
 
 
-def _flat(modules: list[tuple[str, Module]]) -> list[Statement]:
+def _flat(modules: list[tuple[str, RapidModule]]) -> list[RapidStatement]:
     """Statements of the main routine, each page in the place where it is called."""
-    routines: dict[str, list[Statement]] = {}
+    routines: dict[str, list[RapidStatement]] = {}
     for _, module in modules:
         for name, statements in module.routines.items():
             if name in routines:
@@ -163,12 +163,14 @@ def _flat(modules: list[tuple[str, Module]]) -> list[Statement]:
     return flat
 
 
-def _end(modules: list[tuple[str, Module]]) -> Statement:
+def _end(modules: list[tuple[str, RapidModule]]) -> RapidStatement:
     """Where the main routine ends."""
     return modules[0][1].ends["main"]
 
 
-def _sync(statement: Statement, data: RapidData, moves: list[Move], *, between: bool, synchronised: bool) -> _Sync:
+def _sync(
+    statement: RapidStatement, data: RapidData, moves: list[RapidMove], *, between: bool, synchronised: bool
+) -> _Sync:
     """A statement that begins or ends synchronised moves, behind a stop point."""
     match = _SYNC.fullmatch(statement.text)
     if match is None or not synchronised:
@@ -187,7 +189,7 @@ def _sync(statement: Statement, data: RapidData, moves: list[Move], *, between: 
     return _Sync(statement, is_on, ident.lower(), tasks.lower())
 
 
-def _lowers(frame: ExportFrame, unit: RapidUnit, statements: list[Statement]) -> bool:
+def _lowers(frame: ExportFrame, unit: RapidUnit, statements: list[RapidStatement]) -> bool:
     """Whether a program begins with the instruction that lowers its output, and with no other one of a handshake."""
     match = _SIGNAL.fullmatch(statements[0].text) if statements else None
     if match is None:
@@ -198,14 +200,16 @@ def _lowers(frame: ExportFrame, unit: RapidUnit, statements: list[Statement]) ->
     return True
 
 
-def _handshake(statements: list[Statement], expected: tuple[Step, ...], moves: list[Move], marks: list[int]) -> None:
+def _handshake(
+    statements: list[RapidStatement], expected: tuple[HandshakeStep, ...], moves: list[RapidMove], marks: list[int]
+) -> None:
     """The instructions of a handshake, behind a stop point, once at a row."""
     for statement, step in zip(statements, expected or (None,), strict=False):
         shown = "a move" if step is None else f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)}"
         match = _SIGNAL.fullmatch(statement.text)
         if match is None:
             statement.refuse("a move, a call or a handshake")
-        signal_step = Step(match[1].lower() == "waitdi", match[2].lower(), match[3] == "1")
+        signal_step = HandshakeStep(match[1].lower() == "waitdi", match[2].lower(), match[3] == "1")
         if step is None or signal_step != step._replace(signal=step.signal.lower()):
             statement.refuse(shown)
     if len(statements) < len(expected):
@@ -217,10 +221,10 @@ def _handshake(statements: list[Statement], expected: tuple[Step, ...], moves: l
 def _require_whole(
     frame: ExportFrame,
     unit: RapidUnit,
-    moves: list[Move],
+    moves: list[RapidMove],
     syncs: list[_Sync],
     *,
-    end: Statement,
+    end: RapidStatement,
     between: bool,
 ) -> None:
     """The program of a robot has all it needs."""

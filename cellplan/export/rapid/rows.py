@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.export.joints import from_numbers
-from cellplan.export.rapid.moves import Move
+from cellplan.export.rapid.moves import RapidMove
 from cellplan.export.rapid.units import EXTERNAL_AXES, TIME_DECIMALS, RapidUnit
 from cellplan.export.zones import axis_shares, part_shares, tool_shares
 from cellplan.geometry.transforms import Array, pose_from, quaternion_to_rotation
@@ -29,7 +29,7 @@ _PART: Final = re.compile(
 _ABSENT: Final = 9e9
 
 
-def rows_of(unit: RapidUnit, moves: Sequence[Move], marks: tuple[int, ...]) -> RobotRows:
+def rows_of(unit: RapidUnit, moves: Sequence[RapidMove], marks: tuple[int, ...]) -> RobotRows:
     """Rows of a robot; ``q`` of an arm is NaN at targets on the part.
 
     Raises:
@@ -68,7 +68,7 @@ def rows_of(unit: RapidUnit, moves: Sequence[Move], marks: tuple[int, ...]) -> R
     )
 
 
-def _rounding(unit: RapidUnit, moves: Sequence[Move], q: Array, p: Array) -> Array:
+def _rounding(unit: RapidUnit, moves: Sequence[RapidMove], q: Array, p: Array) -> Array:
     """Share of the shorter neighbouring segment within which each row is rounded, shape (N,).
 
     Args:
@@ -85,21 +85,21 @@ def _rounding(unit: RapidUnit, moves: Sequence[Move], q: Array, p: Array) -> Arr
     return np.where(is_known, tool_shares(unit.robot, np.nan_to_num(q), np.where(is_known, tool / MM, 0.0)), on_part)
 
 
-def _times(moves: Sequence[Move]) -> Array:
+def _times(moves: Sequence[RapidMove]) -> Array:
     """Times of rows in [s] from their durations, on whole multiples of the last decimal where they are meant so."""
     times = np.cumsum([move.duration for move in moves])
     even = np.rint(times * 10.0**TIME_DECIMALS) / 10.0**TIME_DECIMALS
     return np.where(np.abs(times - even) < TIME_TOL, even, times)
 
 
-def _pose(move: Move, place: Array, turn: Array) -> Array:
+def _pose(move: RapidMove, place: Array, turn: Array) -> Array:
     """Pose of a target, shape (4, 4)."""
     if abs(np.linalg.norm(turn) - 1.0) > UNIT_TOL:
         move.statement.refuse("a quaternion of unit length")
     return pose_from(quaternion_to_rotation(turn), place / MM)
 
 
-def _configuration(move: Move, text: str) -> list[int]:
+def _configuration(move: RapidMove, text: str) -> list[int]:
     """Configuration data of a target."""
     numbers = [int(number) for number in text.split(",")]
     if not 0 <= numbers[3] <= 7:
@@ -113,7 +113,7 @@ def _numbers(text: str) -> Array:
 
 
 def _require_axes(
-    unit: RapidUnit, moves: Sequence[Move], arm: Array, external: Array, is_cartesian: NDArray[np.bool_]
+    unit: RapidUnit, moves: Sequence[RapidMove], arm: Array, external: Array, is_cartesian: NDArray[np.bool_]
 ) -> None:
     """Each row has the axes of the robot, and 9E9 for all others."""
     count = len(unit.axes.external)

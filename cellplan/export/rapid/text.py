@@ -22,7 +22,7 @@ _SHOWN: Final = 60  # characters of a statement in a message
 
 
 @dataclass(frozen=True, slots=True)
-class Statement:
+class RapidStatement:
     """A statement without its semicolon, spaces where it needs them only."""
 
     text: str
@@ -43,7 +43,7 @@ class Statement:
 class Datum:
     """A declaration."""
 
-    statement: Statement  # where it stands
+    statement: RapidStatement  # where it stands
     storage: str  # ``pers``, ``const`` or ``var``
     kind: str  # its data type, in lower case
     name: str  # its name as written
@@ -52,17 +52,17 @@ class Datum:
 
 
 @dataclass(slots=True)
-class Module:
+class RapidModule:
     """A module: declarations and routines by name in lower case, and where it ends."""
 
     name: str
     data: dict[str, Datum] = field(default_factory=dict)
-    routines: dict[str, list[Statement]] = field(default_factory=dict)
-    heads: dict[str, Statement] = field(default_factory=dict)
-    ends: dict[str, Statement] = field(default_factory=dict)
+    routines: dict[str, list[RapidStatement]] = field(default_factory=dict)
+    heads: dict[str, RapidStatement] = field(default_factory=dict)
+    ends: dict[str, RapidStatement] = field(default_factory=dict)
 
 
-def read_module(text: str, file: str) -> Module:
+def read_module(text: str, file: str) -> RapidModule:
     """A module of declarations and routines, with unknown statements left in the routines.
 
     Raises:
@@ -72,7 +72,7 @@ def read_module(text: str, file: str) -> Module:
     first = next(statements, None)
     if first is None or not first.text.lower().startswith("module "):
         raise InputError(f"{file}:{first.line if first else 1}: expected MODULE and a name")
-    module = Module(name=first.text.split(" ")[1])
+    module = RapidModule(name=first.text.split(" ")[1])
     is_ended, routine = False, ""
     for statement in statements:
         word, _, rest = statement.text.partition(" ")
@@ -116,7 +116,7 @@ def _no_number(word: str) -> NoReturn:
     raise ValueError(word)
 
 
-def _routine(module: Module, statement: Statement, name: str) -> str:
+def _routine(module: RapidModule, statement: RapidStatement, name: str) -> str:
     """Begin a routine; its name in lower case."""
     key = name.lower()
     if key in module.routines or key in module.data:
@@ -128,7 +128,7 @@ def _routine(module: Module, statement: Statement, name: str) -> str:
     return key
 
 
-def _declare(module: Module, statement: Statement) -> None:
+def _declare(module: RapidModule, statement: RapidStatement) -> None:
     """Take a declaration."""
     if module.routines:
         statement.refuse("declarations before routines")
@@ -149,28 +149,28 @@ def _declare(module: Module, statement: Statement) -> None:
     module.data[key] = Datum(statement, storage, kind.lower(), name, number, value)
 
 
-def _statements(text: str, file: str) -> Iterator[Statement]:
+def _statements(text: str, file: str) -> Iterator[RapidStatement]:
     """Statements of a file, comments and the header of a version left out."""
     pending, begun, is_header = "", 0, False
     for number, line in enumerate(_lines(text, file), start=1):
         if not pending and (line.strip() == "%%%" or is_header):
-            is_header = _header(line, Statement(line.strip(), file, number), is_header=is_header)
+            is_header = _header(line, RapidStatement(line.strip(), file, number), is_header=is_header)
             continue
-        rest = _code(line, Statement(line.strip(), file, number))
+        rest = _code(line, RapidStatement(line.strip(), file, number))
         while rest.strip():
             begun = begun if pending else number
             block = None if pending else _BLOCK.match(rest)
             if block:
-                yield Statement(_plain(block[1]), file, number)
+                yield RapidStatement(_plain(block[1]), file, number)
                 rest = block[2]
                 continue
             head, ended, rest = rest.partition(";")
             pending = f"{pending} {head}" if pending else head
             if ended:
-                yield Statement(_plain(pending), file, begun)
+                yield RapidStatement(_plain(pending), file, begun)
                 pending = ""
     if pending:
-        Statement(_plain(pending), file, begun).refuse("a semicolon at the end of the statement")
+        RapidStatement(_plain(pending), file, begun).refuse("a semicolon at the end of the statement")
     if is_header:
         raise InputError(f"{file}: expected a second line %%% after the version")
 
@@ -187,7 +187,7 @@ def _lines(text: str, file: str) -> Iterator[str]:
         yield plain
 
 
-def _code(line: str, statement: Statement) -> str:
+def _code(line: str, statement: RapidStatement) -> str:
     """A line without its comment."""
     if '"' not in line:
         return line.partition("!")[0]
@@ -198,7 +198,7 @@ def _code(line: str, statement: Statement) -> str:
     return code
 
 
-def _header(line: str, statement: Statement, *, is_header: bool) -> bool:
+def _header(line: str, statement: RapidStatement, *, is_header: bool) -> bool:
     """Whether the header of a version goes on after a line of it."""
     if line.strip() == "%%%":
         return not is_header

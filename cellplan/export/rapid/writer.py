@@ -16,7 +16,7 @@ import numpy as np
 
 from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import Step, handshake_steps, lowering_step, signals_by_key
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step, signals_by_key
 from cellplan.export.head import head_notes
 from cellplan.export.rapid.moves import LARGEST_ID
 from cellplan.export.rapid.reader import read_rapid
@@ -166,7 +166,7 @@ def _require_names(frame: ExportFrame, robot: str) -> None:
             )
 
 
-def _signal(step: Step) -> str:
+def _signal(step: HandshakeStep) -> str:
     """One instruction of a handshake."""
     return f"{'WaitDI' if step.waits else 'SetDO'} {step.signal},{int(step.is_on)};"
 

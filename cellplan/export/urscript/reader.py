@@ -42,7 +42,7 @@ _SPEED: Final = r"(?!0\.0+(?![0-9]))(?:0|[1-9][0-9]{0,3})\.[0-9]{3}"
 _RADIUS: Final = r"(?!0\.0+(?![0-9]))[0-9]\.[0-9]{4}"
 
 
-class Statement(NamedTuple):
+class UrscriptStatement(NamedTuple):
     """One instruction: its line, from 1, its text without comment and spare spaces, and the line as it stands."""
 
     line: int
@@ -58,7 +58,7 @@ class _Statements:
         self.file, self.place = file, 0
         lines = lines_of(text, file)
         self.all = [
-            Statement(number, plain, content)
+            UrscriptStatement(number, plain, content)
             for number, line in enumerate(lines, start=1)
             if (content := line.partition("#")[0].strip()) and (plain := compact(content))
         ]
@@ -73,7 +73,7 @@ class _Statements:
         Raises:
             InputError: A routine has more rows, another name, or is not called next.
         """
-        inside, called = list[Statement](), list[str]()
+        inside, called = list[UrscriptStatement](), list[str]()
         while self.peek().text.startswith("def "):
             called.append(page_name(len(called) + 1))
             self.take(f"def {called[-1]}():")
@@ -91,9 +91,9 @@ class _Statements:
             raise line_error(self.file, moves[0].line, f"{called[0]}()", moves[0].shown)
         self.all, self.place = [*begin, *inside, *self.all[self.place :]], 0
 
-    def _routine(self, most: int) -> list[Statement]:
+    def _routine(self, most: int) -> list[UrscriptStatement]:
         """The instructions of a routine up to its end."""
-        statements, depth = list[Statement](), 1
+        statements, depth = list[UrscriptStatement](), 1
         while depth:
             at = self.peek()
             depth += at.text.startswith("while ") - (at.text == "end")
@@ -102,13 +102,13 @@ class _Statements:
         self._require_length([statement for statement in statements if statement.text.startswith(MOVES)], most)
         return statements[:-1]
 
-    def _require_length(self, moves: Sequence[Statement], most: int) -> None:
+    def _require_length(self, moves: Sequence[UrscriptStatement], most: int) -> None:
         """Refuse more rows than a routine holds."""
         if len(moves) > most:
             line = moves[most].line
             raise InputError(f"{self.file}:{line}: expected {most} rows at most in a routine, got {len(moves)}")
 
-    def peek(self) -> Statement:
+    def peek(self) -> UrscriptStatement:
         """The next instruction.
 
         Raises:
@@ -192,7 +192,7 @@ class _Points:
         self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
         self.expected = f"{ARM} positions with {decimals} decimals"
 
-    def add(self, statement: Statement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+    def add(self, statement: UrscriptStatement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
         """Take in the row of an instruction.
 
         Raises:
@@ -275,7 +275,7 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> Robo
     return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
 
 
-def _require_speed(robot: Robot, speed: float, statement: Statement, file: str) -> None:
+def _require_speed(robot: Robot, speed: float, statement: UrscriptStatement, file: str) -> None:
     """Make sure that a speed is none beyond those of all joints."""
     largest = max(joint.velocity for joint in robot.model.joints)
     if speed > largest:

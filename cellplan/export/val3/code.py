@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.export.val3.xml import Element
+from cellplan.export.val3.xml import Val3Element
 
 _NAME: Final = r"[A-Za-z]\w*"
 _ITEM: Final = rf"({_NAME})(?:\s*\[\s*(\w+)\s*\])?"
@@ -22,7 +22,7 @@ DEEPEST: Final = 8  # loops in one another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Statement:
+class Val3Statement:
     """A statement."""
 
     line: int  # its line in the file
@@ -30,7 +30,7 @@ class Statement:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Move(Statement):
+class Val3Move(Val3Statement):
     """A motion of the joints."""
 
     names: tuple[str, str, str]  # data of the joints, of the tool and of the motion descriptor
@@ -38,17 +38,17 @@ class Move(Statement):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StandStill(Statement):
+class StandStill(Val3Statement):
     """A wait until all motions have ended."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reset(Statement):
+class Reset(Val3Statement):
     """All motions that were not made yet are forgotten."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WaitFor(Statement):
+class WaitFor(Val3Statement):
     """A wait for an input."""
 
     name: str  # its data
@@ -56,7 +56,7 @@ class WaitFor(Statement):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetOutput(Statement):
+class SetOutput(Val3Statement):
     """A change of an output."""
 
     name: str  # its data
@@ -64,14 +64,14 @@ class SetOutput(Statement):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Call(Statement):
+class Call(Val3Statement):
     """A call of another program."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Loop(Statement):
+class Loop(Val3Statement):
     """Statements that are done again and again."""
 
     counter: str  # name of what counts
@@ -79,10 +79,10 @@ class Loop(Statement):
     body: Sequence["Node"]  # the statements
 
 
-Node = Move | StandStill | Reset | WaitFor | SetOutput | Call | Loop
+Node = Val3Move | StandStill | Reset | WaitFor | SetOutput | Call | Loop
 
 
-def read_code(code: Element, counters: Collection[str]) -> tuple[list[Node], int]:
+def read_code(code: Val3Element, counters: Collection[str]) -> tuple[list[Node], int]:
     """Statements of a program between ``begin`` and ``end``, and the line of its ``end``.
 
     Args:
@@ -101,15 +101,15 @@ def read_code(code: Element, counters: Collection[str]) -> tuple[list[Node], int
     if first[1] != "begin" or len(lines) < 2 or last[1] != "end":
         (line, said), word = (first, "begin") if first[1] != "begin" else (last, "end")
         raise _error(code, line, word, said)
-    reader = _Reader(code=code, lines=lines[1:-1][::-1], counters=counters)
+    reader = _CodeReader(code=code, lines=lines[1:-1][::-1], counters=counters)
     return reader.statements(()), last[0]
 
 
 @dataclass(slots=True, kw_only=True)
-class _Reader:
+class _CodeReader:
     """Reads statements line by line."""
 
-    code: Element
+    code: Val3Element
     lines: list[tuple[int, str]]  # numbers and texts of the lines that are left, the next one last
     counters: Collection[str]  # names of the numbers that loops may count with
 
@@ -151,7 +151,7 @@ class _Reader:
         """Any statement but a loop."""
         if match := _MOVE.fullmatch(said):
             names, indices = (match[1], match[3], match[5]), (_index(match[2]), _index(match[4]), _index(match[6]))
-            return Move(line=line, text=said, names=names, indices=indices)
+            return Val3Move(line=line, text=said, names=names, indices=indices)
         if _STAND.fullmatch(said):
             return StandStill(line=line, text=said)
         if _RESET.fullmatch(said):
@@ -172,6 +172,6 @@ def _index(said: str | None) -> int | str:
     return int(said) if said.isdecimal() else said
 
 
-def _error(code: Element, line: int, expected: str, got: str) -> InputError:
+def _error(code: Val3Element, line: int, expected: str, got: str) -> InputError:
     """One located line."""
     return InputError(f"{code.file}:{line}: expected {expected}, got {got[:60]!r}")

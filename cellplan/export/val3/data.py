@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.export.val3.names import BASE, FLANGE, NAME, TOOL_NAME
-from cellplan.export.val3.xml import DATA_SPACE, TYPE, Element, parse
+from cellplan.export.val3.xml import DATA_SPACE, TYPE, Val3Element, parse
 
 _JOINTS: Final = tuple(f"j{axis}" for axis in range(1, 7))
 _POSE: Final = ("x", "y", "z", "rx", "ry", "rz")
@@ -37,7 +37,7 @@ _BLENDS: Final = ("off", "joint", "Cartesian")
 class Data:
     """An array of values."""
 
-    element: Element  # where it is declared
+    element: Val3Element  # where it is declared
     kind: str  # type of its values
     values: Sequence[Mapping[str, str]]  # attributes of each value; one that is missing has its default
 
@@ -69,7 +69,7 @@ def read_data(text: str, file: str) -> dict[str, Data]:
     return variables
 
 
-def _data(element: Element) -> tuple[str, Data]:
+def _data(element: Val3Element) -> tuple[str, Data]:
     """One array."""
     element.require(needed=("name", TYPE, "type", "size"), allowed=("access",))
     attributes = element.attributes
@@ -94,7 +94,7 @@ def _data(element: Element) -> tuple[str, Data]:
     return name, Data(element=element, kind=kind, values=read or [{}] * int(size))
 
 
-def _value(value: Element, key: int, kind: str) -> Mapping[str, str]:
+def _value(value: Val3Element, key: int, kind: str) -> Mapping[str, str]:
     """Attributes of one value."""
     value.require(needed=("key", *_NEEDED[kind]), allowed=(*_NUMBERS[kind], *_TEXTS[kind]))
     value.only(space=DATA_SPACE)

@@ -6,7 +6,7 @@ from typing import Final
 
 from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import Step, signals_by_key
+from cellplan.export.handshake import HandshakeStep, signals_by_key
 from cellplan.export.pages import program_paths
 from cellplan.model.exported import ExportFrame
 
@@ -41,7 +41,7 @@ def project_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None
     return program_paths(frame, dialect, longest=NAME, reserved=WORDS, taken=DATA)
 
 
-def signal_names(steps: Iterable[Step]) -> dict[tuple[bool, str], str]:
+def signal_names(steps: Iterable[HandshakeStep]) -> dict[tuple[bool, str], str]:
     """Names of the data of signals: the signal itself where it can be one, else a name of this format.
 
     Returns:

@@ -8,12 +8,12 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.joints import from_numbers
-from cellplan.export.val3.code import Call, Loop, Move, Node, Reset, SetOutput, StandStill, WaitFor, read_code
+from cellplan.export.val3.code import Call, Loop, Node, Reset, SetOutput, StandStill, Val3Move, WaitFor, read_code
 from cellplan.export.val3.data import Data, read_data
 from cellplan.export.val3.names import START, STOP, input_link, output_link
-from cellplan.export.val3.xml import PARAMETER_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE, Element, parse
+from cellplan.export.val3.xml import PARAMETER_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE, Val3Element, parse
 from cellplan.export.zones import tool_shares
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.units import MM
@@ -37,7 +37,7 @@ def read_val3(
     programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
     left = dict(files)
     for (program, robot), path in paths.items():
-        player = _Player(frame=frame, robot=robot, project=_project(left, path))
+        player = _Val3Player(frame=frame, robot=robot, project=_project(left, path))
         player.play_all()
         placed = frame.robot(robot)
         q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
@@ -51,7 +51,7 @@ def read_val3(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Program:
+class _Val3Program:
     """A program of a project."""
 
     file: str
@@ -60,21 +60,21 @@ class _Program:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Project:
+class _ReadProject:
     """What the files of a project hold."""
 
     path: str  # its folder
     data: Mapping[str, Data]  # its data by name
-    programs: Mapping[str, _Program]  # its programs by name
+    programs: Mapping[str, _Val3Program]  # its programs by name
 
 
-def _project(left: dict[str, str], path: str) -> _Project:
+def _project(left: dict[str, str], path: str) -> _ReadProject:
     """Read a project; takes its files out of those that are left."""
     file = f"{path}/{path.rpartition('/')[2]}.pjx"
     listed, data_file = _listed(parse(_taken(left, file), file, "Project", PROJECT_SPACE), path)
     data = read_data(_taken(left, data_file), data_file)
     programs = {name: _program(left, f"{path}/{name}.pgx", name, data) for name in listed}
-    return _Project(path=path, data=data, programs=programs)
+    return _ReadProject(path=path, data=data, programs=programs)
 
 
 def _taken(left: dict[str, str], file: str) -> str:
@@ -84,7 +84,7 @@ def _taken(left: dict[str, str], file: str) -> str:
     return left.pop(file)
 
 
-def _listed(project: Element, path: str) -> tuple[list[str], str]:
+def _listed(project: Val3Element, path: str) -> tuple[list[str], str]:
     """Names of the programs that a project lists, and path of its data."""
     project.require()
     project.only("Parameters", "Programs", "Database", "Libraries", "Types", space=PROJECT_SPACE)
@@ -109,7 +109,7 @@ def _listed(project: Element, path: str) -> tuple[list[str], str]:
     return names, f"{path}/{file_name}.dtx"
 
 
-def _file_name(entry: Element, ending: str) -> str:
+def _file_name(entry: Val3Element, ending: str) -> str:
     """Name of a listed file without its ending."""
     entry.require(needed=("file",))
     match = re.fullmatch(r"([A-Za-z]\w{0,14})" + re.escape(ending), entry.attributes["file"], re.ASCII)
@@ -118,7 +118,7 @@ def _file_name(entry: Element, ending: str) -> str:
     return match[1]
 
 
-def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data]) -> _Program:
+def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data]) -> _Val3Program:
     """Read a program."""
     root = parse(_taken(left, file), file, "Programs", PROGRAM_SPACE)
     root.require()
@@ -141,10 +141,10 @@ def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data
     if code.children or program.text.strip():
         raise code.error("text alone", "an element")
     statements, end = read_code(code, counters)
-    return _Program(file=file, code=statements, end=end)
+    return _Val3Program(file=file, code=statements, end=end)
 
 
-def _local(local: Element) -> str:
+def _local(local: Val3Element) -> str:
     """Name of a local number, which counts a loop."""
     local.require(needed=("name", "type", TYPE, "size"))
     if local.attributes["type"] != "num" or local.attributes[TYPE] != "array" or local.attributes["size"] != "1":
@@ -153,7 +153,7 @@ def _local(local: Element) -> str:
 
 
 @dataclass(slots=True, kw_only=True)
-class _Player:
+class _Val3Player:
     """Follows the programs of a project statement by statement.
 
     Attributes:
@@ -162,7 +162,7 @@ class _Player:
 
     frame: ExportFrame  # which robots
     robot: str
-    project: _Project
+    project: _ReadProject
     rows: list[Sequence[float]] = field(default_factory=list)  # joint positions of the controller in each row
     zones: list[float] = field(default_factory=list)
     marks: list[int] = field(default_factory=list)  # rows with a handshake
@@ -197,7 +197,7 @@ class _Player:
             if data.kind == "jointRx" and self.used.get(name, 0) != data.size:
                 raise data.error("motions to all of its values", f"{self.used.get(name, 0)} of {data.size}")
 
-    def _play(self, program: _Program, nodes: Sequence[Node], counters: Mapping[str, int]) -> None:
+    def _play(self, program: _Val3Program, nodes: Sequence[Node], counters: Mapping[str, int]) -> None:
         """Follow statements."""
         for node in nodes:
             self.steps += 1
@@ -205,7 +205,7 @@ class _Player:
                 raise _error(program.file, node.line, f"at most {MOST_STEPS} statements to be done", node.text)
             if self.step and not isinstance(node, (SetOutput, WaitFor)):
                 raise _error(program.file, node.line, f"the rest of the handshake ({self._expected()})", node.text)
-            if isinstance(node, Move):
+            if isinstance(node, Val3Move):
                 self._move(program, node, counters)
             elif isinstance(node, StandStill):
                 self._stand(program, node)
@@ -219,13 +219,13 @@ class _Player:
             else:
                 self._signal(program, node)
 
-    def _stand(self, program: _Program, node: StandStill) -> None:
+    def _stand(self, program: _Val3Program, node: StandStill) -> None:
         """A wait for the end of all motions."""
         if not self.is_exact:
             raise _error(program.file, node.line, "an exact stop before it (blend off)", node.text)
         self.stands = True
 
-    def _call(self, program: _Program, node: Call) -> None:
+    def _call(self, program: _Val3Program, node: Call) -> None:
         """A call of a page."""
         if program.file != self.project.programs[START].file or node.name in {START, STOP, *self.calls}:
             raise _error(program.file, node.line, "each page called once by start", node.text)
@@ -240,7 +240,7 @@ class _Player:
         if len(self.rows) == before or self.step or not self.is_exact:
             raise _error(page.file, page.end, "motions, the last of which ends in an exact stop", "the end")
 
-    def _move(self, program: _Program, node: Move, counters: Mapping[str, int]) -> None:
+    def _move(self, program: _Val3Program, node: Val3Move, counters: Mapping[str, int]) -> None:
         """A motion to the next value of its data."""
         if self.calls and program.file == self.project.programs[START].file:
             raise _error(program.file, node.line, "no motion in a program that calls pages", node.text)
@@ -260,7 +260,7 @@ class _Player:
         self.stands = False
 
     def _value(
-        self, program: _Program, node: Move, counters: Mapping[str, int], place: int, kind: str
+        self, program: _Val3Program, node: Val3Move, counters: Mapping[str, int], place: int, kind: str
     ) -> Mapping[str, str]:
         """The value that an argument of a motion names."""
         name, index = node.names[place], _index(node, counters, place)
@@ -271,7 +271,7 @@ class _Player:
             raise _error(program.file, node.line, f"an index of {name} from 0 to {data.size - 1}", node.text)
         return data.values[index]
 
-    def _signal(self, program: _Program, node: SetOutput | WaitFor) -> None:
+    def _signal(self, program: _Val3Program, node: SetOutput | WaitFor) -> None:
         """An instruction of a handshake."""
         expected, row = handshake_steps(self.frame, self.robot), len(self.rows) - 1
         is_first = bool(expected) and not self.lowered and row < 0 and not self.calls
@@ -299,13 +299,13 @@ class _Player:
         return _shown(handshake_steps(self.frame, self.robot)[self.step])
 
 
-def _shown(step: Step) -> str:
+def _shown(step: HandshakeStep) -> str:
     """An instruction of a handshake in messages."""
     state = "true" if step.is_on else "false"
     return f"wait for {step.signal}=={state}" if step.waits else f"{step.signal}={state}"
 
 
-def _index(node: Move, counters: Mapping[str, int], place: int) -> int | None:
+def _index(node: Val3Move, counters: Mapping[str, int], place: int) -> int | None:
     """Value of the index of an argument; None for a name that no loop counts."""
     index = node.indices[place]
     return index if isinstance(index, int) else counters.get(index)

@@ -11,7 +11,7 @@ import numpy as np
 from cellplan.errors import raise_findings, refusals
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import Step, handshake_steps, lowering_step
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.head import head_notes
 from cellplan.export.joints import from_numbers, to_numbers
 from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
@@ -65,8 +65,8 @@ class _Project:
     numbers: Array  # joint positions of the arm, shape (N, 6)
     decimals: int  # of these
     moves: Sequence[_Move]  # how each row is approached and passed
-    steps: Sequence[Step]  # instructions at a mark
-    first: Sequence[Step]  # instructions before the first motion
+    steps: Sequence[HandshakeStep]  # instructions at a mark
+    first: Sequence[HandshakeStep]  # instructions before the first motion
     pages: Sequence[range]  # rows of each page
     tool: Array  # tool in the flange frame, shape (4, 4)
 
@@ -251,7 +251,7 @@ def _moves(project: _Project, page: range, ending: str) -> list[str]:
     return lines
 
 
-def _instruction(step: Step, signals: Mapping[tuple[bool, str], str]) -> str:
+def _instruction(step: HandshakeStep, signals: Mapping[tuple[bool, str], str]) -> str:
     """One step of a handshake."""
     name, state = signals[step.waits, step.signal], "true" if step.is_on else "false"
     return f"wait({name}=={state})" if step.waits else f"{name}={state}"

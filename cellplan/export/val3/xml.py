@@ -18,14 +18,14 @@ TYPE: Final = f"{TYPE_SPACE} type"
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
-class Element:
+class Val3Element:
     """An element of a file."""
 
     file: str
     line: int  # line of its tag
     name: str  # name with its namespace before it
     attributes: dict[str, str]  # its attributes; those of a namespace have it before the name
-    children: list["Element"] = field(default_factory=list)
+    children: list["Val3Element"] = field(default_factory=list)
     text: str = ""
     text_line: int = 0  # line on which the text begins
 
@@ -46,7 +46,7 @@ class Element:
             if name not in needed and name not in allowed:
                 raise self.error("no other attributes", name.rpartition(" ")[2])
 
-    def only(self, *names: str, space: str) -> list["Element"]:
+    def only(self, *names: str, space: str) -> list["Val3Element"]:
         """Its elements, which all have one of some names and of a namespace; it has no text.
 
         Raises:
@@ -59,7 +59,7 @@ class Element:
             raise self.error("no text", self.text.strip())
         return self.children
 
-    def one(self, name: str, *, space: str) -> "Element":
+    def one(self, name: str, *, space: str) -> "Val3Element":
         """The only element of a name.
 
         Raises:
@@ -71,7 +71,7 @@ class Element:
         return matching[0]
 
 
-def parse(text: str, file: str, root: str, space: str) -> Element:
+def parse(text: str, file: str, root: str, space: str) -> Val3Element:
     """Read a file.
 
     Args:
@@ -85,11 +85,11 @@ def parse(text: str, file: str, root: str, space: str) -> Element:
     """
     split_lines(text, file)  # refuses two kinds of line ends
     parser = expat.ParserCreate(namespace_separator=" ")
-    top = Element(file=file, line=1, name="", attributes={})
+    top = Val3Element(file=file, line=1, name="", attributes={})
     open_elements = [top]
 
     def begin(name: str, attributes: dict[str, str]) -> None:
-        element = Element(file=file, line=parser.CurrentLineNumber, name=name, attributes=attributes)
+        element = Val3Element(file=file, line=parser.CurrentLineNumber, name=name, attributes=attributes)
         open_elements[-1].children.append(element)
         open_elements.append(element)
 

@@ -63,7 +63,7 @@ class PhaseRows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ProgramRows:
+class WideRows:
     """A program with all that its wide table shows.
 
     Attributes:
@@ -105,7 +105,7 @@ class ProgramRows:
         return column
 
 
-def wide_columns(program: ProgramRows) -> Columns:
+def wide_columns(program: WideRows) -> Columns:
     """The columns of the wide table by name, in the units of the names.
 
     Raises:
@@ -155,7 +155,7 @@ def kept_distance(kind: ClearanceClass, phase: PhaseRows) -> Array | None:
     return np.minimum(curve[before], curve[after])
 
 
-def _phase_names(program: ProgramRows) -> tuple[str, ...]:
+def _phase_names(program: WideRows) -> tuple[str, ...]:
     """Name of the phase of each row."""
     names = [""] * len(program.times)
     for phase in program.phases:
@@ -168,7 +168,7 @@ def _singular_values(phase: PhaseRows) -> Array | None:
     return None if phase.report.conditioning is None else phase.report.conditioning.stack
 
 
-def _task_columns(program: ProgramRows, task: str) -> Columns:
+def _task_columns(program: WideRows, task: str) -> Columns:
     """What the tool of a task does on the part, or in the world for a task given there."""
 
     def poses(phase: PhaseRows) -> Array | None:
@@ -196,7 +196,7 @@ def _task_columns(program: ProgramRows, task: str) -> Columns:
     return columns
 
 
-def _speed_columns(program: ProgramRows, robot: Robot) -> Columns:
+def _speed_columns(program: WideRows, robot: Robot) -> Columns:
     """Speeds of the joints of a robot, and of its tool tip in the world."""
     speeds = program.spread(lambda phase: phase.report.qd[robot.name], width=len(robot.model.joints))
     columns: Columns = {f"{name}_s": values for name, values in joint_columns(robot, speeds).items()}

@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.export.csv import DECIMALS, joint_fields, read_table, time_fields
-from cellplan.export.wide.columns import TIME, Column, ProgramRows, wide_columns
+from cellplan.export.wide.columns import TIME, Column, WideRows, wide_columns
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import JointTable
 
@@ -22,7 +22,7 @@ def file_name(program: str | None) -> str:
     return "wide.csv" if program is None else f"{program}/wide.csv"
 
 
-def render_wide(program: ProgramRows) -> str:
+def render_wide(program: WideRows) -> str:
     """Text of the table.
 
     Raises:

@@ -16,7 +16,7 @@ from cellplan.io.cell.layout_ties import Ties
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.layout import Choice, KeepOut, LayoutSettings, PathRange, VariableKind, VaryRange
+from cellplan.model.layout import KeepOut, LayoutChoice, LayoutSettings, PathRange, VariableKind, VaryRange
 from cellplan.model.robot import RobotModel
 from cellplan.model.settings.layout import KeepOutEntry, LayoutEntry
 from cellplan.model.settings.units import in_si
@@ -36,7 +36,7 @@ class _Reading:
 
     ranges: dict[str, VaryRange] = field(default_factory=dict)
     paths: list[PathRange] = field(default_factory=list)
-    choices: list[Choice] = field(default_factory=list)
+    choices: list[LayoutChoice] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
 
 

@@ -7,7 +7,7 @@ from cellplan.io.cell.layout_addresses import Address
 from cellplan.io.cell.layout_ranges import Context
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, listed, shown, unknown_name
 from cellplan.io.schema.cell import MotionEntry
-from cellplan.model.layout import Choice, ChoiceKind, PathRange
+from cellplan.model.layout import ChoiceKind, LayoutChoice, PathRange
 
 KINDS: Final[Mapping[str, ChoiceKind]] = {
     "robot": ChoiceKind.ROBOT,
@@ -21,15 +21,15 @@ FEWEST: Final = 7  # coefficients: three at rest at either end, and one between
 MOST: Final = 200
 
 
-def read_choice(address: Address, value: Any, path: KeyPath, context: Context) -> Choice | Finding:
+def read_choice(address: Address, value: Any, path: KeyPath, context: Context) -> LayoutChoice | Finding:
     """A choice between robots, modes or branches."""
     kind = KINDS[address.what]
     if kind is ChoiceKind.BRANCH:
         if value is not True:
             return context.document.finding(path, f"expected true, got {shown(value)}")
-        return Choice(address=address.group, kind=kind, name=address.name)
+        return LayoutChoice(address=address.group, kind=kind, name=address.name)
     wrong = _wrong_options(address, value, path, context)
-    return wrong or Choice(address=address.group, kind=kind, name=address.name, options=value)
+    return wrong or LayoutChoice(address=address.group, kind=kind, name=address.name, options=value)
 
 
 def _wrong_options(address: Address, value: Any, path: KeyPath, context: Context) -> Finding | None:

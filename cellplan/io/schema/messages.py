@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get
 from pydantic import BaseModel, Tag, ValidationError
 
 from cellplan.io.input.findings import Finding, KeyPath
-from cellplan.io.schema.mismatch import Kind, Mismatch, mismatch_text
+from cellplan.io.schema.mismatch import Mismatch, MismatchKind, mismatch_text
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.settings.entry import Entry
 from cellplan.model.settings.units import Quantity
@@ -44,7 +44,7 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
         return model.model_validate(document.root), []
     except ValidationError as error:
         findings = error.errors(include_url=False, include_context=True, include_input=False)
-    mismatches = [_Reader(model, document, dict(finding)).mismatch() for finding in findings[:FINDING_LIMIT]]
+    mismatches = [_MessageReader(model, document, dict(finding)).mismatch() for finding in findings[:FINDING_LIMIT]]
     located = [_located(mismatch, document) for mismatch in mismatches if mismatch is not None]
     return None, list(dict.fromkeys(located))
 
@@ -75,7 +75,7 @@ def _located(mismatch: Mismatch, document: YamlDocument) -> Finding:
     return document.finding(mismatch.path, text)
 
 
-class _Reader:
+class _MessageReader:
     """Reads one finding of pydantic, with its place in the file and in the format."""
 
     def __init__(self, model: type[Entry], document: YamlDocument, finding: Mapping[str, Any]) -> None:
@@ -100,14 +100,14 @@ class _Reader:
         if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
             return None
         if self.is_key and self.type != "rule":
-            return Mismatch(kind=Kind.NAME, path=self.path, got=self.path[-1])
+            return Mismatch(kind=MismatchKind.NAME, path=self.path, got=self.path[-1])
         if self.type == "extra_forbidden":
             allowed = fields_of(annotation_at(self.model, self.location[:-1]))
-            return Mismatch(kind=Kind.UNKNOWN_KEY, path=self.path, allowed=tuple(allowed))
+            return Mismatch(kind=MismatchKind.UNKNOWN_KEY, path=self.path, allowed=tuple(allowed))
         if self.type == "rule":
             below = re.findall(r"[^.\[\]]+", self.context["key"])
             path = (*self.path, *(int(key) if key.isdigit() else key for key in below))
-            return Mismatch(kind=Kind.RULE, path=path, expected=self.context["text"])
+            return Mismatch(kind=MismatchKind.RULE, path=path, expected=self.context["text"])
         if self.type == "too_short" and len(self.value) >= self.context["min_length"]:
             return None  # short only of entries that are wrong themselves
         return self._missing() if self.type == "missing" else self._about_value()
@@ -116,31 +116,33 @@ class _Reader:
         """A key or an element of a list of fixed length that is absent."""
         if isinstance(self.path[-1], int):
             got = value_at(self.document.root, self.path[:-1])
-            return Mismatch(kind=Kind.TYPE, path=self.path[:-1], expected=self._type(self.location[:-1]), got=got)
+            return Mismatch(
+                kind=MismatchKind.TYPE, path=self.path[:-1], expected=self._type(self.location[:-1]), got=got
+            )
         fields = fields_of(annotation_at(self.model, self.location[:-1]))
         words = (fields[str(self.location[-1])].description or "a value").rstrip(".")
         expected = words if words[:2].isupper() else words[:1].lower() + words[1:]
-        return Mismatch(kind=Kind.MISSING, path=self.path, expected=expected)
+        return Mismatch(kind=MismatchKind.MISSING, path=self.path, expected=expected)
 
     def _about_value(self) -> Mismatch:
         """A value that is not allowed."""
         about = partial(Mismatch, path=self.path, got=self.value)
         branch = str(self.location[-1]) if self.location else ""
         if self.type == "choice":
-            return about(kind=Kind.TYPE, expected=self.text)
+            return about(kind=MismatchKind.TYPE, expected=self.text)
         if TAG.fullmatch(branch) and self.type in {"literal_error", "string_type"}:
-            kind = Kind.CHOICE if self.type == "literal_error" else Kind.TYPE
+            kind = MismatchKind.CHOICE if self.type == "literal_error" else MismatchKind.TYPE
             return about(kind=kind, expected=branch[1:-1], allowed=tuple(_words(branch[1:-1])))
         if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
-            return about(kind=Kind.COUNT, at_least=self.context.get("min_length"), at_most=self._most_entries())
+            return about(kind=MismatchKind.COUNT, at_least=self.context.get("min_length"), at_most=self._most_entries())
         if self.type == "string_pattern_mismatch":
-            return about(kind=Kind.NAME)
+            return about(kind=MismatchKind.NAME)
         if self.type in BOUNDS:
             return self._bound()
         expected = self._type(self.location)
         is_literal = self.type == "literal_error"
         return about(
-            kind=Kind.CHOICE if is_literal else Kind.TYPE,
+            kind=MismatchKind.CHOICE if is_literal else MismatchKind.TYPE,
             expected=expected,
             allowed=tuple(_words(expected)) if is_literal else (),
         )
@@ -154,7 +156,7 @@ class _Reader:
         lower = self.context.get("gt", self.context.get("ge"))
         is_positive = lower is not None and lower >= 0.0 >= self.value and not (lower == 0.0 and "ge" in self.context)
         return Mismatch(
-            kind=Kind.BOUND,
+            kind=MismatchKind.BOUND,
             path=self.path,
             at_least=lower,
             at_most=self.context.get("le", self.context.get("lt")),

@@ -42,7 +42,7 @@ class Unreadable:
 UNREADABLE: Final = Unreadable()
 
 
-class Mark(NamedTuple):
+class SourceMark(NamedTuple):
     """A place in a file; line and column count from 1."""
 
     line: int
@@ -60,8 +60,8 @@ class YamlDocument:
     file: str  # name in messages
     digest: str  # SHA-256 of the bytes that were read
     root: dict[str, Any]  # the values: dict, tuple, str, int, float, bool, or ``UNREADABLE`` where a finding was made
-    values: Mapping[KeyPath, Mark]  # place of each value; a block mapping or list stands at its key
-    keys: Mapping[KeyPath, Mark]  # place of each key
+    values: Mapping[KeyPath, SourceMark]  # place of each value; a block mapping or list stands at its key
+    keys: Mapping[KeyPath, SourceMark]  # place of each key
     findings: tuple[Finding, ...]  # what the reader refused; the caller adds its own and raises all at once
     unreadable: frozenset[KeyPath]  # key paths whose value was refused
     changes: Mapping[KeyPath, str] = field(default_factory=dict)
@@ -196,8 +196,8 @@ class _Composer:
 
     file: str
     events: Iterator[Any]
-    values: dict[KeyPath, Mark] = field(default_factory=dict)
-    keys: dict[KeyPath, Mark] = field(default_factory=dict)
+    values: dict[KeyPath, SourceMark] = field(default_factory=dict)
+    keys: dict[KeyPath, SourceMark] = field(default_factory=dict)
     findings: list[Finding] = field(default_factory=list)
     unreadable: set[KeyPath] = field(default_factory=set)
     count: int = 0
@@ -220,7 +220,7 @@ class _Composer:
             raise InputError(f"{self.file}:{_mark(more).line}: expected one YAML document, got a second one")
         return root
 
-    def _value(self, event: Any, path: KeyPath, key_mark: Mark) -> Any:
+    def _value(self, event: Any, path: KeyPath, key_mark: SourceMark) -> Any:
         """Value that begins with an event."""
         self._count(event, len(path))
         is_block = isinstance(event, yaml.CollectionStartEvent) and not event.flow_style
@@ -329,6 +329,6 @@ class _Composer:
         self.findings.append(Finding(line=_mark(event).line, key=key_text(path), text=text))
 
 
-def _mark(event: Any) -> Mark:
+def _mark(event: Any) -> SourceMark:
     """Where an event starts."""
-    return Mark(event.start_mark.line + 1, event.start_mark.column + 1)
+    return SourceMark(event.start_mark.line + 1, event.start_mark.column + 1)

@@ -17,7 +17,7 @@ from cellplan.model.task import Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Step:
+class ScrewStep:
     """One axis on the walk, at the reference configuration, expressed in the part frame P."""
 
     s_P: Array  # unit direction, shape (3,): against the table's direction where the axis is passed from tip to base
@@ -28,14 +28,14 @@ class Step:
     position: float  # where the axis stands, in [rad] or [m]
 
 
-def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Array]:
+def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[ScrewStep], Array]:
     """Axes met on the way from the part to an operator's tool, and that tool at the reference configuration, in P.
 
     The positioner is walked from the part back to its base, so its last axis comes first and each of its axes points
     the other way; then the operator is walked from its base to its tool.
     """
     holder = part_holder(cell)
-    steps: list[Step] = []
+    steps: list[ScrewStep] = []
     if holder is None:
         X_PW = inverse(cell.part.X_CP)
     else:
@@ -49,7 +49,7 @@ def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[Step], Arr
     return steps, X_PB @ robot.model.X_BF @ robot.tool.X_FT
 
 
-def _walk_from_world(cell: Cell, q: Array, name: str) -> tuple[list[Step], Array]:
+def _walk_from_world(cell: Cell, q: Array, name: str) -> tuple[list[ScrewStep], Array]:
     """Axes met on the way from the world to a robot's tool, and that tool at the reference configuration, in W."""
     robot = cell.robot(name)
     return _steps(cell, robot, q, X_PB=robot.X_WB), robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
@@ -88,7 +88,7 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     return J
 
 
-def displaced_screws(steps: list[Step]) -> tuple[Array, Array]:
+def displaced_screws(steps: list[ScrewStep]) -> tuple[Array, Array]:
     r"""Screws of the steps at the configuration, and the displacement of what lies behind the last step.
 
     ``$ = [s; s0 x s]`` for a revolute and ``[0; s]`` for a prismatic axis, angular part first as in the source
@@ -107,12 +107,12 @@ def displaced_screws(steps: list[Step]) -> tuple[Array, Array]:
     return screws, D
 
 
-def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[Step]:
+def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[ScrewStep]:
     """Axes of one robot from base to flange, brought from B to P."""
     columns = cell.columns(robot.name)
     chain = chain_to_flange(robot.model)
     return [
-        Step(
+        ScrewStep(
             s_P=X_PB[:3, :3] @ axis.axis_B,
             s0_P=X_PB[:3, :3] @ axis.point_B + X_PB[:3, 3],
             is_revolute=axis.is_revolute,
@@ -124,9 +124,9 @@ def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[Step]:
     ]
 
 
-def _reversed(step: Step) -> Step:
+def _reversed(step: ScrewStep) -> ScrewStep:
     """The same axis passed from tip to base: what is seen to move is now the base side, the other way."""
-    return Step(
+    return ScrewStep(
         s_P=-step.s_P,
         s0_P=step.s0_P,
         is_revolute=step.is_revolute,

@@ -11,9 +11,20 @@ from cellplan.io.cell.changes import plain_values
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.report import CAUTION
 from cellplan.model.units import DEG, MM, joint_unit
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
-from cellplan.report.plots.figure import Axis, Box, Figure, Item, Key, Mark, Note, Panel, line, outline
+from cellplan.report.plots.figure import (
+    Figure,
+    Item,
+    LegendKey,
+    Note,
+    PlotAxis,
+    PlotBox,
+    PlotMark,
+    PlotPanel,
+    line,
+    outline,
+)
 from cellplan.report.plots.palette import INK, LIMIT, PAPER, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
@@ -199,14 +210,14 @@ def map_figure(record: Record) -> Figure:
     """The figure of a map."""
     half = 0.5 * _step(record)
     x, y = record["x_mm"], record["y_mm"]
-    panel = Panel(
+    panel = PlotPanel(
         title="",
-        y=Axis(low=y[0] - half, high=y[-1] + half, label="y in mm, upward", unit="mm"),
+        y=PlotAxis(low=y[0] - half, high=y[-1] + half, label="y in mm, upward", unit="mm"),
         items=[*_places(record, half), *_things(record), *_best(record)],
     )
     return Figure(
         title=f"{record['cell']}: base of {record['robot']} from above",
-        x=Axis(low=x[0] - half, high=x[-1] + half, label="x in mm", unit="mm"),
+        x=PlotAxis(low=x[0] - half, high=x[-1] + half, label="x in mm", unit="mm"),
         panels=[panel],
         is_plane=True,
         is_exact=True,
@@ -251,7 +262,7 @@ def _places(record: Record, half: float) -> Iterator[Item]:
         first = 0
         for colour, places in groupby(colours):
             last = first + len(list(places)) - 1
-            yield Box((x[first] - half, x[last] + half), (y - half, y + half), colour)
+            yield PlotBox((x[first] - half, x[last] + half), (y - half, y + half), colour)
             first = last + 1
 
 
@@ -275,18 +286,18 @@ def _best(record: Record) -> Iterator[Item]:
         place = record["places"][best["place"]]
         colour = {"passed": PAPER, None: INK}.get((best["certified"] or {}).get("status"), LIMIT)
         size, edge = 6.5 if rank == 0 else 3.5, INK if colour == PAPER else PAPER
-        yield Mark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
+        yield PlotMark(place["x_mm"], place["y_mm"], colour, size=size, edge=edge, is_star=rank == 0)
 
 
-def _legend(record: Record) -> Iterator[Key]:
+def _legend(record: Record) -> Iterator[LegendKey]:
     """What the colours mean, with the number of places of each."""
-    yield Key(f"passes: {record['counts']['passes']}", is_bold=True)
+    yield LegendKey(f"passes: {record['counts']['passes']}", is_bold=True)
     for colour, first, last in cycle_classes(record):
-        yield Key(f"cycle {first:.2f} to {last:.2f} s", colour)
+        yield LegendKey(f"cycle {first:.2f} to {last:.2f} s", colour)
     for verdict, colour in colours_of(record).items():
-        yield Key(f"{TITLES[verdict]}: {record['counts'][verdict]}", colour)
-    yield Key(f"red: {record['robot']} as it stands", ink=LIMIT)
-    yield Key("star: best place, dots: next best")
+        yield LegendKey(f"{TITLES[verdict]}: {record['counts'][verdict]}", colour)
+    yield LegendKey(f"red: {record['robot']} as it stands", ink=LIMIT)
+    yield LegendKey("star: best place, dots: next best")
 
 
 def map_page(record: Record, plot: bytes) -> str:
@@ -335,7 +346,7 @@ def map_tables(record: Record) -> Tables:
     return {"places": listed_table(record, "places"), "best": listed_table(record, "best")}
 
 
-MAP: Final = Kind(
+MAP: Final = ResultKind(
     name="map",
     title="Map of a base",
     file="map.json",

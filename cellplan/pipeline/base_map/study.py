@@ -20,7 +20,7 @@ from cellplan.report.record.common import Record, as_json
 from cellplan.study.folder import RESULT, SCHEMA, write_results
 from cellplan.study.status import Best
 from cellplan.study.study import Study
-from cellplan.study.trial import Trial
+from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Limits, Workers
 
 MODULES: Final = ("cellplan.pipeline.base_map.tiles",)
@@ -82,7 +82,7 @@ def map_study(
         progress("finding starts", 0.0)
         tiles = Tiles.of(ready.job, *ready.starts())
 
-        def propose(finished: Sequence[Trial]) -> Sequence[Mapping[str, Any]]:
+        def propose(finished: Sequence[StudyTrial]) -> Sequence[Mapping[str, Any]]:
             return [] if finished else tiles.values
 
         count = len(tiles.values)

@@ -17,7 +17,7 @@ from cellplan.search.base_map.verdicts import (
     judge,
     verdicts_at_start,
 )
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 SHARES: Final = 4  # [-] of which the number of tiles is a multiple, so that so many workers end together
 PAIRS: Final = frozenset({"joint", "fast", "pair"})  # of names, lists in plain data
@@ -67,12 +67,12 @@ class Tiles:
         return verdicts
 
 
-def evaluate(request: MapRequest, variant: Variant) -> Outcome:
+def evaluate(request: MapRequest, variant: Variant) -> TrialOutcome:
     """Judge the places of a tile."""
     return judged(prepared_request(request).job, variant.values)
 
 
-def judged(job: MapJob, values: Mapping[str, Any]) -> Outcome:
+def judged(job: MapJob, values: Mapping[str, Any]) -> TrialOutcome:
     """What becomes of the places of a tile.
 
     Args:
@@ -84,9 +84,9 @@ def judged(job: MapJob, values: Mapping[str, Any]) -> Outcome:
     figures: dict[str, Any] = {"places": {str(place): _plain(verdict) for place, verdict in sorted(verdicts.items())}}
     passing = best_first(listed)
     if not passing:
-        return Outcome(status=TrialStatus.FAILED, reason="no place passes", figures=figures)
+        return TrialOutcome(status=TrialStatus.FAILED, reason="no place passes", figures=figures)
     best = {"passing": len(passing), "cycle_s": listed[passing[0]].cycle}
-    return Outcome(status=TrialStatus.PASSED, figures={**best, **figures})
+    return TrialOutcome(status=TrialStatus.PASSED, figures={**best, **figures})
 
 
 def _plain(verdict: PlaceVerdict) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from cellplan.report.record.summary import summary_record
 from cellplan.report.record.variant_figures import variant_curves, variant_figures
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 MODE: Final = "motion.mode"
 REPORT: Final = "report.json"
@@ -127,7 +127,7 @@ def first_name(job: CompareJob) -> str:
     return _cell_name(_source(job, job.subjects[0]))
 
 
-def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
+def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:
     """Solve a cell or a mode of it, or read and verify a run.
 
     A mode that has no solution from home to home is solved without these moves, and says that they are missing.
@@ -138,7 +138,7 @@ def evaluate_subject(job: CompareJob, variant: Variant) -> Outcome:
         return _stored_outcome(job, path)
     folder = None if job.runs is None else run_folder(job.runs, variant.number)
 
-    def solved(values: Mapping[str, object]) -> Outcome:
+    def solved(values: Mapping[str, object]) -> TrialOutcome:
         def cell() -> Cell:
             given = with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)
             return given.with_values(values) if values else given
@@ -273,17 +273,17 @@ def _solved_figures(solution: Solution) -> Record:
     return {**variant_figures(record, phases, proof="solved"), "curves": curves}
 
 
-def _stored_outcome(job: CompareJob, path: Path) -> Outcome:
+def _stored_outcome(job: CompareJob, path: Path) -> TrialOutcome:
     """The figures of a run; one whose report lacks some of them is no run of this version."""
     try:
         return _verified_outcome(job, path)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         missing = f"got none or another one for {error}" if isinstance(error, KeyError) else "got something else"
         reason = f"{path / REPORT}: expected every figure of a run of this version, {missing}; solve the cell again"
-        return Outcome(status=TrialStatus.BAD_INPUT, reason=reason, figures={})
+        return TrialOutcome(status=TrialStatus.BAD_INPUT, reason=reason, figures={})
 
 
-def _verified_outcome(job: CompareJob, path: Path) -> Outcome:
+def _verified_outcome(job: CompareJob, path: Path) -> TrialOutcome:
     """The figures of a run, which is verified again where it passed."""
     stored = read_stored_run(path)
     status, proof, clearance = TrialStatus.FAILED, "it failed when it was solved", None
@@ -307,7 +307,7 @@ def _verified_outcome(job: CompareJob, path: Path) -> Outcome:
     curves = variant_curves(stored.record, [stored.series(place) for place in stored.records], clearance)
     figures = variant_figures(stored.record, stored.records, proof=proof)
     reason = failed[0] if failed else ""
-    return Outcome(status=status, reason=reason, figures={**figures, "curves": curves})
+    return TrialOutcome(status=status, reason=reason, figures={**figures, "curves": curves})
 
 
 def _clearance(reports: Sequence[Report]) -> tuple[Array, Array] | None:

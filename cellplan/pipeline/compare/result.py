@@ -8,9 +8,20 @@ import numpy as np
 
 from cellplan.model.report import CAUTION
 from cellplan.pipeline.compare.which_pays import sentences
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
-from cellplan.report.plots.figure import Axis, Box, Curve, Figure, Item, Limit, Note, Panel, time_axis, value_axis
+from cellplan.report.plots.figure import (
+    Figure,
+    Item,
+    Limit,
+    Note,
+    PlotAxis,
+    PlotBox,
+    PlotCurve,
+    PlotPanel,
+    time_axis,
+    value_axis,
+)
 from cellplan.report.plots.palette import PAPER, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
@@ -244,7 +255,7 @@ def _joints(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
             ("velocity_ratio", "highest velocity, in % of its limit"),
         )
     ]
-    x = Axis(low=0.4, high=count + 0.6, label="joint, counted from the base")
+    x = PlotAxis(low=0.4, high=count + 0.6, label="joint, counted from the base")
     return Figure(title="use of the joints", x=x, panels=panels, columns=2)
 
 
@@ -253,7 +264,7 @@ def _percent(use: Record | None, key: str) -> list[float]:
     return [PERCENT * (joint[key] or 0.0) for joint in use["joints"].values()] if use else []
 
 
-def _bars(title: str, values: Mapping[str, Sequence[float]]) -> Panel:
+def _bars(title: str, values: Mapping[str, Sequence[float]]) -> PlotPanel:
     """Bars side by side at each joint; the value of one that is cut off stands on it."""
     top = min(TOP, max(105.0, *(max(bars, default=0.0) for bars in values.values())))
     axis, width = value_axis(0.0, top, unit="%", is_floored=True), BARS / len(values)
@@ -261,10 +272,10 @@ def _bars(title: str, values: Mapping[str, Sequence[float]]) -> Panel:
     for place, (colour, bars) in enumerate(values.items()):
         for joint, value in enumerate(bars, start=1):
             left = joint - 0.5 * BARS + place * width
-            items.append(Box((left, left + width), (0.0, min(value, top)), colour))
+            items.append(PlotBox((left, left + width), (0.0, min(value, top)), colour))
             if value > top:
                 items.append(Note(left + 0.5 * width, top, f"{value:.0f}", PAPER, size=6.0, moved=(0.0, -6.0)))
-    return Panel(title=title, y=axis, items=items)
+    return PlotPanel(title=title, y=axis, items=items)
 
 
 def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
@@ -275,7 +286,7 @@ def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     return Figure(title=title, x=time_axis(np.array([0.0, end])), panels=panels, columns=2)
 
 
-def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
+def _speed_panel(solved: Mapping[str, Any], robot: str) -> PlotPanel:
     """Highest joint speed of one robot in every variant."""
     curves = {
         colour: (
@@ -290,11 +301,11 @@ def _speed_panel(solved: Mapping[str, Any], robot: str) -> Panel:
     top = min(TOP, highest)
     items: list[Item] = [Limit(PERCENT)] if top > PERCENT else []
     items += [
-        Curve(name, np.array(times), np.minimum(values, top), colour)
+        PlotCurve(name, np.array(times), np.minimum(values, top), colour)
         for colour, (name, times, values) in curves.items()
     ]
     note = f"up to {highest:.0f} %" if highest > TOP else ""
-    return Panel(title=robot, note=note, y=value_axis(0.0, top, unit="%", is_floored=True), items=items)
+    return PlotPanel(title=robot, note=note, y=value_axis(0.0, top, unit="%", is_floored=True), items=items)
 
 
 def _distances(solved: Mapping[str, Any]) -> Figure:
@@ -314,10 +325,10 @@ def _distances(solved: Mapping[str, Any]) -> Figure:
     items: list[Item] = []
     if len(required) == 1:
         items.append(Limit(max(required), f"required: {max(required):g} mm", is_upper=False))
-    items += [Curve(name, times, values, colour) for colour, (name, times, values) in curves.items()]
+    items += [PlotCurve(name, times, values, colour) for colour, (name, times, values) in curves.items()]
     axis = value_axis(0.0, max(highest, *required), unit="mm", is_floored=True)
     title = "smallest distance of all bodies over time, certified between the rows"
-    panel = Panel(title="distance, in mm", y=axis, items=items)
+    panel = PlotPanel(title="distance, in mm", y=axis, items=items)
     return Figure(title=title, x=time_axis(np.array([0.0, end])), panels=[panel])
 
 
@@ -382,7 +393,7 @@ def comparison_tables(record: Record) -> Tables:
     }
 
 
-COMPARISON: Final = Kind(
+COMPARISON: Final = ResultKind(
     name="comparison",
     title="Comparison",
     tables=comparison_tables,

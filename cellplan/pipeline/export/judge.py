@@ -17,7 +17,7 @@ from cellplan.pipeline.export.compare_rows import other_rows
 from cellplan.pipeline.export.judge_path import PathRows, path_findings, path_rows
 from cellplan.pipeline.export.judge_speeds import joint_findings, motion_findings, position_findings
 from cellplan.pipeline.export.part_errors import ToolsOnPart
-from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
 from cellplan.pipeline.export.rows import full_rows
 from cellplan.pipeline.export.shared import Shared, played_digest
 from cellplan.scene.scene import Scene
@@ -105,11 +105,11 @@ def judge(
 
 def played_programs(
     run: VerifiedRun, dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows], *, lead: float
-) -> Iterator[Played]:
+) -> Iterator[ExecutedProgram]:
     """The programs as targets play them."""
     by_name = {program.name: program for program in full_rows(run)}
     for written, recovered in zip(job.programs, read, strict=True):
-        yield Played.of(
+        yield ExecutedProgram.of(
             run,
             by_name[written.name],
             (recovered, written),
@@ -120,7 +120,7 @@ def played_programs(
 
 
 def _judged_once(
-    played: Played, shared: Shared, dialect: Dialect, job: ExportJob
+    played: ExecutedProgram, shared: Shared, dialect: Dialect, job: ExportJob
 ) -> tuple[tuple[str, ...], tuple[Deviation, ...], tuple[Deviation, ...]]:
     """Findings, deviations and corners of one program, kept for programs that are played and judged alike."""
 
@@ -132,7 +132,9 @@ def _judged_once(
     return shared.once((played_digest(played), promise, _is_played(dialect, promise), job.blend), judgement)
 
 
-def _program_findings(played: Played, scenes: Sequence[Scene], dialect: Dialect, job: ExportJob) -> Iterator[str]:
+def _program_findings(
+    played: ExecutedProgram, scenes: Sequence[Scene], dialect: Dialect, job: ExportJob
+) -> Iterator[str]:
     """Everything that is judged of one program."""
     yield from position_findings(played)
     promise = job.frame.promise
@@ -152,7 +154,7 @@ def _is_played(dialect: Dialect, promise: Promise) -> bool:
     return promise is Promise.TIMED and (dialect.at_cycle or not dialect.is_thinned)
 
 
-def _held_findings(played: Played, stretch: Stretch) -> Iterator[str]:
+def _held_findings(played: ExecutedProgram, stretch: ExecutedStretch) -> Iterator[str]:
     """Robots that must stand still in a phase and are not where they stand in the run."""
     times = played.grid(stretch.begin, stretch.end)
     q = played.at(times)
@@ -167,19 +169,19 @@ def _held_findings(played: Played, stretch: Stretch) -> Iterator[str]:
             )
 
 
-def _path_findings(played: Played, scenes: Sequence[Scene]) -> Iterator[str]:
+def _path_findings(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[str]:
     """What the cell demands of the path in all phases, and the rows do not keep."""
     for where, rows in _path_rows(played, scenes):
         yield from (where + finding for finding in path_findings(rows))
 
 
-def _path_rows(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[str, PathRows]]:
+def _path_rows(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[str, PathRows]]:
     """The path in every phase, with what its findings begin with."""
     for stretch, scene in _judged(played, scenes):
         yield f"{stretch.motion.name}: " if stretch.motion.name else "", path_rows(played, stretch, scene)
 
 
-def _judged(played: Played, scenes: Sequence[Scene]) -> Iterator[tuple[Stretch, Scene]]:
+def _judged(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[ExecutedStretch, Scene]]:
     """Phases with their scenes; a phase that is played as in a cycle before is left out."""
     known: dict[int, list[Mapping[str, Array]]] = {}
     for stretch in played.stretches():
@@ -196,7 +198,7 @@ def _is_same(one: Mapping[str, Array], other: Mapping[str, Array]) -> bool:
     return all(one[name].shape == other[name].shape and np.all(np.abs(one[name] - other[name]) <= SAME) for name in one)
 
 
-def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+def _deviations(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Deviation]:
     """How far a program is from the rows of the run, between which joints move evenly."""
     run = played.run
     times = played.grid(0.0, played.end)
@@ -233,7 +235,7 @@ def _deviations(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
                 yield Deviation(subject=name, largest=largest, unit=unit, at_s=at_s, phase=phase)
 
 
-def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
+def _corners(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[Deviation]:
     """By how much rounded rows may put the tools off, beside what they are off already."""
     if not any(np.any(shares > 0.0) for shares in played.shares.values()):
         return
@@ -253,7 +255,7 @@ def _corners(played: Played, scenes: Sequence[Scene]) -> Iterator[Deviation]:
                 )
 
 
-def _rounded(programs: Sequence[Played]) -> tuple[int, int]:
+def _rounded(programs: Sequence[ExecutedProgram]) -> tuple[int, int]:
     """Rows that are rounded, and all rows, of the robots that are exported."""
     shares = [played.shares[name] for played in programs for name in played.exported]
     return sum(int(np.count_nonzero(share)) for share in shares), sum(map(len, shares))

@@ -28,7 +28,7 @@ from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy, ToolDept
 from cellplan.model.task import Task
 from cellplan.model.units import MM
 from cellplan.pipeline.export.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
-from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
 from cellplan.pipeline.export.schedule_at import schedule_at
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -85,7 +85,7 @@ class PathRows:
         return depths
 
 
-def path_rows(played: Played, stretch: Stretch, scene: Scene) -> PathRows:
+def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, scene: Scene) -> PathRows:
     """The path of a program in one of its phases."""
     times = played.grid(stretch.begin, stretch.end, with_corners=True)
     return PathRows(

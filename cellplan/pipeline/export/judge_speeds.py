@@ -18,7 +18,7 @@ from cellplan.model.acceleration import MotionAccelerations
 from cellplan.model.cell import Robot
 from cellplan.model.exported import Interpolation
 from cellplan.model.report import Check
-from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
 from cellplan.pipeline.export.rows import times_of
 from cellplan.pipeline.export.schedule_at import schedule_at
 from cellplan.scene.scene import Scene
@@ -28,7 +28,7 @@ JERK: Final = "joint_jerk"
 EVEN: Final = 1e-6  # [-] of a step by which times of even rows may differ
 
 
-def position_findings(played: Played) -> Iterator[str]:
+def position_findings(played: ExecutedProgram) -> Iterator[str]:
     """Rows beyond the limits of a joint, or cubics that pass one between rows."""
     for name in played.exported:
         robot, rows = played.run.cell.robot(name), played.rows[name]
@@ -42,7 +42,7 @@ def position_findings(played: Played) -> Iterator[str]:
         yield from _failed([*checks, *check_shown(robot, times_of(rows), rows.q)], played.phase_at)
 
 
-def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
+def joint_findings(played: ExecutedProgram, *, accelerations: bool) -> Iterator[str]:
     """Speeds beyond the limits of a joint, and accelerations where they are what a controller plays.
 
     Args:
@@ -63,7 +63,7 @@ def joint_findings(played: Played, *, accelerations: bool) -> Iterator[str]:
             yield from _failed(judged, played.phase_at)
 
 
-def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[str]:
+def motion_findings(played: ExecutedProgram, stretch: ExecutedStretch, scene: Scene) -> Iterator[str]:
     """Feeds of tools, their speeds in the world, loads and the acceleration of the part in one phase.
 
     They are taken at even times, as far apart as the rows of the run, or as the rows of the slowest cycle where these
@@ -85,7 +85,7 @@ def motion_findings(played: Played, stretch: Stretch, scene: Scene) -> Iterator[
     yield from _failed(checks, lambda _: stretch.motion.name or "")
 
 
-def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
+def _as_played(played: ExecutedProgram, robot: Robot) -> tuple[Array, Array]:
     """Times and positions at which the speeds of a robot count: its rows, or a cubic on its controller's cycle."""
     rows = played.rows[robot.name]
     times = times_of(rows)
@@ -96,7 +96,7 @@ def _as_played(played: Played, robot: Robot) -> tuple[Array, Array]:
     return fine, played.curve(robot.name).at(fine)
 
 
-def _jumps(played: Played) -> Array:
+def _jumps(played: ExecutedProgram) -> Array:
     """Times in [s] of the played program at which the desired speed of a tool jumps."""
     schedules = ((stretch.begin, stretch.motion.schedule) for stretch in played.stretches())
     jumps = [begin + desired_jumps(schedule) for begin, schedule in schedules if schedule.is_continuous]

@@ -26,7 +26,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Relation
 from cellplan.model.exported import Interpolation, RobotRows
 from cellplan.model.task import Frame, Task
-from cellplan.pipeline.export.played import Played
+from cellplan.pipeline.export.played import ExecutedProgram
 from cellplan.pipeline.export.rows import times_of
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
@@ -70,7 +70,7 @@ def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
     return between
 
 
-def all_corners(played: Played, times: Array) -> Array:
+def all_corners(played: ExecutedProgram, times: Array) -> Array:
     """As ``corners_at`` of all robots of a program, shape (M, nq)."""
     corners = []
     for robot in played.run.cell.robots:
@@ -81,12 +81,12 @@ def all_corners(played: Played, times: Array) -> Array:
     return np.concatenate(corners, axis=1)
 
 
-def robot_corners(played: Played) -> dict[str, Array]:
+def robot_corners(played: ExecutedProgram) -> dict[str, Array]:
     """How far each exported robot may be off at its rows by rounding, in [rad] or [m], shape (N, n), by robot."""
     return {name: np.abs(corner_vectors(played.rows[name], played.shares[name])) for name in played.exported}
 
 
-def off_chords(played: Played, times: Array) -> Array:
+def off_chords(played: ExecutedProgram, times: Array) -> Array:
     """How far joints that run a cubic may be off straight motion between times, in [rad] or [m], shape (M - 1, nq).
 
     Args:

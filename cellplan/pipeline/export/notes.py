@@ -5,14 +5,14 @@ from typing import Final
 
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.judge import Deviation, Judgement
-from cellplan.pipeline.export.prepare import Prepared
+from cellplan.pipeline.export.prepare import PreparedExport
 from cellplan.pipeline.export.skew import skew_text
 
 READ_BACK: Final = "read back by cellplan's own reader, not by the maker's controller"
 NOISE: Final = 1e-6  # [deg] or [mm] deviations below it differ from processor to processor
 
 
-def export_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> tuple[str, ...]:
+def export_notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> tuple[str, ...]:
     """Notes for the head of every file, of any characters.
 
     Args:
@@ -22,7 +22,7 @@ def export_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> 
     return tuple(_notes(run, prepared, judgement))
 
 
-def _notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Iterator[str]:
+def _notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> Iterator[str]:
     promised = prepared.promised
     yield f"cell {run.cell.name}, format {prepared.dialect.name}"
     yield f"promise: {promised.promise}"
@@ -40,7 +40,7 @@ def _notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Iterat
     yield READ_BACK
 
 
-def skew_lines(prepared: Prepared) -> Iterator[str]:
+def skew_lines(prepared: PreparedExport) -> Iterator[str]:
     """What the start skew may be."""
     if prepared.skew is not None:
         least = prepared.skew.least

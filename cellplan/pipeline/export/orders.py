@@ -38,7 +38,7 @@ Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+class OrderStretch:
     """Rows between two neighbouring marks, within which every order of the robots is certified.
 
     Attributes:
@@ -58,7 +58,7 @@ class Orders:
     """The marks of a program."""
 
     program: str | None  # name of the program; None for the only one
-    stretches: tuple[Stretch, ...]  # what lies between them, in order
+    stretches: tuple[OrderStretch, ...]  # what lies between them, in order
     times: tuple[float, ...]  # times of the marks in [s] in the run
 
     @property
@@ -78,8 +78,8 @@ def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[
     """
     scenes, orders = scenes_of(run), []
     for program in run_programs(run):
-        known: dict[int, list[Stretch]] = {}
-        stretches: list[Stretch] = []
+        known: dict[int, list[OrderStretch]] = {}
+        stretches: list[OrderStretch] = []
         for count, phase in enumerate(program.phases):
             progress(STAGE, count / len(program.phases))
             if phase.last == phase.first:
@@ -183,7 +183,7 @@ class PhaseSearch:
             for name, q in self._q.items()
         }
 
-    def stretches(self) -> Iterator[Stretch]:
+    def stretches(self) -> Iterator[OrderStretch]:
         """The stretches of the phase: the longest from its first row on that is clear, and so on."""
         pairs = tuple(combinations(self._q, 2))
         first = 0
@@ -194,7 +194,7 @@ class PhaseSearch:
             if blocked:
                 last = self._farthest(first, blocked)
                 bounds = self._bounds(first, last, pairs)
-            yield Stretch(
+            yield OrderStretch(
                 phase=self._phase.name,
                 place=self._phase.place,
                 first=self._phase.first + first,
@@ -241,7 +241,9 @@ def _region(q: dict[str, Array], pair: Pair) -> ClockRegion:
     return ClockRegion(first=pair[0], second=pair[1], rectangles=np.array([[0.0, last[0], 0.0, last[1]]]))
 
 
-def _positions(cell: Cell, program: RunProgram, rows: ProgramRows, count: int, stretch: Stretch) -> dict[str, Array]:
+def _positions(
+    cell: Cell, program: RunProgram, rows: ProgramRows, count: int, stretch: OrderStretch
+) -> dict[str, Array]:
     """Rows of every robot between two marks: as they were read, or those of the run where it is not exported."""
     positions = {}
     for robot in cell.robots:

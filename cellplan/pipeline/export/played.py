@@ -19,7 +19,7 @@ MOST_PARTS: Final = 10  # [-] of a step of a cubic curve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stretch:
+class ExecutedStretch:
     """One phase of a played program."""
 
     place: int  # place of its motion among those of the run
@@ -29,7 +29,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Played:
+class ExecutedProgram:
     """One program as it is played: rows that were read, with those of the run for robots that are not exported.
 
     Attributes:
@@ -54,7 +54,7 @@ class Played:
         shares: Mapping[str, Array],
         interpolation: Interpolation,
         lead: float,
-    ) -> "Played":
+    ) -> "ExecutedProgram":
         """A program that was read.
 
         Args:
@@ -131,11 +131,11 @@ class Played:
         times: Array = next(iter(tables.values())).times + self.lead
         return times
 
-    def stretches(self) -> Iterator[Stretch]:
+    def stretches(self) -> Iterator[ExecutedStretch]:
         """All phases in their order, those of all cycles."""
         run = self.run
         if run.cell.program is None:
-            yield Stretch(
+            yield ExecutedStretch(
                 place=self.place, motion=run.motions[self.place], begin=self.lead, end=float(self.run_times[-1])
             )
             return
@@ -143,7 +143,7 @@ class Played:
             place, rows = number % len(run.motions), run.motion.rows(phase)
             begin, end = self.run_times[rows.start], self.run_times[rows.stop - 1]
             if end > begin:
-                yield Stretch(place=place, motion=run.motions[place], begin=float(begin), end=float(end))
+                yield ExecutedStretch(place=place, motion=run.motions[place], begin=float(begin), end=float(end))
 
     def phase_at(self, at_s: float | None) -> str:
         """Name of the phase at a time in [s] of the played program; empty for a program of one, or without a time."""

@@ -31,7 +31,7 @@ BOTH: tuple[Promise, ...] = (Promise.TIMED, Promise.SYNCHRONISED)  # promises th
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Prepared:
+class PreparedExport:
     """What a format is to write.
 
     Attributes:
@@ -53,7 +53,7 @@ class Prepared:
 
 def prepare(
     run: VerifiedRun, dialect: Dialect, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
-) -> Prepared:
+) -> PreparedExport:
     """Choose promise, marks and rows of an export.
 
     Args:
@@ -82,7 +82,7 @@ def prepare(
         finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
         other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
         job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
-    return Prepared(
+    return PreparedExport(
         dialect=dialect,
         job=job,
         promised=promised,

@@ -11,8 +11,8 @@ from cellplan.model.report import CAUTION
 from cellplan.model.units import MM
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.notes import deviation_line, deviation_records, skew_lines
-from cellplan.pipeline.export.orders import Orders, Stretch
-from cellplan.pipeline.export.prepare import Prepared
+from cellplan.pipeline.export.orders import Orders, OrderStretch
+from cellplan.pipeline.export.prepare import PreparedExport
 from cellplan.pipeline.export.skew import PER_SECOND
 from cellplan.pipeline.export.written import Written
 from cellplan.pipeline.write_run import versions
@@ -22,7 +22,7 @@ SCHEMA: Final = "cellplan.export/2"
 Record = dict[str, Any]
 
 
-def export_record(run: VerifiedRun, prepared: Prepared, written: Written) -> Record:
+def export_record(run: VerifiedRun, prepared: PreparedExport, written: Written) -> Record:
     """What ``export.json`` says of an export by a dialect."""
     frame = written.job.frame
     about = {
@@ -84,7 +84,7 @@ def _record(run: VerifiedRun, name: str, about: Record, files: Mapping[str, str]
     }
 
 
-def _skew(prepared: Prepared) -> Record | None:
+def _skew(prepared: PreparedExport) -> Record | None:
     """What the start skew may be; None where no other controller shares the run, or no time is promised."""
     if prepared.skew is None:
         return None
@@ -117,7 +117,7 @@ def _marks(orders: Orders, place: int, written: Written) -> Record:
     }
 
 
-def _stretch(stretch: Stretch) -> Record:
+def _stretch(stretch: OrderStretch) -> Record:
     """What was certified between two marks."""
     return {
         "phase": stretch.phase,

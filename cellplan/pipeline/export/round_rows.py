@@ -28,7 +28,7 @@ from cellplan.pipeline.export.judge import played_programs
 from cellplan.pipeline.export.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows
 from cellplan.pipeline.export.margins import body_reach, corner_vectors, robot_corners
 from cellplan.pipeline.export.orders import Orders, blocked_orders
-from cellplan.pipeline.export.played import Played, Stretch
+from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
 from cellplan.pipeline.export.rows import times_of
 from cellplan.pipeline.export.schedule_at import schedule_at
 from cellplan.pipeline.export.shared import Shared
@@ -96,7 +96,7 @@ def stops_left(job: ExportJob) -> tuple[int, int]:
 class _Choice:
     """The shares of one program while they are chosen."""
 
-    def __init__(self, job: ExportJob, program: ProgramRows, played: Played, shared: Shared) -> None:
+    def __init__(self, job: ExportJob, program: ProgramRows, played: ExecutedProgram, shared: Shared) -> None:
         self._job, self._given, self._played, self._shared = job, program, played, shared
         self._free = may_round(program, job.frame.promise)
         self._chosen = {name: np.where(free, SHARES[0], 0.0) for name, free in self._free.items()}
@@ -146,7 +146,7 @@ class _Choice:
                 }
                 self._limit(between, self._shared.scene, reach)
 
-    def _round(self, stretch: Stretch, scene: Scene, inside: Mapping[str, slice]) -> None:
+    def _round(self, stretch: ExecutedStretch, scene: Scene, inside: Mapping[str, slice]) -> None:
         """Choose the shares of a phase."""
         begun = {name: self._chosen[name][rows].copy() for name, rows in inside.items()}
         for margin in ROOMS:
@@ -163,7 +163,7 @@ class _Choice:
                 return
         self._limit(inside, scene, 0.0)
 
-    def _keep_tools(self, stretch: Stretch, scene: Scene, reserve: float) -> bool:
+    def _keep_tools(self, stretch: ExecutedStretch, scene: Scene, reserve: float) -> bool:
         """Lower shares until no tool leaves a share of what is allowed; whether all is kept then, between rows too."""
         allowed: dict[str, float] = {}
         for _ in range(len(SHARES) * 4):
@@ -177,7 +177,7 @@ class _Choice:
                 return keeps_tools(rows)
         return False
 
-    def _lower_depths(self, stretch: Stretch, rows: PathRows, known: dict[str, float], reserve: float) -> bool:
+    def _lower_depths(self, stretch: ExecutedStretch, rows: PathRows, known: dict[str, float], reserve: float) -> bool:
         """Lower the shares of rows at which a tool may be deeper by more than it may; whether there were any."""
         if not known:
             known |= {task.name: limit - depth for task, depth, limit in straight_depths(rows)}
@@ -225,12 +225,12 @@ class _Choice:
         """Share within which each row counts as rounded, by robot."""
         return row_shares(self._job, self.program)
 
-    def _rows(self, stretch: Stretch, scene: Scene) -> PathRows:
+    def _rows(self, stretch: ExecutedStretch, scene: Scene) -> PathRows:
         """The path of a phase with the shares chosen so far."""
         return path_rows(replace(self._played, shares=self._shares()), stretch, scene)
 
 
-def _inside(times: Array, stretch: Stretch) -> slice:
+def _inside(times: Array, stretch: ExecutedStretch) -> slice:
     """Rows in a phase, both ends included, from their times in [s], shape (N,)."""
     first, last = np.searchsorted(times, [stretch.begin - SAME_TIME, stretch.end + SAME_TIME])
     return slice(int(first), int(last))

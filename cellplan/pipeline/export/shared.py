@@ -10,7 +10,7 @@ import numpy as np
 from cellplan.model.progress import Progress, silent
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.orders import Orders, certified_orders
-from cellplan.pipeline.export.played import Played
+from cellplan.pipeline.export.played import ExecutedProgram
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.scene.scene import Scene
 
@@ -61,7 +61,7 @@ class Shared:
         return known
 
 
-def played_digest(played: Played) -> str:
+def played_digest(played: ExecutedProgram) -> str:
     """SHA-256 of all that a played program is, besides its run: equal digests are played alike to the last bit."""
     state = hashlib.sha256()
     about = (played.place, str(played.interpolation), played.exported, played.lead.hex())

@@ -65,7 +65,7 @@ def thinned(
     """
     robots = {name: rows for group in groups for name, rows in program.robots.items() if name in group}
     sets = [
-        _Group(scene, [robots[name] for name in group if name in robots], limits, essential_rows.rows)
+        _RowGroup(scene, [robots[name] for name in group if name in robots], limits, essential_rows.rows)
         for group in groups
         if any(name in robots for name in group)
     ]
@@ -79,7 +79,7 @@ def thinned(
     return replace(program, robots=thinned_rows)
 
 
-class _Group:
+class _RowGroup:
     """Robots that share rows, and the rows chosen so far."""
 
     def __init__(
@@ -185,7 +185,9 @@ class _Group:
         return row
 
 
-def _split_by_tools(scene: Scene, program: ProgramRows, groups: Sequence[_Group], *, work: Sequence[WorkRows]) -> None:
+def _split_by_tools(
+    scene: Scene, program: ProgramRows, groups: Sequence[_RowGroup], *, work: Sequence[WorkRows]
+) -> None:
     """Choose rows until the tools and further holders keep their tolerances on the part in all phases.
 
     Where several groups move a tool, each has an equal share of its tolerance, with the others as they are in the run:

@@ -16,7 +16,7 @@ from cellplan.pipeline.export.margins import robot_corners
 from cellplan.pipeline.export.notes import export_notes
 from cellplan.pipeline.export.orders import certify_written
 from cellplan.pipeline.export.part_targets import joints_of_part_poses
-from cellplan.pipeline.export.prepare import Prepared, is_at_cycle
+from cellplan.pipeline.export.prepare import PreparedExport, is_at_cycle
 
 STAGE: Final = "checking what was written"
 RATIO_NOISE: Final = 1e-9  # [-] of a step that is the cycle of a controller
@@ -31,7 +31,7 @@ class Written:
     judgement: Judgement  # what was found in what was read back
 
 
-def write(run: VerifiedRun, prepared: Prepared, *, progress: Progress = silent) -> Written:
+def write(run: VerifiedRun, prepared: PreparedExport, *, progress: Progress = silent) -> Written:
     """Render the files of an export, read them back, and judge what was read; then say so in their heads.
 
     Args:
@@ -49,7 +49,7 @@ def write(run: VerifiedRun, prepared: Prepared, *, progress: Progress = silent) 
     return written
 
 
-def with_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Written:
+def with_notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> Written:
     """The files of an export that say in their heads what was found in them.
 
     Args:
@@ -60,7 +60,7 @@ def with_notes(run: VerifiedRun, prepared: Prepared, judgement: Judgement) -> Wr
     return Written(job=job, files=prepared.dialect.render(job), judgement=judgement)
 
 
-def read_files(prepared: Prepared, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+def read_files(prepared: PreparedExport, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """What the reader of the format finds in files.
 
     Raises:
@@ -70,7 +70,7 @@ def read_files(prepared: Prepared, files: Mapping[str, str]) -> tuple[ProgramRow
 
 
 def judged(
-    run: VerifiedRun, prepared: Prepared, read: tuple[ProgramRows, ...], *, progress: Progress = silent
+    run: VerifiedRun, prepared: PreparedExport, read: tuple[ProgramRows, ...], *, progress: Progress = silent
 ) -> Judgement:
     """Make all checks on what was read.
 
@@ -98,7 +98,7 @@ def judged(
     return judgement
 
 
-def _unresolved(run: VerifiedRun, prepared: Prepared, findings: Sequence[str]) -> Iterator[str]:
+def _unresolved(run: VerifiedRun, prepared: PreparedExport, findings: Sequence[str]) -> Iterator[str]:
     """A detail of findings of accelerations: steps of the run that are longer than the cycle of a controller."""
     shortest = min(cycle_of(run.cell.robot(name)) for name in prepared.job.frame.robots)
     step = run.cell.motion.step
@@ -107,7 +107,7 @@ def _unresolved(run: VerifiedRun, prepared: Prepared, findings: Sequence[str]) -
         yield f"  motion.step_s: {step:g} is stated; steps of {shortest:g}, a controller's cycle, resolve accelerations"
 
 
-def _stated_coarsely(run: VerifiedRun, prepared: Prepared) -> Iterator[str]:
+def _stated_coarsely(run: VerifiedRun, prepared: PreparedExport) -> Iterator[str]:
     """Details of findings: what the cell states of the robots that makes rows coarse."""
     dialect, robots = prepared.dialect, [run.cell.robot(name) for name in prepared.job.frame.robots]
     for robot in robots if dialect.kinds else ():

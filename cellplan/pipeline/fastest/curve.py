@@ -13,7 +13,7 @@ from cellplan.pipeline.fastest.scaling import scaled_values, steps_within, whole
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.report.record.figures import LOAD
 from cellplan.study.run import outcomes
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 LONGEST: Final = 3.0  # [-] times the shortest cycle: where the curve ends
 
@@ -83,10 +83,10 @@ def _values(base: Cell, shortest: TimedProgram, factor: float) -> dict[str, obje
     return scaled_values(scaled, whole_steps(scaled, factor))
 
 
-def _outcome(base: Cell, laws: Sequence[Law], task: str | None, variant: Variant) -> Outcome:
+def _outcome(base: Cell, laws: Sequence[Law], task: str | None, variant: Variant) -> TrialOutcome:
     """One point; why there is none becomes its reason."""
     try:
         program = TimedProgram.solved(base, laws[variant.number], variant.values, task=task, progress=silent)
     except (InputError, NoSolutionError) as error:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
-    return Outcome(status=TrialStatus.PASSED, reason="", figures=program.figures.record(LOAD))
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
+    return TrialOutcome(status=TrialStatus.PASSED, reason="", figures=program.figures.record(LOAD))

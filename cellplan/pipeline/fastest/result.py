@@ -17,9 +17,9 @@ from cellplan.pipeline.fastest.shortest import ShortestCycles
 from cellplan.pipeline.fastest.timed_program import BINDS, TimedProgram
 from cellplan.pipeline.write_run import versions, write_run
 from cellplan.report.page.figures import figure
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
-from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Limit, Mark, Panel, value_axis
+from cellplan.report.plots.figure import Figure, Item, Limit, PlotAxis, PlotCurve, PlotMark, PlotPanel, value_axis
 from cellplan.report.plots.palette import INK, ROBOTS
 from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.columns import csv_text, page_cells, page_headings, terminal_table
@@ -286,13 +286,13 @@ def curve_figures(record: Record) -> dict[str, Figure]:
     cycles = [point["cycle_time_s"] for points in curves.values() for point in points]
     if "demand" in marked:
         cycles.append(marked["demand"]["cycle_time_s"])
-    x = Axis(low=min(cycles), high=max(cycles), label="cycle time in s", unit="s")
+    x = PlotAxis(low=min(cycles), high=max(cycles), label="cycle time in s", unit="s")
     seen = {name: one for name, one in marked.items() if x.low <= one["cycle_time_s"] <= x.high}
     panels = {key: _panel(key, curves, seen) for key in PLOTTED}
     return {key: Figure(title="", x=x, panels=[it], width=NARROW) for key, it in panels.items() if it is not None}
 
 
-def _panel(key: str, curves: Mapping[str, list[Record]], marked: Mapping[str, Record]) -> Panel | None:
+def _panel(key: str, curves: Mapping[str, list[Record]], marked: Mapping[str, Record]) -> PlotPanel | None:
     """Limit, curves and single programs of one quantity; None where no program has it."""
     shown = SHOWN[key]
     items: list[Item] = [] if shown.limit is None else [Limit(shown.limit, shown.limit_name, is_shaded=False)]
@@ -301,13 +301,13 @@ def _panel(key: str, curves: Mapping[str, list[Record]], marked: Mapping[str, Re
         pairs = [(point["cycle_time_s"], shown.percent * point[key]) for point in points if point[key] is not None]
         if law in curves and pairs:
             at_s, heights = np.array(pairs).T
-            items.append(Curve(law, at_s, heights, COLOURS[law]))
-        items += [Mark(at_one, value, COLOURS[law]) for at_one, value in pairs]
+            items.append(PlotCurve(law, at_s, heights, COLOURS[law]))
+        items += [PlotMark(at_one, value, COLOURS[law]) for at_one, value in pairs]
         values += [value for _, value in pairs]
     if not values:
         return None
     axis = value_axis(min(0.0, *values), max(*values, shown.limit or 0.0), is_floored=True)
-    return Panel(title=shown.plot, y=axis, items=items)
+    return PlotPanel(title=shown.plot, y=axis, items=items)
 
 
 def fastest_page(record: Record) -> str:
@@ -388,7 +388,7 @@ def write_fastest(cycles: ShortestCycles, folder: Path, *, progress: Progress = 
     return record
 
 
-FASTEST: Final = Kind(
+FASTEST: Final = ResultKind(
     name="fastest",
     title="Shortest cycles",
     file="fastest.json",

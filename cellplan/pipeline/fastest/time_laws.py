@@ -20,7 +20,7 @@ DIGITS: Final = 4  # of the greatest feed that holds
 
 
 @dataclass(slots=True)
-class Bracket:
+class RootBracket:
     """Whole numbers from below and above, the largest that fails and the smallest that is known to hold."""
 
     fails: int = 0
@@ -85,7 +85,7 @@ def from_both_sides(
         at: The program in a number of steps; a ``TooFewStepsError`` says that a task needs more of them.
         demanded_share: How many times as long a program must last, at most 1 where it keeps its limits.
     """
-    best, now, bracket = None, first, Bracket()
+    best, now, bracket = None, first, RootBracket()
     share = demanded_share(first)
     for trial in range(MOST_TRIALS):
         bracket.note(number, holds=share <= 1.0)
@@ -142,7 +142,7 @@ def _at_greatest_feed(
     """
     feed = MM * (task.feed or 0.0)
     unit = 10.0 ** (np.floor(np.log10(feed)) - DIGITS + 1)
-    highest, less, bracket, best = int(np.floor(feed / unit + NEAR)), 0, Bracket(), None
+    highest, less, bracket, best = int(np.floor(feed / unit + NEAR)), 0, RootBracket(), None
     for trial in range(MOST_TRIALS):
         load = program.load_of(robot)
         bracket.note(less, holds=load <= 1.0)

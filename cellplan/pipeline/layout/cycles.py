@@ -6,17 +6,17 @@ from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values, whole_steps
 from cellplan.pipeline.fastest.time_laws import from_both_sides
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
-from cellplan.pipeline.layout.prepared import Prepared
-from cellplan.search.programs.objective import Objective, Timing
+from cellplan.pipeline.layout.prepared import PreparedSearch
+from cellplan.search.programs.objective import CycleTiming, Objective
 
 
-def is_scaled(ready: Prepared) -> bool:
+def is_scaled(ready: PreparedSearch) -> bool:
     """Whether the motion is made as fast as the limits allow as a whole."""
-    return ready.request.objective is Objective.CYCLE and ready.request.timing is Timing.LAWS
+    return ready.request.objective is Objective.CYCLE and ready.request.timing is CycleTiming.LAWS
 
 
 def draft(
-    ready: Prepared, cell: Cell, cycle: float, progress: Progress, early: EarlyClearance | None = None
+    ready: PreparedSearch, cell: Cell, cycle: float, progress: Progress, early: EarlyClearance | None = None
 ) -> TimedProgram:
     """The program of a layout in a cycle, or at the duration of the cell, or retimed; verified but for its clearance.
 
@@ -28,7 +28,7 @@ def draft(
         early: Begins with its clearance at once, unless its duration may still change.
     """
     is_cycle = ready.request.objective is Objective.CYCLE
-    if ready.request.timing is Timing.RETIMED:
+    if ready.request.timing is CycleTiming.RETIMED:
         timing: object = "fastest" if is_cycle else {"cycle_s": ready.duration}
         law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED
         values = {"motion.timing": timing}
@@ -38,7 +38,7 @@ def draft(
     return scaled(cell, whole_steps(cell, cycle / ready.duration), progress)
 
 
-def shortest(ready: Prepared, cell: Cell, program: TimedProgram, progress: Progress) -> TimedProgram:
+def shortest(ready: PreparedSearch, cell: Cell, program: TimedProgram, progress: Progress) -> TimedProgram:
     """The program in the shortest cycle that its limits allow, from that in another cycle; see ``draft``."""
     step = cell.motion.step
 

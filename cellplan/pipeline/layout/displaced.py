@@ -19,13 +19,13 @@ from cellplan.pipeline.fastest.scaling import scaled_values
 from cellplan.pipeline.fastest.timed_program import Law, TimedProgram
 from cellplan.pipeline.layout.cycles import load_of, required_time
 from cellplan.pipeline.layout.finish import margin_of, rejection_of
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, prepared
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import run
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class DisplacedLayout:
     components: tuple[int, ...]  # their components, see ``BaseDisplacements``
     factor: float | None  # how many times as long as in the cell everything takes; None for as long as there
 
-    def cell(self, ready: Prepared, d: Array, start: Array) -> Cell:
+    def cell(self, ready: PreparedSearch, d: Array, start: Array) -> Cell:
         """The cell of the file with displacements of shape (m,), and with the start posture near a given one, (nq,).
 
         Raises:
@@ -58,7 +58,7 @@ class DisplacedLayout:
         return of.cell(d, motion.q[0, 0])
 
 
-def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
+def verified(layout: DisplacedLayout, variant: Variant) -> TrialOutcome:
     """Plan and verify a layout with one displacement: every check of the cell and the margins of the search.
 
     Distances are proved to be kept; the smallest ones are not searched for.
@@ -79,16 +79,16 @@ def verified(layout: DisplacedLayout, variant: Variant) -> Outcome:
             program = program.certified(silent, EarlyClearance())
             reason = rejection_of(program, ready.variables) or "distances are not certified"
     except (InputError, NoSolutionError) as error:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     figures = {
         "load": max(load_of(program), required_time(program)),
         "margin_deg": margin_of(program),
         "is_apart": is_apart,
     }
-    return Outcome(status=TrialStatus.FAILED if reason else TrialStatus.PASSED, reason=reason, figures=figures)
+    return TrialOutcome(status=TrialStatus.FAILED if reason else TrialStatus.PASSED, reason=reason, figures=figures)
 
 
-def _job(ready: Prepared) -> Job:
+def _job(ready: PreparedSearch) -> Job:
     """The job at the nodes of the trials.
 
     Raises:

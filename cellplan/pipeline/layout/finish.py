@@ -23,14 +23,14 @@ from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared, values_of
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, kept_demands, prepared, values_of
 from cellplan.pipeline.layout.proposals import choice_of
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
 from cellplan.search.variables.variables import Variables
-from cellplan.study.trial import Trial
+from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Workers
 
 NODES: Final = 129  # [-] of the finish
@@ -47,7 +47,7 @@ ROUNDING: Final = 1e-9  # [deg] by which a margin may be missed: of printed numb
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Certified:
+class CandidateResult:
     """A layout that solve passed, or why it did not.
 
     Attributes:
@@ -137,19 +137,19 @@ class Finish:
         records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
     """
 
-    ready: Prepared  # the cell
+    ready: PreparedSearch  # the cell
     progress: Progress  # called with the stage and the fraction done
     workers: int | Executor = 1  # processes that help where they are idle; or how many each study begins
     solves: int = 0  # how often a layout was solved in full so far
     records: dict[int, MisplacementRecord] = field(default_factory=dict)
     choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices that the cell was made ready with
-    _problems: dict[tuple[Prepared, int, tuple[float, ...]], Any] = field(default_factory=dict)
+    _problems: dict[tuple[PreparedSearch, int, tuple[float, ...]], Any] = field(default_factory=dict)
 
-    def ordered(self, trials: Sequence[Trial]) -> Sequence[Trial]:
+    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[StudyTrial]:
         """Trials that conform by the search, best first, in the order in which they are finished."""
         return trials
 
-    def certified(self, trial: Trial) -> Certified:
+    def certified(self, trial: StudyTrial) -> CandidateResult:
         """A layout of the search, certified or with the reason why not."""
         x, start = self._layout(trial)
         reserves, is_first, before = _Reserves(), True, self.solves
@@ -162,7 +162,7 @@ class Finish:
                 reason = rejection_of(program, self.ready.variables) or too_singular(
                     self.ready, timed.standing, program
                 )
-            result = Certified(
+            result = CandidateResult(
                 trial=trial.number,
                 x=x,
                 start=start,
@@ -175,7 +175,7 @@ class Finish:
                 return result
             is_first = False
 
-    def _layout(self, trial: Trial) -> tuple[Array, Array]:
+    def _layout(self, trial: StudyTrial) -> tuple[Array, Array]:
         """Variables and start posture of a layout of the search; the cell is made ready with its discrete choices."""
         self.choice = choice_of(trial)
         self.ready = prepared(self.ready.request, self.choice)
@@ -274,7 +274,7 @@ def rejection_of(program: TimedProgram, variables: Variables) -> str:
     return ""
 
 
-def too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> str:
+def too_singular(ready: PreparedSearch, standing: Standing, program: TimedProgram) -> str:
     """Which arm comes nearer to a singular configuration than the cell allows, by the report; empty for none."""
     arms, demanded, layout = standing.measures.arms, standing.demands.singular, ready.cell.layout
     if arms is None or demanded is None or layout is None or layout.singular is None:
@@ -288,7 +288,7 @@ def too_singular(ready: Prepared, standing: Standing, program: TimedProgram) -> 
     return ""
 
 
-def certified_cell(result: Certified) -> Cell:
+def certified_cell(result: CandidateResult) -> Cell:
     """The cell file's cell of a certified layout: what ``solve`` read.
 
     Raises:

@@ -12,7 +12,7 @@ from cellplan.pipeline.drawing import drawing
 from cellplan.pipeline.layout.cycles import draft, is_scaled, shortest
 from cellplan.pipeline.layout.finish import clearance_of, margin_of, rejection_of, too_singular
 from cellplan.pipeline.layout.limits import LimitRecord, Standing, standing_of
-from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
+from cellplan.pipeline.layout.prepared import PreparedSearch, prepared, values_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.trial import EFFORT
 from cellplan.report.record.common import Number, number
@@ -60,7 +60,7 @@ def given_layout(request: LayoutRequest) -> Given:
     )
 
 
-def standing_of_given(ready: Prepared) -> Standing | None:
+def standing_of_given(ready: PreparedSearch) -> Standing | None:
     """How the given layout stands; None where a tool cannot follow."""
     if ready.unled is not None and not ready.path_search.is_given:
         return standing_of_given(ready.unled)
@@ -71,7 +71,7 @@ def standing_of_given(ready: Prepared) -> Standing | None:
     return None if point is None else standing_of(ready.coarse, point, ready.demands(), EFFORT)
 
 
-def given_record(ready: Prepared) -> GivenRecord:
+def given_record(ready: PreparedSearch) -> GivenRecord:
     """The given layout as ``solve`` has it; where it is rejected, what it breaks at the nodes of the search too."""
     searched = ready.unled if ready.unled is not None and not ready.path_search.is_given else ready
     standing, cycle = standing_of_given(searched), None
@@ -101,7 +101,7 @@ def given_record(ready: Prepared) -> GivenRecord:
     }
 
 
-def _violations(ready: Prepared, standing: Standing | None, rejected: str) -> list[LimitRecord]:
+def _violations(ready: PreparedSearch, standing: Standing | None, rejected: str) -> list[LimitRecord]:
     """What a rejected layout breaks, the worst first: at the nodes of the search, else why it is rejected."""
     limits = list[LimitRecord]()
     if standing is not None:
@@ -115,7 +115,7 @@ def _rounded(value: float | None) -> Number:
     return None if value is None else number(round(value, FINE))
 
 
-def _shown_start(ready: Prepared) -> Array:
+def _shown_start(ready: PreparedSearch) -> Array:
     """The configuration in which the given layout is drawn: its start, or all joints at zero without one."""
     try:
         return ready.given_start

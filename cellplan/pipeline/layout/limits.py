@@ -10,7 +10,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.fastest.timed_program import BINDS
 from cellplan.report.record.common import number
-from cellplan.search.kernel.figures import Crests
+from cellplan.search.kernel.figures import PeakValues
 from cellplan.search.programs.explain import explain
 from cellplan.search.programs.measures import Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
@@ -238,7 +238,7 @@ def _of_distance(standing: Standing, by: PointDerivatives) -> Array:
     return derivatives[int(values.argmin())]
 
 
-def _highest(crests: Crests, by: Array, limits: Array, values: Array) -> Array:
+def _highest(crests: PeakValues, by: Array, limits: Array, values: Array) -> Array:
     """Derivatives of the highest value, shape (n,)."""
     node, column = np.unravel_index(int(values.argmax()), values.shape)
     nodes, columns = np.array([node], dtype=np.intp), np.array([column], dtype=np.intp)

@@ -24,7 +24,7 @@ from cellplan.pipeline.layout.finish import (
     KEYS,
     MORE_ANGLE,
     NODES,
-    Certified,
+    CandidateResult,
     Finish,
     clearance_of,
     margin_of,
@@ -41,10 +41,10 @@ from cellplan.search.misplacement.corners import Corner
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
 from cellplan.search.misplacement.robust import WITHIN, Robust, RobustSearch, robust_layout, seeded_signs
-from cellplan.search.misplacement.tolerance import Tolerance, tolerances
+from cellplan.search.misplacement.tolerance import BaseTolerance, tolerances
 from cellplan.search.programs.objective import Effort, Objective
 from cellplan.study.study import Study
-from cellplan.study.trial import Trial, Variant
+from cellplan.study.trial import StudyTrial, Variant
 from cellplan.study.workers import Limits
 
 FINALISTS: Final = 3  # [-] layouts that differ, of which the one is finished that is the best with displaced bases
@@ -78,11 +78,11 @@ class MisplacedFinish(Finish):
     misplacement: MisplacementEntry  # by how much
     _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
 
-    def ordered(self, trials: Sequence[Trial]) -> Sequence[Trial]:
+    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[StudyTrial]:
         """See ``Finish``: of the best ones that differ, the one with the shortest cycle with displaced bases first."""
         if self.ready.request.objective is not Objective.CYCLE:
             return trials
-        listed = list[Trial]()
+        listed = list[StudyTrial]()
         for trial in trials:
             cycle = trial.figures[BESTS[Objective.CYCLE].figure]
             if all(abs(cycle - other.figures["cycle_s"]) > SAME * cycle for other in listed):
@@ -92,14 +92,14 @@ class MisplacedFinish(Finish):
             if trial.number not in self._begun:
                 self._begin(trial)
 
-        def rank(trial: Trial) -> tuple[int, float]:
+        def rank(trial: StudyTrial) -> tuple[int, float]:
             robust = self._begun[trial.number][1]
             return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.passing, robust.cycle)
 
         first = sorted(listed, key=rank)
         return [*first, *(trial for trial in trials if all(trial is not leading for leading in first))]
 
-    def certified(self, trial: Trial) -> Certified:
+    def certified(self, trial: StudyTrial) -> CandidateResult:
         """A layout of the search with all its corners; see ``Finish``.
 
         Raises:
@@ -126,7 +126,7 @@ class MisplacedFinish(Finish):
             search.effort = effort
         return result
 
-    def _begin(self, trial: Trial) -> None:
+    def _begin(self, trial: StudyTrial) -> None:
         """Improve a layout with displaced bases at few nodes."""
         self.progress(f"displacing the bases of trial {trial.number}", 0.0)
         x, start = self._layout(trial)
@@ -145,7 +145,7 @@ class MisplacedFinish(Finish):
 
     def _result(
         self, trial: int, robust: Robust, effort: Effort, before: int
-    ) -> tuple[Certified, tuple[float, float] | None]:
+    ) -> tuple[CandidateResult, tuple[float, float] | None]:
         """The layout solved and all its corners verified, and the margin and distance to ask for where one failed."""
         x, start, demands = robust.improved.x, robust.improved.start, self.ready.demands()
         standing = standing_of(self._problem(NODES), robust.improved.point, demands, effort)
@@ -164,7 +164,7 @@ class MisplacedFinish(Finish):
             if not reason:
                 limits = self._tolerances(robust, program, effort)
                 self.records[trial] = self._record(robust, program.cycle, verdicts, solved, limits)
-        result = Certified(
+        result = CandidateResult(
             trial=trial,
             x=x,
             start=start,
@@ -252,7 +252,7 @@ class MisplacedFinish(Finish):
         self.solves += len(trials)
         return [self._verdict(trial) for trial in trials]
 
-    def _verdict(self, trial: Trial) -> _Verdict:
+    def _verdict(self, trial: StudyTrial) -> _Verdict:
         """The verdict of one trial."""
         figures, demanded = trial.figures, DEG * float(self.ready.variables.margin.max(initial=0.0))
         margin = figures.get("margin_deg")
@@ -260,7 +260,7 @@ class MisplacedFinish(Finish):
         reason = "" if trial.passed else trial.outcome.reason
         return _Verdict(reason, figures.get("load") or 0.0, is_mendable)
 
-    def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[Tolerance]:
+    def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[BaseTolerance]:
         """How far each base may be off, found at the nodes and verified; less where that fails."""
         factor = None
         if self.ready.request.objective is Objective.CYCLE:
@@ -298,7 +298,7 @@ class MisplacedFinish(Finish):
         cycle: float,
         verdicts: Sequence[_Verdict],
         solved: list[CornerRecord],
-        limits: Sequence[Tolerance],
+        limits: Sequence[BaseTolerance],
     ) -> MisplacementRecord:
         """All of it in printed units."""
         ends = robust.worst_ones + robust.ends
@@ -320,7 +320,7 @@ class MisplacedFinish(Finish):
         }
 
 
-def _is_lost(trial: Trial) -> bool:
+def _is_lost(trial: StudyTrial) -> bool:
     """Whether a layout with displaced bases fails in any cycle."""
     load = trial.figures.get("load")
     return not trial.passed and not (isinstance(load, float) and load > 1.0)
@@ -362,7 +362,7 @@ def _corner(what: str, names: Sequence[str], d: Array, judged: tuple[TimedProgra
     }
 
 
-def _tolerances(limits: Sequence[Tolerance]) -> Iterator[ToleranceRecord]:
+def _tolerances(limits: Sequence[BaseTolerance]) -> Iterator[ToleranceRecord]:
     """One line for each base and direction."""
     count = len(limits) // 2
     for plus, minus in zip(limits[:count], limits[count:], strict=True):

@@ -29,7 +29,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.kernel.singular_values import usual_values
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.objective import Demands, Objective, Timing
+from cellplan.search.programs.objective import CycleTiming, Demands, Objective
 from cellplan.search.programs.problem import Point
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
@@ -38,14 +38,17 @@ from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
-ALONG_SPLINE: Final = {Timing.LAWS: 4, Timing.RETIMED: 2}  # [-] times as many of a motion along a spline, no parabolas
+ALONG_SPLINE: Final = {
+    CycleTiming.LAWS: 4,
+    CycleTiming.RETIMED: 2,
+}  # [-] times as many of a motion along a spline, no parabolas
 SINGULAR_SHARE: Final = 0.1  # [-] of usual singular values: a wrist a few degrees from straight
 NEARLY: Final = 0.99  # [-] of demanded singular values: kept
 SINGULAR_EVERYWHERE: Final = 1e-6  # usual singular value in [m] and [rad] below which it says nothing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Prepared:
+class PreparedSearch:
     """A cell whose layout is searched.
 
     Attributes:
@@ -61,11 +64,11 @@ class Prepared:
     bodies: CellDistances  # their distances, wherever the layout puts them
     schedule: Schedule  # the tasks on the common clock
     moving: tuple[str, ...]  # names of the robots that move
-    unled: "Prepared | None" = None
+    unled: "PreparedSearch | None" = None
     found_start: Array | None = None
 
     @classmethod
-    def of(cls, request: LayoutRequest, cell: Cell) -> "Prepared":
+    def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
         """Make a cell ready.
 
         Args:
@@ -193,7 +196,7 @@ class Prepared:
         return Demands(**(values | changes))
 
 
-def kept_demands(ready: Prepared, point: Point, **changes: Any) -> Demands:
+def kept_demands(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
     """What is demanded of a layout near one that was improved.
 
     The usual share of the singular values is demanded only where the point keeps it, one that the cell states always.
@@ -205,7 +208,7 @@ def kept_demands(ready: Prepared, point: Point, **changes: Any) -> Demands:
     return demands if is_kept else replace(demands, singular=None)
 
 
-def _singular(ready: Prepared) -> Array | None:
+def _singular(ready: PreparedSearch) -> Array | None:
     """Least singular values that the arms are to keep, shape (A,); None where none are demanded."""
     share = SINGULAR_SHARE if ready.request.objective is Objective.CYCLE else 0.0
     if (layout := ready.cell.layout) is not None and layout.singular is not None:
@@ -223,7 +226,7 @@ def _usual(job: Job) -> Array:
     return usual_values(job)
 
 
-def values_of(ready: Prepared, x: Array, start: Array) -> dict[str, object]:
+def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object]:
     """What to write into the given cell file for a point of its problem: values by address, rounded.
 
     Args:
@@ -235,7 +238,7 @@ def values_of(ready: Prepared, x: Array, start: Array) -> dict[str, object]:
     return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
 
 
-def _with_found_start(ready: Prepared) -> Prepared:
+def _with_found_start(ready: PreparedSearch) -> PreparedSearch:
     """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
     try:
         start = ready.given_start
@@ -247,16 +250,16 @@ def _with_found_start(ready: Prepared) -> Prepared:
     return replace(ready, variables=replace(variables, given=given), found_start=start)
 
 
-def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> Prepared:
+def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> PreparedSearch:
     """The cell of a request, with the discrete choices of one trial; made once in each process."""
     return _prepared(request, tuple(sorted((choice or {}).items())))
 
 
 @lru_cache(maxsize=8)
-def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> Prepared:
+def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> PreparedSearch:
     """See ``prepared``."""
     cell = searched_cell(request)
     if choice:
         cell = cell.with_values(dict(choice))
         refuse_other_jobs(cell, "a layout search")
-    return Prepared.of(request, cell)
+    return PreparedSearch.of(request, cell)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from cellplan.errors import NoSolutionError
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.objective import Objective
 from cellplan.search.variables.choices import Choices
 from cellplan.study.status import Best
-from cellplan.study.trial import Trial
+from cellplan.study.trial import StudyTrial
 
 SIZE: Final = 4  # [-] trials of a round
 WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
@@ -42,7 +42,7 @@ class Proposals:
     branches: Sequence[Mapping[str, Any]] = ()
     rejected: frozenset[int] = frozenset()  # trials that are no candidates any more
 
-    def __call__(self, finished: Sequence[Trial]) -> list[dict[str, Any]]:
+    def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:
         """Values of the trials of the next round."""
         first = self._first()[len(finished) : len(finished) + SIZE]
         if first:
@@ -83,7 +83,7 @@ class Proposals:
         rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
 
-    def _leading(self, finished: Sequence[Trial]) -> Iterator[Trial]:
+    def _leading(self, finished: Sequence[StudyTrial]) -> Iterator[StudyTrial]:
         """Trials that conform, best first, of equal ones the first."""
         best = BESTS[self.request.objective]
         sign = -1.0 if best.is_largest else 1.0
@@ -98,7 +98,7 @@ class Proposals:
                 last = value
                 yield trial
 
-    def _perturbed(self, trial: Trial | None, spread: float, number: int) -> dict[str, Any]:
+    def _perturbed(self, trial: StudyTrial | None, spread: float, number: int) -> dict[str, Any]:
         """A trial near the end of another one; None for the given layout."""
         if trial is None:
             choices = self.choices
@@ -118,7 +118,7 @@ class Proposals:
         """A trial anywhere within the bounds."""
         return {"kind": "sampled", "index": index, "choice": self.choices[number % len(self.choices)]}
 
-    def _fourth(self, best: Trial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
+    def _fourth(self, best: StudyTrial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
         """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
 
         While nothing conforms, a sample in every round.
@@ -132,13 +132,13 @@ class Proposals:
         return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
 
 
-def proposals_of(request: LayoutRequest, ready: Prepared) -> "Proposals":
+def proposals_of(request: LayoutRequest, ready: PreparedSearch) -> "Proposals":
     """What the rounds of a search of a cell try."""
     choices = tuple(Choices.of(ready.cell).values())
     return Proposals(request=request, choices=choices, branches=_branches(ready.unled or ready))
 
 
-def _branches(ready: Prepared) -> list[dict[str, list[float]]]:
+def _branches(ready: PreparedSearch) -> list[dict[str, list[float]]]:
     """Other start postures of the given layout from which all tools follow their paths, with their variables.
 
     Those of the robots whose branch may change; none where the given layout has no start.
@@ -153,19 +153,19 @@ def _branches(ready: Prepared) -> list[dict[str, list[float]]]:
     return [{"x": values.tolist(), "start": q.tolist()} for values, q in zip(x, start, strict=True)]
 
 
-def _leads_nowhere(trial: Trial) -> bool:
+def _leads_nowhere(trial: StudyTrial) -> bool:
     """Whether a trial is the given layout and no motion begins there."""
     figures = trial.outcome.figures
     return trial.variant.values["kind"] == "given" and ("x" not in figures or "sampled" in figures)
 
 
-def choice_of(trial: Trial) -> Mapping[str, object]:
+def choice_of(trial: StudyTrial) -> Mapping[str, object]:
     """The discrete choices of a trial; empty for those of the cell."""
     choice: Any = trial.variant.values.get("choice")
     return choice or {}
 
 
-def is_candidate(trial: Trial) -> bool:
+def is_candidate(trial: StudyTrial) -> bool:
     """Whether a trial conforms to what is demanded; one that asks for more clearance only leads to others."""
     return trial.passed and not trial.variant.values.get("clearance_m")
 

@@ -10,11 +10,11 @@ from cellplan.io.cell.changes import plain_values
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.drawing import drawing, footprint, swept_area
 from cellplan.pipeline.fastest.timed_program import Law
-from cellplan.pipeline.layout.finish import Certified, certified_cell
+from cellplan.pipeline.layout.finish import CandidateResult, certified_cell
 from cellplan.pipeline.layout.given_layout import Given, GivenRecord, standing_of_given
 from cellplan.pipeline.layout.limits import LimitRecord
 from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
-from cellplan.pipeline.layout.prepared import Prepared, prepared, values_of
+from cellplan.pipeline.layout.prepared import PreparedSearch, prepared, values_of
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, choice_of, choice_text, is_candidate, origin_text
 from cellplan.pipeline.layout.trial import change_of
 from cellplan.pipeline.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
@@ -24,7 +24,7 @@ from cellplan.report.record.schema import record_schema
 from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
-from cellplan.study.trial import Trial
+from cellplan.study.trial import StudyTrial
 
 SCHEMA: Final = "cellplan.layout/1"
 TOP: Final = 10  # [-] layouts that are listed
@@ -127,12 +127,12 @@ def layout_schema() -> dict[str, Any]:
 
 
 def layout_record(
-    ready: Prepared,
+    ready: PreparedSearch,
     finished: Finished,
     given: Given,
     *,
-    tried: Mapping[int, Certified],
-    best: Certified | None,
+    tried: Mapping[int, CandidateResult],
+    best: CandidateResult | None,
     solves: int,
 ) -> LayoutRecord:
     """The search in printed units.
@@ -187,7 +187,7 @@ def layout_record(
     }
 
 
-def _slowed(best: Certified | None) -> Iterator[str]:
+def _slowed(best: CandidateResult | None) -> Iterator[str]:
     """What makes the certified cycle longer than the limits of the joints do."""
     if best is None or best.program is None:
         return
@@ -200,7 +200,9 @@ def _slowed(best: Certified | None) -> Iterator[str]:
         )
 
 
-def _candidates(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> Iterator[CandidateRecord]:
+def _candidates(
+    ready: PreparedSearch, finished: Finished, tried: Mapping[int, CandidateResult]
+) -> Iterator[CandidateRecord]:
     """Layouts that trials ended at: certified ones first, then by the objective; equal ones once."""
     best = BESTS[ready.request.objective]
     sign = -1.0 if best.is_largest else 1.0
@@ -228,7 +230,7 @@ def _is_same(one: CandidateRecord, other: CandidateRecord) -> bool:
     )
 
 
-def _candidate(ready: Prepared, trial: Trial, certified: Certified | None) -> CandidateRecord:
+def _candidate(ready: PreparedSearch, trial: StudyTrial, certified: CandidateResult | None) -> CandidateRecord:
     """One layout."""
     figures, ready = trial.figures, _prepared_of(ready, trial)
     x, start = np.array(figures["x"]), np.array(figures["start"])
@@ -282,7 +284,7 @@ def _convergence(finished: Finished) -> list[ProgressRecord]:
     return progress
 
 
-def _dropped(trials: Iterable[Trial]) -> list[DroppedRecord]:
+def _dropped(trials: Iterable[StudyTrial]) -> list[DroppedRecord]:
     """Trials without a conforming layout, by reason, the most frequent first."""
     lost = [trial for trial in trials if not trial.passed]
     counts = Counter(trial.outcome.reason for trial in lost)
@@ -291,7 +293,7 @@ def _dropped(trials: Iterable[Trial]) -> list[DroppedRecord]:
     return [{"reason": reason, "count": count, "trial": first[reason]} for reason, count in ordered]
 
 
-def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]) -> list[ChoiceRecord]:
+def _choices(ready: PreparedSearch, finished: Finished, tried: Mapping[int, CandidateResult]) -> list[ChoiceRecord]:
     """What came of every combination of discrete choices, in the order in which they were tried; none without any."""
     combinations = list(Choices.of(ready.cell).values())
     if len(combinations) == 1:
@@ -319,7 +321,7 @@ def _choices(ready: Prepared, finished: Finished, tried: Mapping[int, Certified]
     return choices
 
 
-def _prepared_of(ready: Prepared, trial: Trial) -> Prepared:
+def _prepared_of(ready: PreparedSearch, trial: StudyTrial) -> PreparedSearch:
     """The cell with the discrete choices of a trial."""
     choice = choice_of(trial)
     return prepared(ready.request, choice) if choice else ready
@@ -331,13 +333,13 @@ def _no_result(finished: Finished) -> str:
     return "none_certified" if is_started else "no_start"
 
 
-def _velocity_only(best: Certified) -> float:
+def _velocity_only(best: CandidateResult) -> float:
     """Cycle of the best layout by its limits of speed alone in [s]."""
     measures, times = best.standing.measures, best.standing.problem.times
     return round(float(measures.speeds.value.max()) * float(times[-1] - times[0]), FINE)
 
 
-def _drawing(ready: Prepared, given: Given, best: Certified) -> dict[str, Any]:
+def _drawing(ready: PreparedSearch, given: Given, best: CandidateResult) -> dict[str, Any]:
     """Floor plan of the given and the best layout."""
     cell = certified_cell(best)
     if best.program is None:

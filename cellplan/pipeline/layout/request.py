@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cellplan.search.programs.objective import Objective, Timing
+from cellplan.search.programs.objective import CycleTiming, Objective
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class LayoutRequest:
     cell: Path
     allow_dirs: tuple[Path, ...] = ()
     objective: Objective = Objective.CYCLE
-    timing: Timing = Timing.LAWS
+    timing: CycleTiming = CycleTiming.LAWS
     duration: float | None = None
     clearance: float | None = None
     margin: float | None = None

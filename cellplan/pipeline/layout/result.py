@@ -12,19 +12,19 @@ from cellplan.pipeline.layout.limits import LimitRecord
 from cellplan.pipeline.layout.record import CandidateRecord, ChoiceRecord, DroppedRecord, LayoutRecord, ProgressRecord
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.variable_records import VariableRecord
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
 from cellplan.report.plots.figure import (
-    Axis,
-    Box,
-    Curve,
     Figure,
     Item,
-    Key,
+    LegendKey,
     Limit,
-    Mark,
     Note,
-    Panel,
+    PlotAxis,
+    PlotBox,
+    PlotCurve,
+    PlotMark,
+    PlotPanel,
     line,
     outline,
     value_axis,
@@ -187,14 +187,14 @@ def floor_plan(record: Record) -> Figure | None:
     if not drawn:
         return None
     low, high = _extent(drawn)
-    panel = Panel(
+    panel = PlotPanel(
         title="",
-        y=Axis(low=float(low[1]), high=float(high[1]), label="y in mm, upward", unit="mm"),
+        y=PlotAxis(low=float(low[1]), high=float(high[1]), label="y in mm, upward", unit="mm"),
         items=[*_sweep(drawn), *_reach(drawn), *_outlines(drawn), *_bases(drawn)],
     )
     return Figure(
         title=f"{record['cell']} from above",
-        x=Axis(low=float(low[0]), high=float(high[0]), label="x in mm", unit="mm"),
+        x=PlotAxis(low=float(low[0]), high=float(high[0]), label="x in mm", unit="mm"),
         panels=[panel],
         is_plane=True,
         legend=list(_legend(drawn)),
@@ -220,12 +220,12 @@ def front_figure(record: Record) -> Figure | None:
         items.append(line(front, colour=ROBOTS[0], width=1.2))
     for candidate in candidates:
         colour = {"certified": ROBOTS[2], "rejected": LIMIT}.get(candidate["status"], GREY)
-        items.append(Mark(float(candidate["clearance_mm"]), float(candidate["cycle_s"]), colour))
+        items.append(PlotMark(float(candidate["clearance_mm"]), float(candidate["cycle_s"]), colour))
     axis = _cycle_axis([float(candidate["cycle_s"]) for candidate in candidates])
     return Figure(
         title="cycle against clearance",
-        x=Axis(low=low, high=high, label="clearance in mm", unit="mm"),
-        panels=[Panel(title=CYCLE, y=axis, items=items)],
+        x=PlotAxis(low=low, high=high, label="clearance in mm", unit="mm"),
+        panels=[PlotPanel(title=CYCLE, y=axis, items=items)],
         width=HALF,
         row=ROW,
     )
@@ -239,23 +239,23 @@ def convergence_figure(record: Record) -> Figure | None:
     last = max(step["trial"] for step in record["convergence"])
     shown = [float(step[key]) for step in steps for key in ("cycle_s", "best_s") if step[key] is not None]
     tried = [step for step in steps if step["cycle_s"] is not None]
-    items: list[Item] = [Mark(float(trial["trial"]), float(trial["cycle_s"]), GREY) for trial in tried]
+    items: list[Item] = [PlotMark(float(trial["trial"]), float(trial["cycle_s"]), GREY) for trial in tried]
     at = np.array([value for step in steps for value in (step["trial"] - 0.5, step["trial"] + 0.5)], dtype=float)
-    items.append(Curve("best so far", at, np.repeat([float(step["best_s"]) for step in steps], 2), ROBOTS[0]))
+    items.append(PlotCurve("best so far", at, np.repeat([float(step["best_s"]) for step in steps], 2), ROBOTS[0]))
     return Figure(
         title="each trial (dots) and the best so far (line)",
-        x=Axis(low=-0.5, high=max(last, 1) + 0.5, label="trial"),
-        panels=[Panel(title=CYCLE, y=_cycle_axis(shown), items=items)],
+        x=PlotAxis(low=-0.5, high=max(last, 1) + 0.5, label="trial"),
+        panels=[PlotPanel(title=CYCLE, y=_cycle_axis(shown), items=items)],
         width=HALF,
         row=ROW,
     )
 
 
-def _cycle_axis(cycles: list[float]) -> Axis:
+def _cycle_axis(cycles: list[float]) -> PlotAxis:
     """The axis of cycles; one cycle alone has room about it too."""
     if min(cycles) < max(cycles):
         return value_axis(min(cycles), max(cycles), unit="s")
-    return Axis(low=0.9 * cycles[0], high=1.1 * cycles[0], unit="s")
+    return PlotAxis(low=0.9 * cycles[0], high=1.1 * cycles[0], unit="s")
 
 
 def _shown(record: Record) -> Entries:
@@ -283,7 +283,7 @@ def _sweep(drawn: Record) -> Iterator[Item]:
     half = 0.5 * drawn["swept"]["square_mm"]
     for index, rows in enumerate(drawn["swept"]["robots"].values()):
         for y, first, last in rows:
-            yield Box((first - half, last + half), (y - half, y + half), _colour(index), opacity=0.16)
+            yield PlotBox((first - half, last + half), (y - half, y + half), _colour(index), opacity=0.16)
 
 
 def _reach(drawn: Record) -> Iterator[Item]:
@@ -318,15 +318,15 @@ def _bases(drawn: Record) -> Iterator[Item]:
     for index, robot in enumerate(drawn["best"]["robots"]):
         colour, x, y, was = _colour(index), robot["x_mm"], robot["y_mm"], old[robot["name"]]
         yield line([[was["x_mm"], was["y_mm"]], [x, y]], colour=colour, width=1.4)
-        yield Mark(was["x_mm"], was["y_mm"], PAPER, size=6.5, edge=colour)
-        yield Mark(x, y, colour, size=6.5, edge=colour)
+        yield PlotMark(was["x_mm"], was["y_mm"], PAPER, size=6.5, edge=colour)
+        yield PlotMark(x, y, colour, size=6.5, edge=colour)
         yield Note(x, y, robot["name"], colour, size=8.5, is_bold=True, anchor="start", moved=(6.5, 9.0))
 
 
-def _legend(drawn: Record) -> Iterator[Key]:
+def _legend(drawn: Record) -> Iterator[LegendKey]:
     """What the colours and lines mean."""
     for index, robot in enumerate(drawn["best"]["robots"]):
-        yield Key(robot["name"], _colour(index))
+        yield LegendKey(robot["name"], _colour(index))
     for text in (
         "filled dot: base of the best layout",
         "open dot: base as given",
@@ -335,7 +335,7 @@ def _legend(drawn: Record) -> Iterator[Key]:
         "grey dashes: feet as given",
         "red: paths on the part at the start",
     ):
-        yield Key(text, ink=GREY)
+        yield LegendKey(text, ink=GREY)
 
 
 def _colour(index: int) -> str:
@@ -379,7 +379,7 @@ def layout_tables(record: Record) -> Tables:
     return {name: listed_table(record, name, form) for name, form in forms.items()}
 
 
-LAYOUT: Final = Kind(
+LAYOUT: Final = ResultKind(
     name="layout",
     title="Layout search",
     tables=layout_tables,

@@ -11,9 +11,9 @@ from typing import Final
 from cellplan.model.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.layout.finish import Certified, Finish, certified_cell
+from cellplan.pipeline.layout.finish import CandidateResult, Finish, certified_cell
 from cellplan.pipeline.layout.given_layout import Given, given_layout
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch, prepared
 from cellplan.pipeline.layout.proposals import BESTS, SIZE, Proposals, is_candidate, proposals_of
 from cellplan.pipeline.layout.record import LayoutRecord, layout_record
 from cellplan.pipeline.layout.request import LayoutRequest
@@ -26,7 +26,7 @@ from cellplan.pipeline.write_run import versions
 from cellplan.search.programs.objective import Objective
 from cellplan.study.folder import write_results
 from cellplan.study.study import Finished, Stop, Study
-from cellplan.study.trial import Trial
+from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Limits, Workers
 
 BUDGET: Final = 60.0  # [s] of a search that does not say where to end
@@ -44,7 +44,7 @@ class LayoutResult(Presented):
     """
 
     record: LayoutRecord
-    best: Certified | None
+    best: CandidateResult | None
 
     def __repr__(self) -> str:
         """One line without arrays."""
@@ -59,16 +59,16 @@ class _Search:
 
     request: LayoutRequest
     folder: Path
-    ready: Prepared
+    ready: PreparedSearch
     workers: int | Executor
     stop: Stop
     progress: Progress
     finish: Finish
     proposals: Proposals
     given: Callable[[], Given] | None = None
-    tried: dict[int, Certified] = field(default_factory=dict)
+    tried: dict[int, CandidateResult] = field(default_factory=dict)
 
-    def run(self, *, resume: bool) -> tuple[Finished, Certified | None]:
+    def run(self, *, resume: bool) -> tuple[Finished, CandidateResult | None]:
         """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
         while True:
             finished = self._study().run(
@@ -94,7 +94,7 @@ class _Search:
         study = _study(self.request, self.ready.cell, self.folder)
         return replace(study, propose=self.proposals, enough=is_enough)
 
-    def _best(self, finished: Finished) -> Certified | None:
+    def _best(self, finished: Finished) -> CandidateResult | None:
         """The first candidate that passes, best first."""
         for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             if trial.number not in self.tried:
@@ -104,7 +104,7 @@ class _Search:
                 return self.tried[trial.number]
         return None
 
-    def candidates(self, finished: Finished) -> list[Trial]:
+    def candidates(self, finished: Finished) -> list[StudyTrial]:
         """Trials that conform by the search, best first."""
         best = BESTS[self.request.objective]
         sign = -1.0 if best.is_largest else 1.0
@@ -198,7 +198,7 @@ def _study(request: LayoutRequest, cell: Cell, folder: Path) -> Study:
     return Study(folder=folder, header=header, size=SIZE, propose=lambda _finished: (), best=best)
 
 
-def finish_of(ready: Prepared, progress: Progress, *, workers: int | Executor) -> Finish:
+def finish_of(ready: PreparedSearch, progress: Progress, *, workers: int | Executor) -> Finish:
     """The finish of the layouts of a cell, with displaced bases where they are asked for.
 
     Args:
@@ -214,7 +214,7 @@ def finish_of(ready: Prepared, progress: Progress, *, workers: int | Executor) -
     return MisplacedFinish(ready=ready, progress=progress, workers=workers, misplacement=misplacement)
 
 
-def _written(search: _Search, finished: Finished, best: Certified | None) -> LayoutResult:
+def _written(search: _Search, finished: Finished, best: CandidateResult | None) -> LayoutResult:
     """The record and all files."""
     given = given_layout(search.request) if search.given is None else search.given()
     record = layout_record(search.ready, finished, given, tried=search.tried, best=best, solves=search.finish.solves)
@@ -229,12 +229,12 @@ def _written(search: _Search, finished: Finished, best: Certified | None) -> Lay
     return LayoutResult(record=record, best=best)
 
 
-def _is_enough(rejected: frozenset[int], trial: Trial) -> bool:
+def _is_enough(rejected: frozenset[int], trial: StudyTrial) -> bool:
     """Whether a trial ends the search for any conforming layout."""
     return trial.passed and trial.number not in rejected
 
 
-def _value(trial: Trial, figure: str, sign: float) -> float:
+def _value(trial: StudyTrial, figure: str, sign: float) -> float:
     """The figure of a trial that is compared; without one it comes last."""
     value = trial.figures.get(figure)
     return float(value) if isinstance(value, int | float) else sign * float("inf")

@@ -13,7 +13,7 @@ from cellplan.pipeline.layout.free_motion import freed
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.synchronous import refuse_other_jobs
-from cellplan.search.programs.objective import Objective, Timing
+from cellplan.search.programs.objective import CycleTiming, Objective
 
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg", "length_mm", "tilt_deg")
 PREFIX: Final = "robots."
@@ -62,7 +62,7 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
     if cell.layout is None or cell.layout.misplacement is None:
         return
     key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
-    if request.timing is Timing.RETIMED:
+    if request.timing is CycleTiming.RETIMED:
         raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
     if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
         raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")

@@ -14,7 +14,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared, kept_demands, prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, kept_demands, prepared
 from cellplan.pipeline.layout.proposals import SIZE, proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
@@ -22,7 +22,7 @@ from cellplan.search.programs.objective import Demands, Effort
 from cellplan.search.programs.perturb import perturbed
 from cellplan.search.spline_path.perturb import perturbed_path
 from cellplan.search.spline_path.problem import PathProblem
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
@@ -46,7 +46,7 @@ class _Begin:
     unled: Begin | None = None
 
 
-def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
+def evaluate(request: LayoutRequest, variant: Variant) -> TrialOutcome:
     """Improve the layout that a trial begins with; what is wrong with it becomes its reason.
 
     Args:
@@ -63,14 +63,14 @@ def evaluate_first(request: LayoutRequest) -> None:
 
 
 @lru_cache(maxsize=1)
-def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
+def _evaluated(request: LayoutRequest, number: int, text: str) -> TrialOutcome:
     """See ``evaluate``; the values of the trial as JSON."""
     values = json.loads(text)
     try:
         ready = prepared(request, _mapping(values.get("choice")))
         begin = _begin(ready, values, number)
     except (InputError, NoSolutionError) as error:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
     added = float(str(values.get("clearance_m", 0.0)))
     demands = ready.demands(clearance=added)
     limit = values.get("give_up_above_s")
@@ -78,12 +78,12 @@ def _evaluated(request: LayoutRequest, number: int, text: str) -> Outcome:
     effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
     improved = None if begin is None else _improved(ready, begin, demands, effort)
     if begin is None or improved is None:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     outcome = _outcome(ready, improved, begin.unled)
     return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, values) else outcome
 
 
-def _improved(ready: Prepared, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
+def _improved(ready: PreparedSearch, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
     """The local optimum from a start: once more without the usual singular values where they cannot be kept."""
     improved = improve(ready.coarse, begin.x, begin.start, demands, effort)
     if improved is None or improved.is_conforming:
@@ -94,7 +94,7 @@ def _improved(ready: Prepared, begin: _Begin, demands: Demands, effort: Effort) 
     return improve(ready.coarse, improved.x, improved.start, demands_met, effort)
 
 
-def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin | None:
+def _begin(ready: PreparedSearch, values: Mapping[str, object], number: int) -> _Begin | None:
     """Where a trial begins; None where the tools cannot follow their paths."""
     if ready.unled is not None:
         return _path(ready, ready.unled, values, number)
@@ -102,7 +102,7 @@ def _begin(ready: Prepared, values: Mapping[str, object], number: int) -> _Begin
     return None if layout is None else _Begin(*layout)
 
 
-def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: int) -> _Begin | None:
+def _path(ready: PreparedSearch, unled: PreparedSearch, values: Mapping[str, Any], number: int) -> _Begin | None:
     """Where a trial of a joint path begins: near a path that is known, or at that of a motion by the pseudo-inverse.
 
     Such a motion, from wherever the trial begins, is brought to its own shortest cycle first. Trials of odd numbers
@@ -128,7 +128,7 @@ def _path(ready: Prepared, unled: Prepared, values: Mapping[str, Any], number: i
     return None if begin is None else _led(ready, unled, begin)
 
 
-def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
+def _led(ready: PreparedSearch, unled: PreparedSearch, begin: Begin) -> _Begin | None:
     """The path nearest to a motion by the pseudo-inverse, improved in stages, or to one of the stages on the way.
 
     The last stage whose path the tools can follow, the first one, or halfway between the first and the last, whichever
@@ -156,7 +156,7 @@ def _led(ready: Prepared, unled: Prepared, begin: Begin) -> _Begin | None:
     return layouts[min(ranks, default=(0.0, 0.0, 0))[2]]
 
 
-def _halfway(ready: Prepared, first: _Begin, last: Begin) -> _Begin | None:
+def _halfway(ready: PreparedSearch, first: _Begin, last: Begin) -> _Begin | None:
     """The mean of a path and of that nearest to another motion; None where a tool cannot follow."""
     search = ready.path_search
     fitted = search.fitted(*last)
@@ -167,7 +167,7 @@ def _halfway(ready: Prepared, first: _Begin, last: Begin) -> _Begin | None:
     return None if ready.coarse.evaluate(x, start) is None else _Begin(x, start, unled=last)
 
 
-def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:
+def _path_of(ready: PreparedSearch, begin: Begin) -> _Begin | None:
     """The path nearest to a motion by the pseudo-inverse; None where a tool cannot follow."""
     search = ready.path_search
     fitted = search.fitted(*begin)
@@ -177,7 +177,7 @@ def _path_of(ready: Prepared, begin: Begin) -> _Begin | None:
     return None if ready.coarse.evaluate(x, fitted[1]) is None else _Begin(x, fitted[1], unled=begin)
 
 
-def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
+def _layout(ready: PreparedSearch, values: Mapping[str, object], number: int) -> Begin | None:
     """Where a trial of a layout begins; None where the tools cannot follow their paths."""
     kind = values["kind"]
     if kind == "given" or (kind == "perturbed" and values["of"] is None):
@@ -192,14 +192,14 @@ def _layout(ready: Prepared, values: Mapping[str, object], number: int) -> Begin
     return _perturbed(ready, (x, start), values, number)
 
 
-def _perturbed(ready: Prepared, begin: Begin, values: Mapping[str, object], number: int) -> Begin | None:
+def _perturbed(ready: PreparedSearch, begin: Begin, values: Mapping[str, object], number: int) -> Begin | None:
     """A layout near another one."""
     rng = generator(f"layout/{number}", ready.request.seed)
     point = perturbed(ready.coarse, *begin, rng, size=float(str(values["spread"])))
     return None if point is None else (point.x, point.start)
 
 
-def _near_given(ready: Prepared, values: Mapping[str, object], number: int) -> Begin | None:
+def _near_given(ready: PreparedSearch, values: Mapping[str, object], number: int) -> Begin | None:
     """The given layout or one near it; where no motion begins there, a sample that no other trial takes.
 
     Raises:
@@ -211,7 +211,7 @@ def _near_given(ready: Prepared, values: Mapping[str, object], number: int) -> B
     return begin if values["kind"] == "given" else _perturbed(ready, begin, values, number)
 
 
-def _is_far(ready: Prepared, values: Mapping[str, object]) -> bool:
+def _is_far(ready: PreparedSearch, values: Mapping[str, object]) -> bool:
     """Whether a trial of the given layout, or near it, began at a sample instead."""
     is_near = values["kind"] == "given" or (values["kind"] == "perturbed" and values["of"] is None)
     if not is_near or (ready.unled is not None and ready.path_search.is_given):
@@ -220,7 +220,7 @@ def _is_far(ready: Prepared, values: Mapping[str, object]) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _given(ready: Prepared) -> Begin | None:
+def _given(ready: PreparedSearch) -> Begin | None:
     """The given layout, or with other branches of its inverse kinematics; None where no motion begins there."""
     try:
         start = ready.given_start
@@ -234,18 +234,18 @@ def _given(ready: Prepared) -> Begin | None:
         return None
 
 
-def _attempt(ready: Prepared, index: int) -> Begin:
+def _attempt(ready: PreparedSearch, index: int) -> Begin:
     """The layout of a cell file of the user's."""
     cell = _attempted(ready, index)
     return ready.variables.read_from(cell), ready.start_of(cell)
 
 
-def _attempted(ready: Prepared, index: int) -> Cell:
+def _attempted(ready: PreparedSearch, index: int) -> Cell:
     """A cell file of the user's."""
     return load_cell(ready.request.attempts[index], allow_dirs=ready.request.allow_dirs)
 
 
-def _sampled(ready: Prepared, index: int) -> Begin:
+def _sampled(ready: PreparedSearch, index: int) -> Begin:
     """A start that was sampled over all that may change.
 
     Raises:
@@ -254,12 +254,12 @@ def _sampled(ready: Prepared, index: int) -> Begin:
     return ready.starts.at(1 + index).first
 
 
-def change_of(ready: Prepared, x: Array) -> float:
+def change_of(ready: PreparedSearch, x: Array) -> float:
     """Cost of the change from the given layout to variables of shape (n,)."""
     return float((np.abs(x - ready.coarse.given) * ready.coarse.cost).sum())
 
 
-def _outcome(ready: Prepared, improved: Improved, unled: Begin | None) -> Outcome:
+def _outcome(ready: PreparedSearch, improved: Improved, unled: Begin | None) -> TrialOutcome:
     """Figures of a local optimum."""
     standing = standing_of(ready.coarse, improved.point, kept_demands(ready, improved.point), EFFORT)
     figures: dict[str, Any] = {
@@ -276,10 +276,10 @@ def _outcome(ready: Prepared, improved: Improved, unled: Begin | None) -> Outcom
     if unled is not None:
         figures["unled"] = {"x": unled[0].tolist(), "start": unled[1].tolist()}
     if improved.is_conforming:
-        return Outcome(status=TrialStatus.PASSED, figures=figures)
+        return TrialOutcome(status=TrialStatus.PASSED, figures=figures)
     violations = standing.violations()
     why = reason(violations[0]) if violations else "less room than the search asks for beyond the demands"
-    return Outcome(status=TrialStatus.FAILED, reason=why, figures=figures)
+    return TrialOutcome(status=TrialStatus.FAILED, reason=why, figures=figures)
 
 
 def _mapping(value: object) -> Mapping[str, object]:

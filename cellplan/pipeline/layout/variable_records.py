@@ -6,9 +6,9 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.units import DEG, MM
-from cellplan.pipeline.layout.finish import Certified
+from cellplan.pipeline.layout.finish import CandidateResult
 from cellplan.pipeline.layout.limits import Standing, effects
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.report.record.common import Number, number
 
 FINE: Final = 6  # decimals: far above rounding
@@ -42,7 +42,9 @@ class PathRecord(TypedDict):
     departure_mm: Annotated[Number, "by how much a sliding joint does; null without one"]
 
 
-def variable_records(ready: Prepared, standing: Standing | None, best: Certified | None) -> list[VariableRecord]:
+def variable_records(
+    ready: PreparedSearch, standing: Standing | None, best: CandidateResult | None
+) -> list[VariableRecord]:
     """The variables in the units of the file, with their effects."""
     variables, names = ready.variables, ready.variables.names
     before = len(ready.coarse.names) - len(names)  # coefficients of a joint path have no rows
@@ -70,7 +72,7 @@ def variable_records(ready: Prepared, standing: Standing | None, best: Certified
     return shown
 
 
-def path_record(ready: Prepared, x: Array) -> PathRecord:
+def path_record(ready: PreparedSearch, x: Array) -> PathRecord:
     """The joint path at variables of shape (n,), beside the given motion."""
     search = ready.path_search
     model, departures = ready.variables.base.robot(search.settings.robot).model, search.departures(x)

@@ -60,7 +60,7 @@ def find_homes(
         cell = scene.cell
         for index, name in enumerate(order):
             progress(STAGE, index / len(order))
-            search = _Search(replace(scene, cell=cell), runs, cell.robot(name))
+            search = _HomeSearch(replace(scene, cell=cell), runs, cell.robot(name))
             home = search.home((known or {}).get(name))
             if home is None and (index == 0 or name in tried):
                 raise HomeNotFoundError(search.why_nothing())
@@ -106,7 +106,7 @@ class _IdleRun:
     q: Array  # stacked joint positions in [rad] or [m], shape (N, nq), the homes that are known in place
 
 
-class _Search:
+class _HomeSearch:
     """The search for the home of one robot."""
 
     def __init__(self, scene: Scene, runs: Sequence[PlannedRun], robot: Robot) -> None:

@@ -23,7 +23,7 @@ from cellplan.model.task import Task
 from cellplan.pipeline.plan.program import ProgramClock
 from cellplan.pipeline.plan.step_errors import StepErrors
 from cellplan.planning.timing.fixed_rates import FixedRate
-from cellplan.planning.timing.retime import JointBounds, Retimer
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.scene.scene import Scene
 
@@ -127,7 +127,7 @@ def joint_path(motion: Motion) -> JointPath:
     return replace(motion.path, start=motion.q[0], nodes=nodes)
 
 
-def joint_bounds(cell: Cell) -> JointBounds:
+def joint_bounds(cell: Cell) -> JointLimitsInTime:
     """Limits of all joints of a cell: stated ones, else those that the cell assumes."""
     velocity, acceleration, jerk = [], [], []
     for robot in cell.robots:
@@ -136,7 +136,7 @@ def joint_bounds(cell: Cell) -> JointBounds:
             velocity.append(joint.velocity)
             acceleration.append(np.inf if limit is None else limit)
             jerk.append(retimed_jerk_limit(cell, robot, index) or np.inf)
-    return JointBounds(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
+    return JointLimitsInTime(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +149,7 @@ class RowLimits:
 
     scene: Scene  # the scene of the cell
     paths: tuple[ClockedPath, ...]  # paths of the tasks that are worked on
-    bounds: JointBounds  # limits of all joints
+    bounds: JointLimitsInTime  # limits of all joints
     step: float  # time between two rows in [s]
     path: JointPath | None = None
     errors: StepErrors | None = None  # errors of the tools between rows; None where they do not bound the speed

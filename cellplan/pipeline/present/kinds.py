@@ -10,7 +10,7 @@ from cellplan.pipeline.layout.result import LAYOUT
 from cellplan.pipeline.rehearsal.result import REHEARSAL
 from cellplan.pipeline.repair.result import ADVICE
 from cellplan.pipeline.sweep_result import STUDY
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.record.common import Record
 from cellplan.report.record.rows import Tables, curve_columns, format_of, run_tables
 
@@ -25,14 +25,14 @@ TASK_COLUMNS: Final = (
     "start_s",
     "end_s",
 )
-RUN: Final = Kind(
+RUN: Final = ResultKind(
     name="report",
     title="Run",
     file="report.json",
     tables=lambda record: run_tables([record]),
     shown={"tasks": TASK_COLUMNS},
 )
-SERIES: Final = Kind(
+SERIES: Final = ResultKind(
     name="series",
     title="series",
     file="series.json",
@@ -40,7 +40,7 @@ SERIES: Final = Kind(
     shown={},
 )
 OF_JOBS: Final = (MAP, FASTEST, ADVICE, REHEARSAL, COMPARISON, LAYOUT, STUDY)  # where two files are, the first is shown
-KINDS: Final[Mapping[str, Kind]] = {kind.name: kind for kind in (*OF_JOBS, RUN, SERIES)}
+KINDS: Final[Mapping[str, ResultKind]] = {kind.name: kind for kind in (*OF_JOBS, RUN, SERIES)}
 
 
 def record_tables(record: Record) -> Tables:

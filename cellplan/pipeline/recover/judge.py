@@ -68,7 +68,7 @@ class TimedPhase:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Judgement:
+class RecoveryJudgement:
     """What was found on the written tables of a recovery.
 
     Attributes:
@@ -95,7 +95,7 @@ class Judgement:
 
 def judged(
     texts: Mapping[str, str], phases: Sequence[RecoveryPhase], *, places: RunPlaces, state: StoppedState
-) -> Judgement:
+) -> RecoveryJudgement:
     """Check the tables of a recovery.
 
     Args:
@@ -113,7 +113,7 @@ def judged(
 
 def _judged(
     tables: Sequence[JointTable], phases: Sequence[RecoveryPhase], places: RunPlaces, state: StoppedState
-) -> Judgement:
+) -> RecoveryJudgement:
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
     stopped = places.scene_while_stopped(state.lying)
     schedule = Schedule(times=times, tasks=())
@@ -134,7 +134,7 @@ def _judged(
         checks.append(_clearance(bound, times_of_run, f"{group[0].kind} from {times_of_run[0]:g} s"))
         timed += _timed(group, times, first, _nearest(bound, times_of_run))
         first = last
-    return Judgement(checks=tuple(checks), phases=tuple(timed), apart=tuple(apart))
+    return RecoveryJudgement(checks=tuple(checks), phases=tuple(timed), apart=tuple(apart))
 
 
 def _proved(

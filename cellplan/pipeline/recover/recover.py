@@ -10,7 +10,7 @@ from cellplan.io.run.joint_tables import TableHeader, program_digest, render_tab
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.recover.judge import Judgement, judged
+from cellplan.pipeline.recover.judge import RecoveryJudgement, judged
 from cellplan.pipeline.recover.phases import RecoveryPhase
 from cellplan.pipeline.recover.planner import RecoveryPlanner
 from cellplan.pipeline.recover.state import RunPlaces, StoppedState, stopped_state
@@ -36,7 +36,7 @@ class Recovery:
     run: str
     state: StoppedState
     tables: Mapping[str, str]
-    judgement: Judgement | None
+    judgement: RecoveryJudgement | None
     reason: str
     tried: tuple[str, ...]
 

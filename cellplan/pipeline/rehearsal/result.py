@@ -16,10 +16,20 @@ from cellplan.model.rehearsal import Rehearsal, RunRehearsal
 from cellplan.model.report import TaskAccuracy
 from cellplan.pipeline.rehearsal.record import EXECUTIONS, Pick, rehearsal_record
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import cell_page, inline_plots
 from cellplan.report.plots.errors import ORIENTATION, POSITION, ErrorKind, error_axis, error_panels, readable_unit
-from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Limit, Mark, Panel, time_axis, value_axis
+from cellplan.report.plots.figure import (
+    Figure,
+    Item,
+    Limit,
+    PlotAxis,
+    PlotCurve,
+    PlotMark,
+    PlotPanel,
+    time_axis,
+    value_axis,
+)
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import CheckRecord, Provenance, Record, as_json
@@ -142,17 +152,17 @@ def _envelope_figures(run: RunRehearsal, selected: Sequence[TaskAccuracy], *, na
     return {f"envelope_{name}_{task}": Figure(title=title, x=time_axis(run.times), panels=panels, columns=2)}
 
 
-def _range(times: Array, lengths: Array, *, kind: ErrorKind) -> Panel:
+def _range(times: Array, lengths: Array, *, kind: ErrorKind) -> PlotPanel:
     """Range of error lengths, shape (T, N)."""
     largest = float(lengths.max())
     unit, scale = readable_unit(largest, kind.units)
-    return Panel(
+    return PlotPanel(
         title=f"{kind.name}, in {unit}",
         y=value_axis(0.0, scale * largest or 1.0, unit=unit, is_floored=True),
         items=[
-            Curve("largest", times, scale * lengths.max(axis=0), LIMIT),
-            Curve("mean", times, scale * lengths.mean(axis=0), INK),
-            Curve("smallest", times, scale * lengths.min(axis=0), CLASSES[0]),
+            PlotCurve("largest", times, scale * lengths.max(axis=0), LIMIT),
+            PlotCurve("mean", times, scale * lengths.mean(axis=0), INK),
+            PlotCurve("smallest", times, scale * lengths.min(axis=0), CLASSES[0]),
         ],
     )
 
@@ -168,7 +178,7 @@ def _round_figures(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Figure
     orientation = [np.degrees([made.orientation[task] for made in correction.rounds]) for correction in corrections]
     figure = Figure(
         title=f"{task}: largest true error by correction round",
-        x=Axis(low=0.0, high=longest - 1.0, label="round"),
+        x=PlotAxis(low=0.0, high=longest - 1.0, label="round"),
         panels=[
             _rounds(position, title="position error", unit="mm", allowed=tolerance.position_mm),
             _rounds(orientation, title="orientation error", unit="deg", allowed=tolerance.orientation_deg),
@@ -178,14 +188,14 @@ def _round_figures(cell: Cell, run: RunRehearsal, task: str) -> dict[str, Figure
     return {f"rounds_{task}": figure}
 
 
-def _rounds(curves: Sequence[Array], *, title: str, unit: str, allowed: float) -> Panel:
+def _rounds(curves: Sequence[Array], *, title: str, unit: str, allowed: float) -> PlotPanel:
     """Errors by round."""
     items: list[Item] = [Limit(allowed, f"tolerance {allowed:.6g} {unit}")]
     for number, curve in enumerate(curves):
         colour, rounds = ROBOTS[number % len(ROBOTS)], np.arange(float(len(curve)))
-        items.append(Curve(f"trial {number}", rounds, curve, colour))
-        items += [Mark(float(made), float(value), colour) for made, value in zip(rounds, curve, strict=True)]
-    return Panel(title=f"{title}, in {unit}", y=error_axis(curves, allowed, unit=unit), items=items)
+        items.append(PlotCurve(f"trial {number}", rounds, curve, colour))
+        items += [PlotMark(float(made), float(value), colour) for made, value in zip(rounds, curve, strict=True)]
+    return PlotPanel(title=f"{title}, in {unit}", y=error_axis(curves, allowed, unit=unit), items=items)
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
@@ -258,7 +268,7 @@ def _digests(rehearsal: Rehearsal) -> dict[str, str]:
     }
 
 
-REHEARSAL: Final = Kind(
+REHEARSAL: Final = ResultKind(
     name="rehearsal",
     title="Rehearsal",
     file="rehearsal.json",

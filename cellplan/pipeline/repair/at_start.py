@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.model.units import MM
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.repair.attempts import PART, Attempt, RemedyKind
 from cellplan.scene.scene import Scene
 from cellplan.search.programs.problem import Point
@@ -32,7 +32,7 @@ class StartFault:
         return attempt.kind in KEEPS_START or self.robots.isdisjoint(attempt.robots)
 
 
-def start_faults(ready: Prepared, point: Point) -> tuple[StartFault, ...]:
+def start_faults(ready: PreparedSearch, point: Point) -> tuple[StartFault, ...]:
     """What the start of a motion misses of the demands."""
     problem, cell, margin = ready.coarse, ready.variables.base, ready.demands().margin
     holder = set(cell.positioners) or {PART}

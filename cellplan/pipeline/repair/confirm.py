@@ -12,9 +12,9 @@ from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_TIME
 from cellplan.model.report import Check
 from cellplan.model.units import MM
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch
 from cellplan.pipeline.repair.neat import changed_values, neat
-from cellplan.pipeline.repair.solved import Solved, demanded_margin
+from cellplan.pipeline.repair.solved import SolvedCell, demanded_margin
 from cellplan.pipeline.solve import solve
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.measures import reserves
@@ -38,12 +38,12 @@ class Confirmed:
 
     values: Mapping[str, object]  # what changes, by address of the cell file
     cost: float  # size of the change
-    solved: Solved | None  # the last solution; None where there is none
+    solved: SolvedCell | None  # the last solution; None where there is none
     reason: str  # why it is no remedy; empty where it passed
     solves: int  # how often it was solved
 
 
-def confirmed(ready: Prepared, x: Array, start: Array) -> Confirmed:
+def confirmed(ready: PreparedSearch, x: Array, start: Array) -> Confirmed:
     """A layout of the search, corrected until it passes every check with the demanded margins.
 
     Args:
@@ -89,18 +89,18 @@ def _refined(
     return improved, effort
 
 
-def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[Solved | None, str]:
+def solved_cell(cell: Cell, values: Mapping[str, object]) -> tuple[SolvedCell | None, str]:
     """A changed cell solved in full, and why it is no remedy; empty where it passes with the demanded margins."""
     try:
         changed = cell.with_values(values) if values else cell
-        solved = Solved(solution=solve(changed, is_reported=False), margin=demanded_margin(cell))
+        solved = SolvedCell(solution=solve(changed, is_reported=False), margin=demanded_margin(cell))
     except (InputError, NoSolutionError) as error:
         return None, str(error).splitlines()[0]
     failed = solved.failed
     return solved, failed[0].message if failed else ""
 
 
-def _tightened(solved: Solved, demands: Demands, effort: Effort) -> tuple[Demands, Effort] | None:
+def _tightened(solved: SolvedCell, demands: Demands, effort: Effort) -> tuple[Demands, Effort] | None:
     """Demands that ask for what the verified motion lacks; None where it lacks something else."""
     failed = solved.failed
     names = {check.name for check in failed}

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.layout import VariableKind
-from cellplan.pipeline.layout.prepared import Prepared, values_of
+from cellplan.pipeline.layout.prepared import PreparedSearch, values_of
 from cellplan.search.spline_path.problem import PathProblem
 
 LEAST: Final = 1e-3  # [-] cost of a change that is left out: 0.1 mm or 0.01 deg
@@ -16,7 +16,7 @@ ANGLE: Final = float(np.radians(0.01))  # [rad] to which angles are rounded
 SAME: Final = 2e-6  # [deg] or [mm] by which numbers differ that are the same but for their digits
 
 
-def neat(ready: Prepared, x: Array, start: Array) -> tuple[Array, Array]:
+def neat(ready: PreparedSearch, x: Array, start: Array) -> tuple[Array, Array]:
     """A layout with round numbers and its start posture; as it was where the tools cannot follow from there.
 
     Args:
@@ -41,7 +41,7 @@ def neat(ready: Prepared, x: Array, start: Array) -> tuple[Array, Array]:
     return (x, start) if point is None else (rounded, point.start)
 
 
-def changed_values(ready: Prepared, x: Array, start: Array) -> dict[str, object]:
+def changed_values(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object]:
     """What to write into the cell file, by address; nothing that stands in it already."""
     written = values_of(ready, x, start)
     document: Any = ready.cell.origin.document

@@ -12,7 +12,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.layout.joint_path import without_path
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.repair.attempts import Attempt
@@ -28,7 +28,7 @@ Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (
 
 
 @lru_cache(maxsize=1)
-def ready_cell(request: LayoutRequest) -> Prepared:
+def ready_cell(request: LayoutRequest) -> PreparedSearch:
     """The cell of a request with all that it lets a layout search change but joint paths; made once in each process.
 
     Where a joint path may change, so may the start posture of its robot, which decides the motion without one.
@@ -44,10 +44,10 @@ def ready_cell(request: LayoutRequest) -> Prepared:
                 f"{where}: expected no joint path for --repair, which begins with the motion without one: leave it "
                 "out, or search on from it with cellplan layout"
             )
-    return Prepared.of(request, without_path(cell) or cell)
+    return PreparedSearch.of(request, without_path(cell) or cell)
 
 
-def start_posture(ready: Prepared) -> tuple[Array, str]:
+def start_posture(ready: PreparedSearch) -> tuple[Array, str]:
     """The start posture of the given layout, shape (nq,), and why there is none; then one in mid-range."""
     try:
         return ready.given_start, ""
@@ -59,7 +59,7 @@ def start_posture(ready: Prepared) -> tuple[Array, str]:
         return np.concatenate(starts), str(error).splitlines()[0]
 
 
-def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
+def with_attempt(ready: PreparedSearch, attempt: Attempt) -> PreparedSearch:
     """The cell ready for a search of what one attempt may change.
 
     Raises:
@@ -68,10 +68,10 @@ def with_attempt(ready: Prepared, attempt: Attempt) -> Prepared:
     if attempt.addresses:
         variables = ready.variables.among(frozenset(attempt.addresses))
         return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
-    return Prepared.of(ready.request, _varied(ready.cell, attempt.vary))
+    return PreparedSearch.of(ready.request, _varied(ready.cell, attempt.vary))
 
 
-def begins(ready: Prepared, start: Array, *, seed: int, count: int) -> Iterator[Begin]:
+def begins(ready: PreparedSearch, start: Array, *, seed: int, count: int) -> Iterator[Begin]:
     """Where searches begin: the given layout, and small perturbations of it; of those with a motion only.
 
     Args:
@@ -95,7 +95,7 @@ def begins(ready: Prepared, start: Array, *, seed: int, count: int) -> Iterator[
             yield near
 
 
-def _near(ready: Prepared, start: Array, rng: np.random.Generator) -> Begin | None:
+def _near(ready: PreparedSearch, start: Array, rng: np.random.Generator) -> Begin | None:
     """The layout of least change among draws in which all tools follow their paths; None without one."""
     variables, problem = ready.variables, ready.coarse
     if isinstance(problem, PathProblem):

@@ -7,17 +7,17 @@ from typing import Annotated, Any, Final, TypedDict
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.check_kinds import JOINT_LIMITS, PASSED_BY_TIME
 from cellplan.model.units import DEG
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.repair.attempts import Attempt, RemedyKind
 from cellplan.pipeline.repair.wording import EffectRecord, change_text, effects
 from cellplan.pipeline.write_run import versions
 from cellplan.report.record.common import CheckRecord, Number, number
 from cellplan.report.record.schema import record_schema
 from cellplan.search.variables.pedestals import with_pedestals
-from cellplan.study.trial import Outcome, TrialStatus
+from cellplan.study.trial import TrialOutcome, TrialStatus
 
 SCHEMA: Final = "cellplan.advice/1"
-Tried = tuple[Attempt, Outcome]
+Tried = tuple[Attempt, TrialOutcome]
 DIGITS: Final = 6  # of a cost
 
 
@@ -75,8 +75,8 @@ class AdviceRecord(TypedDict):
 class Case:
     """A repair that is done."""
 
-    ready: Prepared  # the cell with all that may change
-    given: Outcome  # what came of it as it is given
+    ready: PreparedSearch  # the cell with all that may change
+    given: TrialOutcome  # what came of it as it is given
     remedies: Sequence[Tried]  # attempts that passed, the smallest first
     failures: Sequence[Tried]  # the others, in their order
 
@@ -129,13 +129,13 @@ def advice_record(case: Case) -> AdviceRecord:
     }
 
 
-def remedy_values(outcome: Outcome) -> dict[str, Any]:
+def remedy_values(outcome: TrialOutcome) -> dict[str, Any]:
     """What a remedy changes in the cell of the request, by address."""
     values: Any = outcome.figures["values"]
     return dict(values)
 
 
-def _remedy(case: Case, attempt: Attempt, outcome: Outcome) -> RemedyRecord:
+def _remedy(case: Case, attempt: Attempt, outcome: TrialOutcome) -> RemedyRecord:
     """One remedy; its settings are those of the file: what the request sets, then the change."""
     figures: Mapping[str, Any] = outcome.figures
     cell, values = case.ready.cell, remedy_values(outcome)

@@ -10,7 +10,7 @@ from cellplan.model.check_kinds import DISTANCES, JOINT_LIMITS, PASSED_BY_STEP, 
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.layout.limits import LimitRecord, standing_of
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.repair.at_start import StartFault, start_faults
@@ -31,7 +31,7 @@ from cellplan.pipeline.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
 from cellplan.search.programs.objective import Objective
 from cellplan.search.programs.problem import Point
 from cellplan.study.run import outcomes
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 FEW: Final = 6  # [-] attempts that take less time than further processes to start
 KINDS: Final = list(RemedyKind)
@@ -86,7 +86,7 @@ def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = sil
     return Repair(record=advice_record(case), given=ready.cell, best=best)
 
 
-def _violations(ready: Prepared, point: Point) -> list[LimitRecord]:
+def _violations(ready: PreparedSearch, point: Point) -> list[LimitRecord]:
     """What a motion breaks at the nodes of a search."""
     return standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
 
@@ -103,10 +103,10 @@ class _Work:
     workers: int  # number of processes
     progress: Progress  # called with the stage and the fraction done
     faults: Sequence[StartFault] = ()  # what the given start posture misses already
-    given: Outcome = field(default_factory=lambda: Outcome(status=TrialStatus.FAILED, figures={}))
+    given: TrialOutcome = field(default_factory=lambda: TrialOutcome(status=TrialStatus.FAILED, figures={}))
     tried: list[Tried] = field(default_factory=list)  # what came of the attempts
 
-    def try_all(self, ready: Prepared, seems_sound: bool) -> None:
+    def try_all(self, ready: PreparedSearch, seems_sound: bool) -> None:
         """Make attempts until changes of the layout of some number of robots pass, and all others."""
         if seems_sound:
             self._run([None])
@@ -130,7 +130,7 @@ class _Work:
             if job is None or fault is None:
                 jobs.append(job)
             else:
-                self.tried.append((job, Outcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
+                self.tried.append((job, TrialOutcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
         variants = [Variant(place, {"kind": GIVEN} if job is None else job.record) for place, job in enumerate(jobs)]
         workers = self.workers if len(jobs) > FEW else 1
         with outcomes(variants, partial(evaluate, self.request), workers) as every:
@@ -153,7 +153,7 @@ class _Work:
         return [tried for tried in self.tried if tried[1].status is not TrialStatus.PASSED]
 
 
-def _first(ready: Prepared) -> list[Attempt]:
+def _first(ready: PreparedSearch) -> list[Attempt]:
     """Attempts that do not depend on what comes of others."""
     cell, settings = ready.cell, ready.variables.settings
     paths = of_paths(searched_cell(ready.request))
@@ -161,7 +161,7 @@ def _first(ready: Prepared) -> list[Attempt]:
     return sorted(attempts, key=lambda attempt: KINDS.index(attempt.kind))
 
 
-def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
+def _about_limits(ready: PreparedSearch, given: TrialOutcome) -> list[Attempt]:
     """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
     checks, step = _failed(given), ready.cell.motion.step
     failed = {check["name"] for check in checks}
@@ -178,7 +178,7 @@ def _about_limits(ready: Prepared, given: Outcome) -> list[Attempt]:
     return attempts
 
 
-def _failed(given: Outcome) -> list[dict[str, Any]]:
+def _failed(given: TrialOutcome) -> list[dict[str, Any]]:
     """Failed checks of the cell as it is given."""
     names: Any = given.figures.get("failed", ())
     return list(names)

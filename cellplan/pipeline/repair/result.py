@@ -15,7 +15,7 @@ from cellplan.pipeline.layout.result_file import file_records, result_files
 from cellplan.pipeline.repair.record import AdviceRecord
 from cellplan.pipeline.repair.repair import Repair
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
 from cellplan.report.record.common import CheckRecord, Record, as_json
 from cellplan.report.record.numbers import seconds
@@ -205,7 +205,7 @@ def _head(record: AdviceRecord) -> str:
     )
 
 
-ADVICE: Final = Kind(
+ADVICE: Final = ResultKind(
     name="advice",
     title="Repair",
     file=RECORD,

@@ -21,7 +21,7 @@ MARGIN: Final = "joint_margin"  # a demanded margin among the checks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solved:
+class SolvedCell:
     """A solution measured against the demands of a repair."""
 
     solution: Solution

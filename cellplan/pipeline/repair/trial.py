@@ -10,16 +10,16 @@ from cellplan.geometry.arrays import Array
 from cellplan.io.cell.changes import plain_values
 from cellplan.pipeline.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
 from cellplan.pipeline.layout.limits import standing_of
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, Prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.pipeline.repair.confirm import Confirmed, confirmed, solved_cell
 from cellplan.pipeline.repair.prepare import begins, ready_cell, start_posture, with_attempt
-from cellplan.pipeline.repair.solved import Solved, required_time
+from cellplan.pipeline.repair.solved import SolvedCell, required_time
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.objective import Effort
 from cellplan.search.variables.written import written_starts
-from cellplan.study.trial import Outcome, TrialStatus, Variant
+from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 EFFORT: Final = Effort(iterations=25, keys=17)
 BEGINNINGS: Final = 3  # [-] from which the least change of a layout is sought
@@ -33,7 +33,7 @@ GIVEN: Final = "given"
 NO_MOTION: Final = "no layout nearby was found in which all tools follow their paths"
 
 
-def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
+def evaluate(request: LayoutRequest, variant: Variant) -> TrialOutcome:
     """The least change of one attempt that passes every check, or why there is none; the cell as given for none."""
     ready = ready_cell(request)
     if variant.values.get("kind") == GIVEN:
@@ -42,10 +42,10 @@ def evaluate(request: LayoutRequest, variant: Variant) -> Outcome:
     try:
         return _outcome(_least(ready, attempt))
     except (InputError, NoSolutionError) as error:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
 
 
-def _least(ready: Prepared, attempt: Attempt) -> Confirmed | str:
+def _least(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
     """The least change of an attempt, or why there is none."""
     match attempt.kind:
         case RemedyKind.BRANCH:
@@ -60,7 +60,7 @@ def _least(ready: Prepared, attempt: Attempt) -> Confirmed | str:
             return _of_values(ready, attempt.values, 0.0)
 
 
-def _of_variables(ready: Prepared, start: Array, attempt: Attempt) -> Confirmed | str:
+def _of_variables(ready: PreparedSearch, start: Array, attempt: Attempt) -> Confirmed | str:
     """The least change of variables."""
     count = BEGINNINGS if attempt.kind is RemedyKind.LAYOUT else FEWER
     candidates: list[Improved] = []
@@ -81,13 +81,13 @@ def _of_variables(ready: Prepared, start: Array, attempt: Attempt) -> Confirmed 
     return reason
 
 
-def _shortfall(ready: Prepared, improved: Improved) -> str:
+def _shortfall(ready: PreparedSearch, improved: Improved) -> str:
     """What the best layout of a search still breaks."""
     left = standing_of(ready.coarse, improved.point, ready.demands(), EFFORT).violations()
     return f"at best {left[0]['text']}" if left else "at best less room than is asked for beyond the demands"
 
 
-def _of_branch(ready: Prepared, attempt: Attempt) -> Confirmed | str:
+def _of_branch(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
     """The start posture of one robot sought anew, the others as they are."""
     given, reason = start_posture(ready)
     if reason:
@@ -108,9 +108,9 @@ def _of_branch(ready: Prepared, attempt: Attempt) -> Confirmed | str:
     return _of_values(ready, {key: values[key]}, cost)
 
 
-def _of_spin(ready: Prepared, attempt: Attempt) -> Confirmed | str:
+def _of_spin(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
     """The rotation of one tool about its own axis left open."""
-    opened = Prepared.of(ready.request, ready.cell.with_values(attempt.values))
+    opened = PreparedSearch.of(ready.request, ready.cell.with_values(attempt.values))
     point = opened.coarse.evaluate(opened.variables.given, start_posture(ready)[0])
     if point is None:
         return NOT_FOLLOWED
@@ -118,7 +118,7 @@ def _of_spin(ready: Prepared, attempt: Attempt) -> Confirmed | str:
     return left[0]["text"] if left else _of_values(ready, attempt.values, 0.0)
 
 
-def _slower(ready: Prepared, factor: float) -> Confirmed:
+def _slower(ready: PreparedSearch, factor: float) -> Confirmed:
     """The same motion so much slower, and more where that is not enough."""
     cell, longer_than = ready.cell, 1.0
     refuse_fixed_times(cell)
@@ -132,23 +132,23 @@ def _slower(ready: Prepared, factor: float) -> Confirmed:
         factor, longer_than = factor * required, factor
 
 
-def _of_values(ready: Prepared, values: Mapping[str, object], cost: float) -> Confirmed:
+def _of_values(ready: PreparedSearch, values: Mapping[str, object], cost: float) -> Confirmed:
     """Values solved once."""
     solved, reason = solved_cell(ready.cell, values)
     return Confirmed(values=values, cost=cost, solved=solved, reason=reason, solves=1)
 
 
-def _outcome(confirmation: Confirmed | str) -> Outcome:
+def _outcome(confirmation: Confirmed | str) -> TrialOutcome:
     """What came of an attempt, as plain data."""
     if isinstance(confirmation, str):
-        return Outcome(status=TrialStatus.FAILED, reason=confirmation, figures={})
-    solved: Solved | None = confirmation.solved
+        return TrialOutcome(status=TrialStatus.FAILED, reason=confirmation, figures={})
+    solved: SolvedCell | None = confirmation.solved
     figures: dict[str, Any] = {
         "values": plain_values(confirmation.values),
         "cost": confirmation.cost,
         "solves": confirmation.solves,
     }
     if solved is None:
-        return Outcome(status=TrialStatus.NO_SOLUTION, reason=confirmation.reason, figures=figures)
+        return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=confirmation.reason, figures=figures)
     status = TrialStatus.FAILED if confirmation.reason else TrialStatus.PASSED
-    return Outcome(status=status, reason=confirmation.reason, figures={**figures, **solved.figures})
+    return TrialOutcome(status=status, reason=confirmation.reason, figures={**figures, **solved.figures})

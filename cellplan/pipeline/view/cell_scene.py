@@ -20,7 +20,7 @@ from cellplan.pipeline.view.describe import (
     visual_records,
 )
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows, touching_pairs
+from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows, touching_pairs
 from cellplan.pipeline.view.result import FailureRecord, SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.transfer.best_try import STEP as TRY_STEP
@@ -85,7 +85,7 @@ def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Sce
         "facts": [["best try", blocked.tried.words]],
         "remarks": ["time is nominal: no time law was found"],
         "passed": False,
-        "nearest": nearest_record([Stretch(blocked.scene, 0, len(q))], times, q, sampled_rows(times, [at])),
+        "nearest": nearest_record([ViewedStretch(blocked.scene, 0, len(q))], times, q, sampled_rows(times, [at])),
         "failures": [{**_failure(what), "bodies": bodies, "at": at}],
     }
 
@@ -119,7 +119,7 @@ def _scene(scene: Scene, times: Array, q: Array, geometries: Geometries) -> Scen
         "part": [place_record(cell, 0.0)],
         "tasks": tasks,
         "motion": motion_record(times, q, []),
-        "nearest": nearest_record([Stretch(scene, 0, 1)], times[:1], q[:1], np.zeros(1, dtype=np.intp)),
+        "nearest": nearest_record([ViewedStretch(scene, 0, 1)], times[:1], q[:1], np.zeros(1, dtype=np.intp)),
         "certified": {"times": [], "distances": []},
         "contacts": [],
         "failures": [],

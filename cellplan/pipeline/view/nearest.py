@@ -24,7 +24,7 @@ DECIMALS: Final = 4  # of distances in [mm]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stretch:
+class ViewedStretch:
     """Rows of a motion that one scene is for: the first of them and the one after the last."""
 
     scene: Scene
@@ -49,7 +49,7 @@ def sampled_rows(times: Array, further: Iterable[float | None], steps: int = SAM
     return np.unique(np.concatenate([rows, np.array(named, dtype=np.intp)]))
 
 
-def nearest_record(stretches: Sequence[Stretch], times: Array, q: Array, rows: Indices) -> NearestRecord:
+def nearest_record(stretches: Sequence[ViewedStretch], times: Array, q: Array, rows: Indices) -> NearestRecord:
     """The closest pair of bodies that move against each other and are to keep a clearance, at some rows.
 
     Args:

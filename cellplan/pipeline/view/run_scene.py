@@ -22,7 +22,7 @@ from cellplan.pipeline.view.describe import (
     visual_records,
 )
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
+from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows
 from cellplan.pipeline.view.result import (
     ClearanceCurveRecord,
     ContactViewRecord,
@@ -45,7 +45,7 @@ SAME_TIME: Final = 1e-9  # [s] within which the end of a phase is the begin of t
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Played:
+class ViewedPhase:
     """A phase as it is played."""
 
     name: str  # name of the phase
@@ -80,7 +80,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     further += [failure["at"] for failure in failures]
     further += [at for one in played for at in _worst_times(stored.records[one.place], one.begin)]
     ends = [*firsts[1:], len(times)]
-    stretches = [Stretch(scenes[one.number], *rows) for one, *rows in zip(played, firsts, ends, strict=True)]
+    stretches = [ViewedStretch(scenes[one.number], *rows) for one, *rows in zip(played, firsts, ends, strict=True)]
     tasks, faults = task_records(cell)
     return {
         "name": cell.name,
@@ -121,7 +121,7 @@ def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> Motio
     }
 
 
-def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Played]:
+def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[ViewedPhase]:
     """The phases of the program in their order; those of further cycles repeat the first.
 
     Args:
@@ -130,7 +130,7 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
     """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]
     if "" in stored.records:
-        yield Played(name=phases[0]["name"], place="", begin=0.0, number=0, **_series(stored, "", cell))
+        yield ViewedPhase(name=phases[0]["name"], place="", begin=0.0, number=0, **_series(stored, "", cell))
         return
     read = {name: _series(stored, name, cell) for name in stored.records}
     for phase in phases:
@@ -140,7 +140,7 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Pl
         begin, read_phase = float(phase["begin_s"]), read[phase["name"]]
         shifted = {key: begin + read_phase[key] for key in ("times", "kept_times")}
         number = labels.index(phase["name"]) if phase["name"] in labels else 0
-        yield Played(name=phase["name"], place=phase["name"], begin=begin, number=number, **(read_phase | shifted))
+        yield ViewedPhase(name=phase["name"], place=phase["name"], begin=begin, number=number, **(read_phase | shifted))
 
 
 def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
@@ -179,7 +179,7 @@ def _positions(tree: Record, file: str, cell: Cell) -> tuple[Array, Array]:
     return times, q
 
 
-def _joined(played: Sequence[Played]) -> tuple[Array, Array, list[int]]:
+def _joined(played: Sequence[ViewedPhase]) -> tuple[Array, Array, list[int]]:
     """All rows one after the other, a row that two phases share once, and the first row of each phase."""
     times, q, firsts = [played[0].times], [played[0].q], [0]
     for before, one in pairwise(played):
@@ -198,7 +198,7 @@ def _phases(record: Record) -> list[dict[str, Any]]:
     return [{"name": phase["name"], "begin": phase["begin_s"], "end": phase["end_s"]} for phase in phases]
 
 
-def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceRecord]:
+def _part_places(played: Sequence[ViewedPhase], cells: Sequence[Cell]) -> list[PlaceRecord]:
     """What carries the part, phase by phase; a phase in which it stays where it was is left out."""
     places: list[PlaceRecord] = []
     for one in played:
@@ -208,7 +208,7 @@ def _part_places(played: Sequence[Played], cells: Sequence[Cell]) -> list[PlaceR
     return places
 
 
-def _certified(played: Sequence[Played]) -> ClearanceCurveRecord:
+def _certified(played: Sequence[ViewedPhase]) -> ClearanceCurveRecord:
     """The smallest distance of all classes over time, as the runs certify it."""
     times, distances = (
         np.concatenate([one.kept_times for one in played]),
@@ -234,7 +234,7 @@ def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
     return times, distances
 
 
-def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]) -> Iterator[ContactViewRecord]:
+def _contacts(stored: StoredRun, played: Sequence[ViewedPhase], index: dict[str, int]) -> Iterator[ContactViewRecord]:
     """What touches, on the clock of the program."""
     for one in played:
         for contact in stored.records[one.place].get("contacts", []):
@@ -249,7 +249,7 @@ def _contacts(stored: StoredRun, played: Sequence[Played], index: dict[str, int]
 
 
 def _failures(
-    stored: StoredRun, played: Sequence[Played], cell: Cell, index: dict[str, int]
+    stored: StoredRun, played: Sequence[ViewedPhase], cell: Cell, index: dict[str, int]
 ) -> Iterator[FailureRecord]:
     """Checks that failed, on the clock of the program, in the order of their times; those without one come last."""
     failures: list[FailureRecord] = []

@@ -20,7 +20,7 @@ from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.view.cell_scene import standing_scene
 from cellplan.pipeline.view.geometries import Geometries, shape_key
-from cellplan.pipeline.view.nearest import Stretch, nearest_record, sampled_rows
+from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows
 from cellplan.pipeline.view.result import SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.modes import plan_phases
@@ -146,7 +146,7 @@ def _moving(standing: SceneViewRecord, scene: Scene) -> SceneViewRecord:
         **standing,
         "facts": [["shown at", f"{times[-1]:.4g} s"], ["motion", "planned for this page, not verified"]],
         "motion": motion_record(times, q, []),
-        "nearest": nearest_record([Stretch(scene, 0, len(times))], times, q, every),
+        "nearest": nearest_record([ViewedStretch(scene, 0, len(times))], times, q, every),
     }
 
 

@@ -41,7 +41,7 @@ CONFIGURATION_SHARE: Final = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Attempt:
+class WindowResult:
     """What came of one window.
 
     Attributes:
@@ -147,7 +147,7 @@ class Collocation:
         return np.sort(np.concatenate(arrived))
 
     @np.errstate(divide="ignore", over="ignore", invalid="ignore")  # what is not a number does not settle
-    def attempt(self, window: Window, desired: Desired, q0: Array, placement: Placement) -> Attempt:
+    def attempt(self, window: Window, desired: Desired, q0: Array, placement: Placement) -> WindowResult:
         """Resolve one window from start postures, shape (nq, cells)."""
         cells, nodes = q0.shape[1], window.count
         q = np.repeat(q0[:, :, None], nodes, axis=2)
@@ -169,7 +169,7 @@ class Collocation:
             going = going[~is_there & ~is_lost]
             if not len(going):
                 break
-        return Attempt(q, is_settled, self._errors(window, repeated(desired, cells)[0], q, placement))
+        return WindowResult(q, is_settled, self._errors(window, repeated(desired, cells)[0], q, placement))
 
     def _pass(
         self, window: Window, desired: Desired, q: Array, placement: Placement, *, q0: Array

@@ -12,7 +12,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.planning.euler.cycle_closing import closed
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.motion_task import MotionTask
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 
 PROGRESS_EVERY: Final = 200  # [samples]
@@ -66,7 +66,7 @@ def integrate(
     return Motion(times=problem.times[: last + 1], q=q, iterations=iterations, slack=slack)
 
 
-def refuse_long_step(cell: Cell, q: Array, step: Advance) -> None:
+def refuse_long_step(cell: Cell, q: Array, step: StepResult) -> None:
     """Stop when a step is not finite, or so long that the first order no longer holds.
 
     Raises:

@@ -10,9 +10,9 @@ from typing import cast
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.solver import MethodName
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
-Step = Callable[[int, Array], Advance]
+Step = Callable[[int, Array], StepResult]
 Method = Callable[[TrackingProblem], Step]
 
 

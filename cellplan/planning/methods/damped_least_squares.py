@@ -6,13 +6,13 @@ from typing import Final
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.settings.solver import DampedLeastSquaresEntry
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING, ROUNDING, WeightedInverse
 
 FULL_GAIN: Final = 4.0  # times the region: from here on the feedback has its whole gain (Nicolato Eq. 2.14)
 
 
-def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     r"""Integrate damped least-squares speeds by Euler's method ([Nicolato2007]_ Eqs. 2.10-2.14).
 
     .. math:: \min_{\dot q} \; |J \dot q - v|^2 + \lambda^2 \dot q^T W \dot q,
@@ -23,7 +23,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
     """
     settings = problem.cell.solver.damped_least_squares
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         tasks = problem.first_order(k, q)
         inverse = WeightedInverse(tasks.J, tasks.weights)
         measure = nearness(inverse, settings)
@@ -33,7 +33,7 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Adv
         speeds = inverse.speeds(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
         if tasks.secondary is not None:
             speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
-        return Advance(q=q + speeds * problem.step(k))
+        return StepResult(q=q + speeds * problem.step(k))
 
     return advance
 

@@ -9,13 +9,13 @@ from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.configuration_search import Bounds, ConfigurationSearch, Pass, position_bounds
 from cellplan.planning.methods.support.joint_line import joint_lines
 from cellplan.planning.methods.support.search_cost import NO_EFFECT, Expansion, SearchCost
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 NEGLIGIBLE: Final = 1e-12  # share of the cost that a move must gain: below it a joint would turn for rounding errors
 HALVINGS: Final = 20  # of a move whose gain is only known to second order, before it is left out
 
 
-def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     """Best-first search among the joints of all robots ([Nicolato2007]_ Algorithm 1); all tasks add to the cost.
 
     A round goes: of all open joints the one whose best move leaves the least cost makes that move and is closed; when
@@ -32,7 +32,7 @@ def heuristic_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     improve = _best_first(search.cost, tolerance**2)
     before: dict[int, Array] = {}  # configuration at the time before the last one, by that one's number
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         problem.weights(k, q)  # refuses a lost path
         last = before.pop(k, None)
         before.clear()

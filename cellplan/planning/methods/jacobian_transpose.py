@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 SHORTENED: Final = 0.9  # of the step after which the error would be smallest: a little less ends the zigzag
 LEFT_OPEN: Final = 1e-3  # share of the desired correction below which it counts as made
@@ -16,7 +16,7 @@ LONGEST_MOVE: Final = 0.1  # [rad] or [m] of a joint between two evaluations: th
 MOST_LOOKS: Final = 8  # within one sample; what is left is left to the next
 
 
-def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     r"""Follow the errors alone, in steps that cannot overshoot ([Nicolato2007]_ Eq. 2.18, in the metric of W).
 
     .. math:: \dot q = W^{-1} J^T K e
@@ -29,10 +29,10 @@ def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], Advan
     .. math:: \Delta q \leftarrow \Delta q + \alpha W^{-1} J^T r, \qquad r \leftarrow r - \alpha J W^{-1} J^T r
 
     With the single step ``alpha = 1`` from ``r = K e dt`` this is the law as printed. The law knows no velocity of the
-    path: a tool lags behind by about ``(1 / K - dt)`` times its speed. ``Advance.iterations`` counts the steps.
+    path: a tool lags behind by about ``(1 / K - dt)`` times its speed. ``StepResult.iterations`` counts the steps.
     """
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         tasks = problem.first_order(k + 1, q)
         goal = max(1.0 - problem.gain * problem.step(k), 0.0) * tasks.error
         steps = 0
@@ -45,7 +45,7 @@ def jacobian_transpose(problem: TrackingProblem) -> Callable[[int, Array], Advan
             q = q + move * min(1.0, LONGEST_MOVE / longest) if longest > 0.0 else q
             if longest <= LONGEST_MOVE:
                 break
-        return Advance(q=q, iterations=steps)
+        return StepResult(q=q, iterations=steps)
 
     return advance
 

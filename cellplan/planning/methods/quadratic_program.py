@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.qp_engine import nearest_to_origin
 from cellplan.planning.methods.support.speed_bounds import JointBounds, SpeedBounds
-from cellplan.planning.tracking.problem import Advance, FirstOrder, TrackingProblem
+from cellplan.planning.tracking.problem import FirstOrder, StepResult, TrackingProblem
 
 STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
 
 
-def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     r"""Integrate by Euler's method; every step is a quadratic program with the limits as hard bounds.
 
     .. math:: \min_{\dot q, s} \tfrac12 (\dot q - \dot q_0)^T W (\dot q - \dot q_0) + \tfrac12 \rho \, s^T s
@@ -27,7 +27,7 @@ def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], Advanc
     limits = JointBounds(problem.cell)
     speeds: Array | None = None
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         nonlocal speeds
         if speeds is None:
             limits.refuse_outside(q)
@@ -42,7 +42,7 @@ def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], Advanc
             mobile=problem.mobile(k) > 0.0,
             slack_weight=problem.cell.solver.quadratic_program.slack_weight,
         )
-        return Advance(q=q + speeds * dt, slack=float(np.linalg.norm(xdot - tasks.J @ speeds)))
+        return StepResult(q=q + speeds * dt, slack=float(np.linalg.norm(xdot - tasks.J @ speeds)))
 
     return advance
 

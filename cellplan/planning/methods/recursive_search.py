@@ -17,7 +17,7 @@ from cellplan.planning.methods.support.configuration_search import (
     speed_bounds,
 )
 from cellplan.planning.methods.support.search_cost import NO_EFFECT, Expansion, SearchCost
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 SMALL_ANGLE: Final = 0.1  # [rad] or [m]: farther from an expansion its first order is not trusted at first
 ROUNDS_ON_A_LOOK: Final = 50  # before the cell is checked again: near a singularity all depends on where the joints are
@@ -27,7 +27,7 @@ AIM: Final = 0.25  # share of the allowed cost that the rounds are to leave to f
 Indices = NDArray[np.intp]
 
 
-def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     r"""Search joint by joint in a fixed sequence ([Nicolato2007]_ 3.4) over the joints of all robots and all tasks.
 
     For a small angle the cost along one joint is a parabola, and the joint goes to its lowest point (Eqs. 3.25-3.27):
@@ -51,7 +51,7 @@ def recursive_search(problem: TrackingProblem) -> Callable[[int, Array], Advance
     """
     sequence = _sequence(problem.cell)
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         weights = problem.weights(k, q)[sequence]  # refuses a lost path
         limits = speed_bounds(problem, k, q)
         bounds = Bounds(np.where(stands, q, limits.lowest), np.where(stands, q, limits.highest))

@@ -5,13 +5,13 @@ from typing import Final
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING, WeightedInverse
 
 SINGULAR_REGION: Final = 0.02  # smallest singular value below which damping sets in when it is left to the program
 
 
-def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     r"""Integrate by Euler's method with pose-error feedback ([Ribeiro2010]_ Fig. 23, Eq. D.1).
 
     .. math:: \dot q = J^\# (\dot x_d + K e) + (I - J^\# J) \dot q_0, \qquad q(t + dt) = q(t) + \dot q \, dt
@@ -19,13 +19,13 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
     so that the error obeys ``e_dot + K e = 0`` (Eq. D.7).
     """
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         tasks = problem.first_order(k, q)
         inverse = WeightedInverse(tasks.J, tasks.weights)
         speeds = damped_speeds(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
         if tasks.secondary is not None:
             speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
-        return Advance(q=q + speeds * problem.step(k))
+        return StepResult(q=q + speeds * problem.step(k))
 
     return advance
 

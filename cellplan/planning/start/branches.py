@@ -11,7 +11,7 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.task import Frame, Task
-from cellplan.planning.start.failures import Failures, Goal
+from cellplan.planning.start.failures import Failures, MissedGoal
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
     constrained_rank,
@@ -180,7 +180,9 @@ def _scored_branches(
     configurations = reaching_configurations(chain, relation, X_PT, X_WP=X_WP, seeds=seeds)
     q = within_limits(robot.model, configurations)
     if not len(q):
-        search.failures.unreached(robot.name, Goal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=configurations)
+        search.failures.unreached(
+            robot.name, MissedGoal(relation=relation, X_PT=X_PT, X_WP=X_WP), beyond=configurations
+        )
         return []
     manipulability = np.minimum(1.0, smallest_singular_values(chain, relation, X_PT, q) / COMFORTABLE)
     scores = np.sort(joint_margin_shares(robot.model, q), axis=1) * manipulability[:, None]
@@ -254,7 +256,7 @@ def _configurations_at(search: StartSearch, holder: Robot, relation: Relation, X
     )
     inside = within_limits(holder.model, configurations)
     if not len(inside):
-        goal = Goal(relation=relation, X_PT=X_W_holder, X_WP=np.eye(4))
+        goal = MissedGoal(relation=relation, X_PT=X_W_holder, X_WP=np.eye(4))
         search.failures.unreached(holder.name, goal, beyond=configurations)
         return inside
     order = best_first(np.column_stack([np.sort(joint_margin_shares(holder.model, inside), axis=1), inside]))

@@ -21,7 +21,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class StartContact:
     """Two bodies that touch."""
 
     robot: str  # the robot whose configurations were evaluated
@@ -38,7 +38,7 @@ class Contact:
 
 def contacts_of(
     trials: StartTrials, cell: Cell, robot: Robot, tried: Sequence[tuple[Array, Array | None]]
-) -> list[Contact]:
+) -> list[StartContact]:
     """Contacts of one robot with itself and with what does not depend on the other robots' choices, most often first.
 
     Args:
@@ -52,13 +52,15 @@ def contacts_of(
         counts.update(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among))
     bodies = {body.name: body for body in trials.bodies}
     contacts = [
-        Contact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
+        StartContact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
         for pair, count in counts.items()
     ]
     return sorted(contacts, key=lambda contact: (-contact.count, [body.name for body in contact.bodies]))
 
 
-def touches_anywhere(trials: StartTrials, cell: Cell, contact: Contact, holder_configuration: Array | None) -> bool:
+def touches_anywhere(
+    trials: StartTrials, cell: Cell, contact: StartContact, holder_configuration: Array | None
+) -> bool:
     """Whether two bodies touch at configurations from the whole range of their robot's joints as well."""
     robot = cell.robot(contact.robot)
     names = {body.name for body in contact.bodies}

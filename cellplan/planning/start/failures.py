@@ -13,7 +13,7 @@ MOST_GOALS: Final = 6  # goals of a robot that are considered again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Goal:
+class MissedGoal:
     """Where a tool was desired: a task or grasp, the desired tip, and the frame that it is given in, in the world."""
 
     relation: Relation
@@ -32,7 +32,9 @@ class Failures:
     """
 
     arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
-    missed: dict[str, list[Goal]] = field(default_factory=dict)  # goals that no configuration within the limits reaches
+    missed: dict[str, list[MissedGoal]] = field(
+        default_factory=dict
+    )  # goals that no configuration within the limits reaches
     misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
     beyond: dict[str, list[Array]] = field(default_factory=dict)
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
@@ -43,7 +45,7 @@ class Failures:
         arrived = self.arrived.setdefault(robot, [])
         arrived += [(configuration, holder_configuration) for configuration in q[: MOST_KEPT - len(arrived)]]
 
-    def unreached(self, robot: str, goal: Goal, *, beyond: Array) -> None:
+    def unreached(self, robot: str, goal: MissedGoal, *, beyond: Array) -> None:
         """Keep a goal that a robot does not reach, and configurations that do outside its limits, shape (K, n)."""
         self.misses[robot] = self.misses.get(robot, 0) + 1
         goals = self.missed.setdefault(robot, [])

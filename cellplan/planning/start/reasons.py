@@ -11,7 +11,7 @@ from cellplan.model.doubts import doubt_about, doubt_about_all
 from cellplan.model.robot import Joint
 from cellplan.model.seeds import generator
 from cellplan.planning.start.branches import SEEDS, SEEDS_PER_HOLDER, StartSearch
-from cellplan.planning.start.contacts import Contact, contacts_between, contacts_of, touches_anywhere
+from cellplan.planning.start.contacts import StartContact, contacts_between, contacts_of, touches_anywhere
 from cellplan.planning.start.given import off_words, start_place
 from cellplan.planning.start.inverse_kinematics import on_nearest_turns, random_configurations
 from cellplan.planning.start.nearest_reach import nearest_reach
@@ -33,12 +33,12 @@ def why_nothing(search: StartSearch, holder_count: int) -> str:
     return _unreached_words(search, holder_count)
 
 
-def _unavoidable(search: StartSearch) -> list[Contact]:
+def _unavoidable(search: StartSearch) -> list[StartContact]:
     """Contacts in every configuration of some robot, one for each robot.
 
     Those that are there wherever the robot is come first, and of these what stands in the surroundings.
     """
-    contacts: list[Contact] = []
+    contacts: list[StartContact] = []
     for robot in search.cell.robots:
         tried = search.failures.arrived.get(robot.name, [])
         if robot.start is not None or not tried:
@@ -51,12 +51,12 @@ def _unavoidable(search: StartSearch) -> list[Contact]:
     return sorted(contacts, key=_urgency)
 
 
-def _urgency(contact: Contact) -> tuple[bool, bool]:
+def _urgency(contact: StartContact) -> tuple[bool, bool]:
     """What decides which contact is named first."""
     return not contact.is_everywhere, contact.bodies[1].robot is not None
 
 
-def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) -> str:
+def _unavoidable_words(search: StartSearch, contact: StartContact, *others: StartContact) -> str:
     """What to say of a contact that no configuration of a robot avoids, and of the same of other robots."""
     cell, (body, other) = search.cell, contact.bodies
     also = ", and wherever else its joints may be" if contact.is_everywhere else ""
@@ -73,13 +73,13 @@ def _unavoidable_words(search: StartSearch, contact: Contact, *others: Contact) 
     )
 
 
-def _is_everywhere(search: StartSearch, contact: Contact) -> bool:
+def _is_everywhere(search: StartSearch, contact: StartContact) -> bool:
     """Whether a contact is there wherever its robot is."""
     holder_configuration = search.failures.arrived[contact.robot][0][1]
     return touches_anywhere(search.trials, search.cell, contact, holder_configuration)
 
 
-def _cure(contact: Contact) -> str:
+def _cure(contact: StartContact) -> str:
     """What to change so that two bodies need not touch."""
     robot, (body, other) = contact.robot, contact.bodies
     if other.robot == robot:

@@ -19,7 +19,7 @@ from cellplan.planning.start.combinations import Picks, best_combinations
 from cellplan.planning.start.failures import Failures
 from cellplan.planning.start.near_ties import best_first, levels
 from cellplan.planning.start.reasons import why_nothing
-from cellplan.planning.start.trial_motion import StartTrials, Trial
+from cellplan.planning.start.trial_motion import StartTrial, StartTrials
 from cellplan.scene.scene import Scene
 
 CANDIDATES: Final = 10  # configurations of the whole cell that are tried out at first
@@ -33,7 +33,7 @@ class StartChoice:
 
     start: Array  # stacked start configuration in the order of the file, shape (nq,)
     tried: int = 0  # how many were tried out; 0 when all were given
-    trial: Trial | None = None  # what is known of the motion from it; None when all were given
+    trial: StartTrial | None = None  # what is known of the motion from it; None when all were given
     fault: str = ""  # what is wrong with that motion; empty where nothing is
 
     @property
@@ -91,10 +91,10 @@ def choose_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Pr
     return StartChoice(start=order.as_listed(best.start), tried=len(tried), trial=best, fault=fault)
 
 
-def _tried(search: StartSearch, progress: Progress) -> list[Trial]:
+def _tried(search: StartSearch, progress: Progress) -> list[StartTrial]:
     """Trials of the candidates, round by round until one is sound."""
     candidates = _candidates(search, progress)
-    tried: list[Trial] = []
+    tried: list[StartTrial] = []
     for _ in range(ROUNDS):
         judged = []
         for index, candidate in enumerate(islice(candidates, CANDIDATES)):
@@ -167,7 +167,7 @@ def _culprits(cell: Cell, pair: tuple[str, str], picks: Picks) -> tuple[tuple[in
     )
 
 
-def _fault(trial: Trial, joints: Sequence[tuple[str, str]]) -> str:
+def _fault(trial: StartTrial, joints: Sequence[tuple[str, str]]) -> str:
     """What is wrong with the motion of a trial; joints are named by robot and joint."""
     if not trial.is_followed:
         return "a tool loses its path"

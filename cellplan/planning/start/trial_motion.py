@@ -39,7 +39,7 @@ LOST: Final = -1e6  # stands for the share that a motion leaves free which loses
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Trial:
+class StartTrial:
     """What is known of the motion from one start configuration of the whole cell.
 
     Attributes:
@@ -131,7 +131,7 @@ class StartTrials:
             left[self.pair_names.index(pair)] = False
         return pairs
 
-    def judge(self, start: Array, *, may_turn: bool = True) -> Trial:
+    def judge(self, start: Array, *, may_turn: bool = True) -> StartTrial:
         """What follows from a start configuration of the whole cell in the order of names, shape (nq,).
 
         Args:
@@ -142,17 +142,17 @@ class StartTrials:
             motions = self._motions(self._cell, start, self._phases)
         except NoSolutionError:
             lost = np.full(len(start), LOST)
-            return Trial(start=start, ranges=lost, speeds=lost, is_followed=False)
+            return StartTrial(start=start, ranges=lost, speeds=lost, is_followed=False)
         turns = _whole_turns(self._cell, np.concatenate(motions)) if may_turn else np.zeros(len(start))
         shares = [_shares_left_free(self._cell, q + turns, self._step) for q in motions]
-        return Trial(
+        return StartTrial(
             start=start + turns,
             ranges=np.min([ranges for ranges, _ in shares], axis=0),
             speeds=np.min([speeds for _, speeds in shares], axis=0),
             contact=next(filter(None, map(self._contact_on_the_way, self._phases, motions)), ""),
         )
 
-    def looked_at_closely(self, trials: Sequence[Trial]) -> list[Trial]:
+    def looked_at_closely(self, trials: Sequence[StartTrial]) -> list[StartTrial]:
         """Trials with the shares of the whole motion on the accurate clock, which sees what lies between samples.
 
         A trial that the accurate mode cannot follow keeps the shares of the coarse clock, and so do all of them where

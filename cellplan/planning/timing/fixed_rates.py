@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.timing.path_length import Stretch
+from cellplan.planning.timing.path_length import PathStretch
 
 RATES: Final = (1.0, 0.5, 0.05)  # [-] of the tolerance left: rates tried, the demanded one first
 SLOWEST: Final = 16.0  # [-] times the nominal time for what is not demanded: tried at most
@@ -66,7 +66,7 @@ class AtRest:
 class AtFixedRate:
     """Motion of a stretch between two rests at one rate of the nominal time in all that is demanded."""
 
-    piece: Stretch
+    piece: PathStretch
     spans: Array  # stretches of nominal time in [s] within it, shape (n, 2), in their order, that do not overlap
     rate: float  # rate of the nominal time in these
     step: float  # time between two rows in [s]

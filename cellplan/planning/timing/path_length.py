@@ -23,7 +23,7 @@ HALVINGS: Final = 60  # of an interval: down to the last digit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stretch:
+class PathStretch:
     """A stretch of a path between two rests of all joints."""
 
     path: JointPath  # the whole path
@@ -66,7 +66,7 @@ class Stretch:
         return directions
 
 
-def stretches(path: JointPath, top_speeds: Array) -> list[Stretch]:
+def stretches(path: JointPath, top_speeds: Array) -> list[PathStretch]:
     """The stretches of a path between rests of all joints; where all stand still for a while, there is none.
 
     A corner that the path passes at speed ends a stretch as well: joints can pass it at rest only.
@@ -92,7 +92,7 @@ def stretches(path: JointPath, top_speeds: Array) -> list[Stretch]:
     return pieces
 
 
-def _stretch(path: JointPath, scale: Array, sigma: Array) -> Stretch:
+def _stretch(path: JointPath, scale: Array, sigma: Array) -> PathStretch:
     """One stretch: its length by Gauss's rule with three points between neighbouring nominal times."""
     points, weights = np.polynomial.legendre.leggauss(3)
     width = np.diff(sigma)
@@ -101,7 +101,7 @@ def _stretch(path: JointPath, scale: Array, sigma: Array) -> Stretch:
     lengths = np.append(0.0, np.cumsum(0.5 * width * (speeds @ weights)))
     rates = np.linalg.norm(path.at(sigma, 1) * scale, axis=1)
     rates[0] = np.linalg.norm(path.at(sigma[:1] + BEHIND, 1) * scale)
-    return Stretch(path=path, scale=scale, sigma=sigma, lengths=lengths, rates=rates)
+    return PathStretch(path=path, scale=scale, sigma=sigma, lengths=lengths, rates=rates)
 
 
 def _kinks(path: JointPath, scale: Array) -> Sequence[int]:

@@ -24,8 +24,8 @@ from cellplan.planning.timing.fixed_rates import (
     spans_within,
     whole_steps,
 )
-from cellplan.planning.timing.path_length import Stretch, stretches
-from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, Rows
+from cellplan.planning.timing.path_length import PathStretch, stretches
+from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, TimedRows
 from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
 
 POINTS_PER_ROW: Final = 5  # [-] lengths for every row of the tables at first; at least doubled once
@@ -56,7 +56,7 @@ class StepTolerance(Protocol):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointBounds:
+class JointLimitsInTime:
     """Limits of all joints in [rad] or [m] and seconds, shape (nq,) each; infinite for none."""
 
     velocity: Array
@@ -82,7 +82,7 @@ class Retimer:
             Where they cannot be kept by a slower motion they are left to the checks.
     """
 
-    bounds: JointBounds  # limits of all joints
+    bounds: JointLimitsInTime  # limits of all joints
     step: float  # time between two rows in [s]
     feed_share: Callable[[Array], Array]
     slower: Slower
@@ -95,7 +95,7 @@ class Retimer:
         Args:
             path: The joints over the nominal time.
         """
-        made: list[tuple[int, Rows]] = []
+        made: list[tuple[int, TimedRows]] = []
         rest = 0.0
         for piece in stretches(path, self.bounds.velocity):
             made += [*self._rest(rest, float(piece.sigma[0])), self._at_fixed_rate(piece) or self._settled(piece)]
@@ -116,7 +116,7 @@ class Retimer:
             retimed = replace(retimed, counts=counts)
         return retimed
 
-    def _rest(self, begin: float, end: float) -> list[tuple[int, Rows]]:
+    def _rest(self, begin: float, end: float) -> list[tuple[int, TimedRows]]:
         """What is demanded of a rest of all joints with its steps; nothing where no time has to pass.
 
         Where errors between rows count, a rest takes a step at least: in a step into it or out of it the nominal time
@@ -127,7 +127,7 @@ class Retimer:
         takes_steps = len(spans) or (self.errors is not None and end - begin > MARGIN)
         return [(whole_steps(waits.seconds, self.step), waits)] if takes_steps else []
 
-    def _at_fixed_rate(self, piece: Stretch) -> tuple[int, Rows] | None:
+    def _at_fixed_rate(self, piece: PathStretch) -> tuple[int, TimedRows] | None:
         """The motion of one stretch with the demanded rates; None where nothing is demanded, or limits forbid it."""
         begin, end = float(piece.sigma[0]), float(piece.sigma[-1])
         spans = spans_within(self.fixed_rates, begin, end)
@@ -144,7 +144,7 @@ class Retimer:
                 return count, motion
         return None
 
-    def _settled(self, piece: Stretch) -> tuple[int, Rows]:
+    def _settled(self, piece: PathStretch) -> tuple[int, TimedRows]:
         """The motion of one stretch with its steps, from so many lengths that twice as many change it little."""
         written = AsWritten(piece)
         count = max(2, round(float(piece.sigma[-1] - piece.sigma[0]) / self.step))
@@ -166,7 +166,7 @@ class Retimer:
         slow = self._tolerant(slow, written) if slow < count else slow
         return (slow, written) if slow < count else (count, motion)
 
-    def _tolerant(self, count: int, motion: Rows) -> int:
+    def _tolerant(self, count: int, motion: TimedRows) -> int:
         """Steps of a motion made slower until no tool is farther off between rows than is allowed."""
         for number in range(MOST_STRETCHINGS):
             share = float(self.errors.largest(motion.rows(count)).max()) if self.errors else 0.0
@@ -175,7 +175,7 @@ class Retimer:
             count = _longer(count, share**0.5) if number < MOST_ROOTS else count + 1
         return count
 
-    def _best(self, piece: Stretch, points: int) -> tuple[int, Rows]:
+    def _best(self, piece: PathStretch, points: int) -> tuple[int, TimedRows]:
         """The shortest motion of one stretch among the windows and shares that are tried, and its steps."""
         build_up = self.bounds.build_up
         if build_up:
@@ -187,7 +187,7 @@ class Retimer:
         best = counts.index(min(counts))
         return counts[best], tried[best]
 
-    def _profile(self, piece: Stretch, points: int, bend_share: float | None = None) -> SpeedProfile:
+    def _profile(self, piece: PathStretch, points: int, bend_share: float | None = None) -> SpeedProfile:
         """Fastest motion along one stretch; lengths lie closer to each other near the rests.
 
         At a constant speed v of the path a joint has the jerk v^3 times its third derivative by the length: with a
@@ -212,7 +212,7 @@ class Retimer:
             highest=highest,
         )
 
-    def _steps(self, piece: Stretch, motion: Rows, duration: float) -> int:
+    def _steps(self, piece: PathStretch, motion: TimedRows, duration: float) -> int:
         """Steps that a motion of one stretch takes, made slower as a whole until every limit holds in its rows."""
         count = max(2, int(np.ceil(duration / self.step * (1.0 - MARGIN))))
         for _ in range(MOST_STRETCHINGS):

@@ -6,13 +6,13 @@ from typing import Final, Protocol, Self
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.timing.path_length import Stretch
+from cellplan.planning.timing.path_length import PathStretch
 from cellplan.planning.timing.speed_profile import SpeedProfile
 
 TIME_DECIMALS: Final = 12  # decimals kept of nominal times
 
 
-class Rows(Protocol):
+class TimedRows(Protocol):
     """Motion of one stretch: its rows for any number of steps."""
 
     def rows(self, count: int) -> Array:
@@ -27,15 +27,15 @@ class Rows(Protocol):
 class AsWritten:
     """The motion that the time laws give, slower or faster as a whole."""
 
-    piece: Stretch
+    piece: PathStretch
 
     def rows(self, count: int) -> Array:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         return np.linspace(self.piece.sigma[0], self.piece.sigma[-1], count + 1)
 
     @property
     def is_fixed(self) -> bool:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         return False
 
 
@@ -43,7 +43,7 @@ class AsWritten:
 class RestToRest:
     """The fastest motion of one stretch, its speed averaged over a window in [s]."""
 
-    piece: Stretch
+    piece: PathStretch
     profile: SpeedProfile
     window: float
 
@@ -53,7 +53,7 @@ class RestToRest:
         return self.profile.duration + self.window
 
     def rows(self, count: int) -> Array:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         share = np.arange(count + 1) / count
         lengths = self.profile.at(share * self.duration, self.window)
         lengths[-1] = self.piece.length
@@ -61,7 +61,7 @@ class RestToRest:
 
     @property
     def is_fixed(self) -> bool:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         return False
 
 
@@ -69,7 +69,7 @@ class RestToRest:
 class RetimedPath:
     """Motion along a whole path; every rest of all joints is a row."""
 
-    motions: tuple[Rows, ...]  # the motion of each stretch
+    motions: tuple[TimedRows, ...]  # the motion of each stretch
     counts: tuple[int, ...]  # steps that each of them takes
     end: float  # last nominal time in [s]
 

@@ -58,7 +58,7 @@ class FirstOrder:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Advance:
+class StepResult:
     """One step of a resolution method."""
 
     q: Array  # stacked joint vector at the next sample, shape (nq,)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.planning.timing.retime import JointBounds, Retimer
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 
 NEAR: Final = 1.02  # [-] factor of time up to which the law is slowed as a whole; above, its top speed is lowered
 TRIES: Final = 60  # [-] until every limit holds in the rows
@@ -46,7 +46,7 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     return q
 
 
-def box_widths(move: Array, bounds: JointBounds, *, least: float) -> tuple[float, float, float]:
+def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float) -> tuple[float, float, float]:
     """Widths of the three boxes in [s], none below ``least``, the widest first."""
     length = np.abs(move)
     moved = length > 0.0

@@ -95,7 +95,7 @@ def connected_in_time(
         The way; or the numbers of configurations reached from the start and from the goal where none was found.
     """
     (start, begin), (goal, end) = ends
-    search = _Search(check, box.velocity)
+    search = _TreeSearch(check, box.velocity)
     trees = [
         TimedTree(sign=1, x=[start / box.velocity], ticks=[begin]),
         TimedTree(sign=-1, x=[goal / box.velocity], ticks=[end]),
@@ -140,7 +140,7 @@ def shortened_in_time(check: MoveCheck, way: TimedWay, rng: np.random.Generator)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Search:
+class _TreeSearch:
     """What trees grow among."""
 
     check: MoveCheck

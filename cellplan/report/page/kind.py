@@ -10,7 +10,7 @@ from cellplan.report.record.rows import Tables
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
+class ResultKind:
     """A kind of result."""
 
     name: str  # as the schema of its record has it

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from cellplan.report.plots.figure import Box, Curve, Figure, Limit, Mark
+from cellplan.report.plots.figure import Figure, Limit, PlotBox, PlotCurve, PlotMark
 from cellplan.report.plots.no_backend import no_backend
 from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, INK, LIMIT
-from cellplan.report.plots.placing import INCH, SWATCH, TICK, Placed, PlacedPanel, Words, placed
+from cellplan.report.plots.placing import INCH, SWATCH, TICK, PlacedFigure, PlacedPanel, Words, placed
 
 with no_backend():
     import matplotlib as mpl
@@ -71,7 +71,7 @@ def paint(figure: Figure, kind: str) -> bytes:
     return buffer.getvalue()
 
 
-def _artists(layout: Placed) -> Iterator[tuple[Artist, PlacedPanel | None]]:
+def _artists(layout: PlacedFigure) -> Iterator[tuple[Artist, PlacedPanel | None]]:
     """Everything in a figure, and the panel at whose frame it is cut off, if any."""
     is_plane = layout.figure.is_plane
     for x, y, colour in layout.swatches:
@@ -117,15 +117,15 @@ def _line(box: PlacedPanel, x: Any, y: Any, **pen: Any) -> Line2D:
 
 def _item(box: PlacedPanel, item: object, order: float) -> Iterator[Artist]:
     """One item of a panel but for its words."""
-    if isinstance(item, Curve):
+    if isinstance(item, PlotCurve):
         dashes = {"linestyle": (0, (4 / item.width, 3 / item.width))} if item.is_dashed else {}
         x, y = box.across(np.asarray(item.x)), box.down(np.asarray(item.y))
         yield _line(box, x, y, color=item.colour, linewidth=item.width, zorder=order, **dashes)
-    elif isinstance(item, Mark):
+    elif isinstance(item, PlotMark):
         pen = {"marker": "*" if item.is_star else "o", "markersize": item.size, "linestyle": "none"}
         pen |= {"color": item.colour, "markeredgecolor": item.edge or item.colour, "markeredgewidth": 0.6}
         yield _line(box, [box.across(item.x)], [box.down(item.y)], zorder=order, **pen)
-    elif isinstance(item, Box):
+    elif isinstance(item, PlotBox):
         (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
         corner, size = (box.left + left, box.top + top), (right - left, bottom - top)
         fill: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "linewidth": 0, "antialiased": False}

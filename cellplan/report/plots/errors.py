@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.report.plots.figure import Axis, Curve, Item, Key, Limit, Mark, Panel, value_axis
+from cellplan.report.plots.figure import Item, LegendKey, Limit, PlotAxis, PlotCurve, PlotMark, PlotPanel, value_axis
 from cellplan.report.plots.palette import AXES, INK, LIMIT
 from cellplan.report.record.numbers import small
 
@@ -40,7 +40,7 @@ ORIENTATION: Final = ErrorKind(
 )
 
 
-def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind) -> list[Panel]:
+def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind) -> list[PlotPanel]:
     """The length of an error with its tolerance, and the error by axis.
 
     Args:
@@ -54,10 +54,10 @@ def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind)
     worst = int(total.argmax())
     largest = float(total[worst])
     items: list[Item] = [Limit(scale * allowed, f"tolerance {scale * allowed:.6g} {unit}")]
-    items.append(Curve(kind.name, times, scale * total))
+    items.append(PlotCurve(kind.name, times, scale * total))
     colour = LIMIT if largest > allowed else INK
-    items.append(Mark(float(times[worst]), scale * largest, colour))
-    length = Panel(
+    items.append(PlotMark(float(times[worst]), scale * largest, colour))
+    length = PlotPanel(
         title=f"{kind.name}, total, in {unit}",
         note=_largest_text(largest, allowed, scale, float(times[worst])),
         y=error_axis([scale * total], scale * allowed, unit=unit),
@@ -73,21 +73,21 @@ def _largest_text(largest: float, allowed: float, scale: float, at_s: float) -> 
     return f"largest {small(scale * largest)} at {at_s:.3f} s"
 
 
-def _by_axis(times: Array, error: Array, kind: ErrorKind) -> Panel:
+def _by_axis(times: Array, error: Array, kind: ErrorKind) -> PlotPanel:
     """The three components; ripples below the smallest unit are not blown up to fill the picture."""
     largest = float(np.abs(error).max())
     unit, scale = readable_unit(largest, kind.units)
     reach = max(scale * largest, 1.0 if scale * largest < MIN_IN_UNIT else 0.0)
     named = list(zip(kind.axes, AXES, strict=True))
-    return Panel(
+    return PlotPanel(
         title=f"{kind.name} by axis, in {unit}",
-        keys=[Key(axis, colour) for axis, colour in named],
+        keys=[LegendKey(axis, colour) for axis, colour in named],
         y=value_axis(-reach, reach, unit=unit),
-        items=[Curve(axis, times, scale * error[:, i], colour, 1.1) for i, (axis, colour) in enumerate(named)],
+        items=[PlotCurve(axis, times, scale * error[:, i], colour, 1.1) for i, (axis, colour) in enumerate(named)],
     )
 
 
-def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> Axis:
+def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> PlotAxis:
     """A logarithmic axis that shows errors and their tolerance.
 
     It reaches from the decade of the smallest errors, or from four decades below the largest, to above both.
@@ -102,7 +102,7 @@ def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> Axis:
     smallest = max(min(positive), FAR_BELOW * largest) if positive else 1e-3 * top
     decade = math.floor(math.log10(min(smallest, 0.1 * top)))
     low = max(decade, math.floor(math.log10(top)) - DECADES)
-    return Axis(low=10.0**low, high=HEADROOM * top, unit=unit, is_log=True)
+    return PlotAxis(low=10.0**low, high=HEADROOM * top, unit=unit, is_log=True)
 
 
 def readable_unit(largest: float, units: tuple[tuple[str, float], ...]) -> tuple[str, float]:

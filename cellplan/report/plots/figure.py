@@ -14,7 +14,7 @@ WIDTH, ROW = 10.0, 1.75  # [inch] of a figure; from one row of panels to the nex
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Axis:
+class PlotAxis:
     """What is measured along one side of a panel.
 
     Attributes:
@@ -36,12 +36,12 @@ class Axis:
         return (np.asarray(values, dtype=float) - self.low) / (self.high - self.low)
 
 
-def time_axis(times: Array) -> Axis:
+def time_axis(times: Array) -> PlotAxis:
     """The axis of the time of a motion."""
-    return Axis(low=float(times[0]), high=float(times[-1]), label="time in s", unit="s", is_time=True)
+    return PlotAxis(low=float(times[0]), high=float(times[-1]), label="time in s", unit="s", is_time=True)
 
 
-def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = False) -> Axis:
+def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = False) -> PlotAxis:
     """An axis for values, with some room at its ends.
 
     Args:
@@ -51,10 +51,10 @@ def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = Fa
         is_floored: Whether the axis begins at the smallest value itself.
     """
     padding = PADDING_FRACTION * (high - low) or 1.0
-    return Axis(low=low if is_floored else low - padding, high=high + padding, unit=unit)
+    return PlotAxis(low=low if is_floored else low - padding, high=high + padding, unit=unit)
 
 
-class Curve(NamedTuple):
+class PlotCurve(NamedTuple):
     """A polyline: its name, and its points, shape (K,) each; NaN interrupts it."""
 
     name: str
@@ -75,7 +75,7 @@ class Limit(NamedTuple):
     is_vertical: bool = False  # whether it limits the values along the x axis
 
 
-class Mark(NamedTuple):
+class PlotMark(NamedTuple):
     """A point of note, such as the worst instant: a dot or a star, with an edge where that has a colour."""
 
     x: float
@@ -86,7 +86,7 @@ class Mark(NamedTuple):
     is_star: bool = False
 
 
-class Box(NamedTuple):
+class PlotBox(NamedTuple):
     """A filled rectangle: a bar, a place, an area that is swept."""
 
     x: tuple[float, float]
@@ -108,21 +108,21 @@ class Note(NamedTuple):
     moved: tuple[float, float] = (0.0, 0.0)
 
 
-def line(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> Curve:
+def line(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> PlotCurve:
     """A line through points of the plane, shape (K, 2)."""
     x, y = np.array(points, dtype=float).reshape(-1, 2).T
-    return Curve("", x, y, colour, width, is_dashed)
+    return PlotCurve("", x, y, colour, width, is_dashed)
 
 
-def outline(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> Curve:
+def outline(points: Any, *, colour: str, width: float, is_dashed: bool = False) -> PlotCurve:
     """A closed line through points of the plane, shape (K, 2)."""
     return line([*points, points[0]], colour=colour, width=width, is_dashed=is_dashed)
 
 
-Item = Curve | Limit | Mark | Box | Note
+Item = PlotCurve | Limit | PlotMark | PlotBox | Note
 
 
-class Key(NamedTuple):
+class LegendKey(NamedTuple):
     """An entry of a legend: a text with the colour that it explains, or a text alone."""
 
     text: str
@@ -132,14 +132,14 @@ class Key(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Panel:
+class PlotPanel:
     """One pair of axes."""
 
     title: str  # text at its upper left
-    y: Axis  # its upward axis
+    y: PlotAxis  # its upward axis
     items: Sequence[Item]  # what it shows, in the order in which it is drawn
     note: str = ""  # small text at its upper right
-    keys: Sequence[Key] = ()  # names of its curves in their colours, at its upper right
+    keys: Sequence[LegendKey] = ()  # names of its curves in their colours, at its upper right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -151,12 +151,12 @@ class Figure:
     """
 
     title: str  # text above the panels
-    x: Axis  # their axis from left to right
-    panels: Sequence[Panel]  # the panels, row by row
+    x: PlotAxis  # their axis from left to right
+    panels: Sequence[PlotPanel]  # the panels, row by row
     columns: int = 1  # number of panels in a row
     width: float = WIDTH  # width of the figure in [inch]
     row: float = ROW  # height of a row of panels in [inch]
     is_plane: bool = False
-    legend: Sequence[Key] = ()  # texts to the right of the panels
+    legend: Sequence[LegendKey] = ()  # texts to the right of the panels
     is_exact: bool = False  # whether its colours are data, and stay as they are on a dark page
     text: str = ""  # what the figure shows, for those who do not see it

@@ -8,7 +8,18 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import JointUse, Report
 from cellplan.model.units import rounded_down
-from cellplan.report.plots.figure import Axis, Curve, Figure, Item, Key, Limit, Mark, Panel, time_axis, value_axis
+from cellplan.report.plots.figure import (
+    Figure,
+    Item,
+    LegendKey,
+    Limit,
+    PlotAxis,
+    PlotCurve,
+    PlotMark,
+    PlotPanel,
+    time_axis,
+    value_axis,
+)
 from cellplan.report.plots.palette import INK, LIMIT, ROBOTS
 from cellplan.report.plots.placing import number_sign
 from cellplan.report.record.common import shortened
@@ -69,7 +80,7 @@ def _figure(
     return Figure(title=title, x=x, panels=panels, columns=min(2, len(panels)))
 
 
-def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *, is_margin: bool) -> Panel:
+def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *, is_margin: bool) -> PlotPanel:
     """The joints of one robot, with the worst instant of all."""
     names = [use.joint for use in uses]
     if sum(map(len, names)) > MAX_LETTERS:
@@ -80,28 +91,28 @@ def _robot(robot: str, uses: Sequence[JointUse], shares: Array, times: Array, *,
     is_bad = value < 0.0 if is_margin else value > PERCENT
     items: list[Item] = [_limit(is_margin=is_margin)]
     items += [
-        Curve(use.joint, times, shares[:, i], pen, 1.1) for i, (use, pen) in enumerate(zip(uses, pens, strict=True))
+        PlotCurve(use.joint, times, shares[:, i], pen, 1.1) for i, (use, pen) in enumerate(zip(uses, pens, strict=True))
     ]
-    items.append(Mark(float(times[row]), value, LIMIT if is_bad else INK))
-    return Panel(
+    items.append(PlotMark(float(times[row]), value, LIMIT if is_bad else INK))
+    return PlotPanel(
         title=shortened(robot, LONGEST_NAME),
-        keys=[Key(name, pen) for name, pen in zip(names, pens, strict=True)],
+        keys=[LegendKey(name, pen) for name, pen in zip(names, pens, strict=True)],
         note=f"{uses[int(joint)].joint}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.3f} s",
         y=_axis(shares, is_margin=is_margin),
         items=items,
     )
 
 
-def _crowd(shares: Shares, times: Array, colours: Mapping[str, str], *, is_margin: bool) -> Panel:
+def _crowd(shares: Shares, times: Array, colours: Mapping[str, str], *, is_margin: bool) -> PlotPanel:
     """The worst joint of every robot at each instant."""
     worst = {robot: values.min(axis=1) if is_margin else values.max(axis=1) for robot, (_, values) in shares.items()}
     stacked = np.stack(list(worst.values()))
     robot, row = np.unravel_index(int(stacked.argmin() if is_margin else stacked.argmax()), stacked.shape)
     value = float(stacked[robot, row])
     items: list[Item] = [_limit(is_margin=is_margin)]
-    items += [Curve(name, times, curve, colours[name], 1.0) for name, curve in worst.items()]
-    items.append(Mark(float(times[row]), value))
-    return Panel(
+    items += [PlotCurve(name, times, curve, colours[name], 1.0) for name, curve in worst.items()]
+    items.append(PlotMark(float(times[row]), value))
+    return PlotPanel(
         title="worst joint of each robot",
         note=f"{list(worst)[int(robot)]}: {_worst_text(value, is_margin=is_margin)} at {times[row]:.3f} s",
         y=_axis(stacked, is_margin=is_margin),
@@ -114,7 +125,7 @@ def _limit(*, is_margin: bool) -> Limit:
     return Limit(0.0, is_upper=False) if is_margin else Limit(PERCENT)
 
 
-def _axis(shares: Array, *, is_margin: bool) -> Axis:
+def _axis(shares: Array, *, is_margin: bool) -> PlotAxis:
     """The axis of shares: the whole range for margins, up to the limit at least for speeds."""
     if is_margin:
         return value_axis(min(0.0, float(shares.min())), PERCENT, unit="%")

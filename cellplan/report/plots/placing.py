@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.report.plots.figure import Axis, Figure, Key, Limit, Note, Panel
+from cellplan.report.plots.figure import Figure, LegendKey, Limit, Note, PlotAxis, PlotPanel
 from cellplan.report.plots.palette import GREY, INK, LIMIT
 
 INCH: Final = 72.0  # [point]; the lengths below are in points
@@ -44,8 +44,8 @@ class Words(NamedTuple):
 class PlacedPanel:
     """A panel with the box of its curves; its words are placed from the upper left corner of that box."""
 
-    panel: Panel
-    x: Axis  # its axis from left to right
+    panel: PlotPanel
+    x: PlotAxis  # its axis from left to right
     left: float  # left edge of the box
     top: float  # upper edge of the box
     width: float  # width of the box
@@ -64,7 +64,7 @@ class PlacedPanel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Placed:
+class PlacedFigure:
     """A figure with the places of its panels and texts."""
 
     figure: Figure
@@ -78,7 +78,7 @@ class Placed:
 SWATCH: Final = (13.0, 8.6)  # width and height
 
 
-def placed(figure: Figure) -> Placed:
+def placed(figure: Figure) -> PlacedFigure:
     """The places of everything in a figure."""
     legend = LEGEND if figure.legend else 0.0
     head = HEAD if figure.title else UNTITLED_HEAD
@@ -99,16 +99,16 @@ def placed(figure: Figure) -> Placed:
     words += [_entry(key, left, y) for key, y in entries]
     swatches = [(left, y - 0.5 * SWATCH[1], key.colour) for key, y in entries if key.colour]
     shown = [token for token in words if token.text]
-    return Placed(figure=figure, width=width, height=height, panels=panels, words=shown, swatches=swatches)
+    return PlacedFigure(figure=figure, width=width, height=height, panels=panels, words=shown, swatches=swatches)
 
 
-def _entry(key: Key, left: float, y: float) -> Words:
+def _entry(key: LegendKey, left: float, y: float) -> Words:
     """A text of the legend."""
     x = left + SWATCH[0] + 6.0 if key.colour else left
     return Words(x, y + 8.0 * MIDDLE, key.text, colour=key.ink or INK, is_bold=key.is_bold)
 
 
-def _plane(figure: Figure, panel: Panel, head: float) -> PlacedPanel:
+def _plane(figure: Figure, panel: PlotPanel, head: float) -> PlacedPanel:
     """The box of a plane, to scale."""
     spans = (figure.x.high - figure.x.low, panel.y.high - panel.y.low)
     scale = PLANE_LONGEST / max(spans)
@@ -132,7 +132,7 @@ def _grid(figure: Figure, head: float, width: float) -> Iterator[PlacedPanel]:
 
 def _panel(
     figure: Figure,
-    panel: Panel,
+    panel: PlotPanel,
     corner: tuple[float, float],
     size: tuple[float, float],
     ticks: tuple[Sequence[float], Sequence[float]],
@@ -155,7 +155,7 @@ def _panel(
     return replace(box, words=[token for token in words if token.text])
 
 
-def _headings(panel: Panel, width: float) -> Iterator[Words]:
+def _headings(panel: PlotPanel, width: float) -> Iterator[Words]:
     """Title, names of the curves and note above a panel."""
     yield Words(0.0, -5.0, panel.title, size=8.5, is_bold=True, kind="title")
     x = 8.5 * LETTER * len(panel.title) + 8.0
@@ -190,7 +190,7 @@ def _words_within(box: PlacedPanel) -> Iterator[Words]:
             yield Words(box.width - 3.0, y, number_sign(item.label), 7.0, LIMIT, anchor="end")
 
 
-def nice_ticks(axis: Axis, count: int) -> list[float]:
+def nice_ticks(axis: PlotAxis, count: int) -> list[float]:
     """About so many round numbers along an axis; powers of ten on a logarithmic one."""
     if axis.is_log:
         first, last = math.ceil(math.log10(axis.low) - 1e-9), math.floor(math.log10(axis.high) + 1e-9)
@@ -205,7 +205,7 @@ def nice_ticks(axis: Axis, count: int) -> list[float]:
     return [float(f"{k * step:.9g}") for k in range(first, last + 1)]
 
 
-def number_text(value: float, axis: Axis) -> str:
+def number_text(value: float, axis: PlotAxis) -> str:
     """A number at an axis."""
     if axis.is_log:
         exponent = round(math.log10(value))

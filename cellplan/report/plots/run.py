@@ -12,7 +12,7 @@ from cellplan.model.report import ClearanceClass, ClosureAccuracy, Conditioning,
 from cellplan.model.task import Frame
 from cellplan.model.units import rounded_down
 from cellplan.report.plots.errors import ORIENTATION, POSITION, error_panels
-from cellplan.report.plots.figure import Curve, Figure, Item, Limit, Mark, Panel, time_axis, value_axis
+from cellplan.report.plots.figure import Figure, Item, Limit, PlotCurve, PlotMark, PlotPanel, time_axis, value_axis
 from cellplan.report.plots.joint_shares import margins_figure, speeds_figure
 from cellplan.report.plots.palette import CLASSES, INK, LIMIT, robot_colours
 from cellplan.report.plots.placing import SUPERSCRIPTS, number_sign
@@ -89,7 +89,7 @@ def _positions_figure(robot: str, uses: Sequence[JointUse], report: Report, colo
     panels = []
     for i, use in enumerate(uses):
         unit, scale = use.display_unit
-        curve = Curve(use.joint, report.times, scale * report.q[robot][:, i], colour)
+        curve = PlotCurve(use.joint, report.times, scale * report.q[robot][:, i], colour)
         worst_at_s = use.margin_at_s if math.isfinite(use.margin) else None
         limits = (scale * use.lower, scale * use.upper)
         panels.append(_joint_panel(curve, limits, unit, note=_margin_note(use, scale), worst_at_s=worst_at_s))
@@ -110,20 +110,22 @@ def _velocities_figure(robot: str, uses: Sequence[JointUse], report: Report, col
     middle, panels = 0.5 * (report.times[1:] + report.times[:-1]), []
     for i, use in enumerate(uses):
         unit, scale = use.display_unit
-        curve = Curve(use.joint, middle, scale * report.qd[robot][:, i], colour)
+        curve = PlotCurve(use.joint, middle, scale * report.qd[robot][:, i], colour)
         limits = (-scale * use.velocity_limit, scale * use.velocity_limit)
         note = f"peak {scale * use.peak_velocity:.1f} at {use.peak_velocity_at_s:.3f} s"
         panels.append(_joint_panel(curve, limits, f"{unit}/s", note=note, worst_at_s=use.peak_velocity_at_s))
     return _joint_figure(f"{robot}: joint velocities", panels, report.times)
 
 
-def _joint_figure(title: str, panels: Sequence[Panel], times: Array) -> Figure:
+def _joint_figure(title: str, panels: Sequence[PlotPanel], times: Array) -> Figure:
     """The joints of a robot side by side."""
     columns = min(JOINT_COLUMNS, max(len(panels), 1))
     return Figure(title=title, x=time_axis(times), panels=panels, columns=columns)
 
 
-def _joint_panel(curve: Curve, limits: tuple[float, float], unit: str, *, note: str, worst_at_s: float | None) -> Panel:
+def _joint_panel(
+    curve: PlotCurve, limits: tuple[float, float], unit: str, *, note: str, worst_at_s: float | None
+) -> PlotPanel:
     """One panel that shows the whole allowed range and whatever lies outside it."""
     lower, upper = limits
     drawn = [limit for limit in limits if math.isfinite(limit)]
@@ -132,9 +134,9 @@ def _joint_panel(curve: Curve, limits: tuple[float, float], unit: str, *, note: 
     if worst_at_s is not None:
         worst = int(np.argmin(np.abs(curve.x - worst_at_s)))
         value = float(curve.y[worst])
-        items.append(Mark(float(curve.x[worst]), value, INK if lower <= value <= upper else LIMIT))
+        items.append(PlotMark(float(curve.x[worst]), value, INK if lower <= value <= upper else LIMIT))
     span = (min([float(curve.y.min()), *drawn]), max([float(curve.y.max()), *drawn]))
-    return Panel(title=f"{curve.name}, in {unit}", note=note, y=value_axis(*span, unit=unit), items=items)
+    return PlotPanel(title=f"{curve.name}, in {unit}", note=note, y=value_axis(*span, unit=unit), items=items)
 
 
 def _clearance_figure(report: Report, required: float) -> Figure:
@@ -143,23 +145,23 @@ def _clearance_figure(report: Report, required: float) -> Figure:
     return Figure(title="clearance over time", x=time_axis(report.times), panels=panels, columns=2)
 
 
-def _clearance_panel(report: Report, required: float, index: int) -> Panel:
+def _clearance_panel(report: Report, required: float, index: int) -> PlotPanel:
     """One class, with the required clearance in [mm]."""
     kind, title = list(CLASS_TITLES.items())[index]
     distances = 1e3 * report.clearance.curves.get(kind, np.empty(0))
     minimum = report.clearance.minima.get(kind)
     known = distances[np.isfinite(distances)]
     if not len(known) or minimum is None or minimum.minimum is None or minimum.at_s is None:
-        return Panel(title=title, note="no such pair", y=value_axis(0.0, 1.0, is_floored=True), items=[])
+        return PlotPanel(title=title, note="no such pair", y=value_axis(0.0, 1.0, is_floored=True), items=[])
     smallest, word = 1e3 * minimum.minimum, "smallest" if minimum.exact else "at least"
-    return Panel(
+    return PlotPanel(
         title=f"{title}, in mm",
         note=f"{word} {rounded_down(smallest):.1f} at {minimum.at_s:.3f} s, required {required:g}",
         y=value_axis(0.0, max(float(known.max()), required) or 1.0, unit="mm", is_floored=True),
         items=[
             Limit(required, is_upper=False),
-            Curve("distance", report.clearance.curve_times, distances, CLASSES[index]),
-            Mark(minimum.at_s, smallest, LIMIT if smallest < required else INK),
+            PlotCurve("distance", report.clearance.curve_times, distances, CLASSES[index]),
+            PlotMark(minimum.at_s, smallest, LIMIT if smallest < required else INK),
         ],
     )
 
@@ -177,17 +179,17 @@ def _singularity_figure(conditioning: Conditioning, times: Array, colours: Mappi
     return Figure(title=title, x=time_axis(times), panels=panels, columns=JOINT_COLUMNS)
 
 
-def _smallest(name: str, values: Array, times: Array, colour: str) -> Panel:
+def _smallest(name: str, values: Array, times: Array, colour: str) -> PlotPanel:
     """A quantity that should not come near zero."""
     worst = int(np.argmin(values))
     unit, scale = _power_of_ten(float(values.max()))
     at_s, smallest = float(times[worst]), scale * float(values[worst])
     is_long = len(name + unit) > MAX_TITLE_LETTERS
-    return Panel(
+    return PlotPanel(
         title=shortened(name, MAX_TITLE_LETTERS) + unit,
         note=f"{'' if is_long else 'smallest '}{smallest:.2g} at {at_s:.3f} s",
         y=value_axis(0.0, scale * float(values.max()) or 1.0, is_floored=True),
-        items=[Curve(name, times, scale * values, colour), Mark(at_s, smallest)],
+        items=[PlotCurve(name, times, scale * values, colour), PlotMark(at_s, smallest)],
     )
 
 

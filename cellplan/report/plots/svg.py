@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.report.plots.figure import Box, Curve, Figure, Limit, Mark
+from cellplan.report.plots.figure import Figure, Limit, PlotBox, PlotCurve, PlotMark
 from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, LIMIT, PAPER, dark_rules
-from cellplan.report.plots.placing import SWATCH, TICK, Placed, PlacedPanel, Words, gaps, placed
+from cellplan.report.plots.placing import SWATCH, TICK, PlacedFigure, PlacedPanel, Words, gaps, placed
 from cellplan.report.plots.thinning import peaks_kept, straightened
 
 FINE: Final = 100  # coordinates to a point
@@ -39,7 +39,7 @@ def inline_svg(text: str) -> str:
     return STYLE.sub("", text, count=1)
 
 
-def _head(placement: Placed) -> Iterator[str]:
+def _head(placement: PlacedFigure) -> Iterator[str]:
     """The opening tag, what the figure shows in words, its style for dark pages and its paper."""
     figure = placement.figure
     size = f"{placement.width:.6g} {placement.height:.6g}"
@@ -88,13 +88,13 @@ def _short(length: float) -> str:
     return f"{length:.2f}".rstrip("0").rstrip(".")
 
 
-def _swatches(placement: Placed) -> Iterator[str]:
+def _swatches(placement: PlacedFigure) -> Iterator[str]:
     """The colours of the legend."""
     for x, y, colour in placement.swatches:
         yield f'<rect x="{x:.2f}" y="{y:.2f}" width="{SWATCH[0]:g}" height="{SWATCH[1]:g}" fill="{colour}"/>'
 
 
-def _panels(placement: Placed) -> Iterator[str]:
+def _panels(placement: PlacedFigure) -> Iterator[str]:
     """Every panel."""
     is_plane = placement.figure.is_plane
     for box in placement.panels:
@@ -149,11 +149,11 @@ def _plane_frame(box: PlacedPanel) -> str:
 
 def _item(box: PlacedPanel, item: object) -> Iterator[str]:
     """The elements of one item but for its words."""
-    if isinstance(item, Curve):
+    if isinstance(item, PlotCurve):
         yield from _curve(box, item)
-    elif isinstance(item, Mark):
+    elif isinstance(item, PlotMark):
         yield from _mark(_fine(box.across(item.x)), _fine(box.down(item.y)), item)
-    elif isinstance(item, Box):
+    elif isinstance(item, PlotBox):
         (left, right), (bottom, top) = box.across(np.array(item.x)).tolist(), box.down(np.array(item.y)).tolist()
         place = f'x="{_fine(left)}" y="{_fine(top)}" width="{_fine(right) - _fine(left)}"'
         opacity = f' fill-opacity="{item.opacity:g}"' if item.opacity < 1.0 else ""
@@ -171,7 +171,7 @@ def _fine(length: Array | float) -> int:
     return round(float(np.clip(FINE * np.asarray(length), -FARTHEST, FARTHEST)))
 
 
-def _curve(box: PlacedPanel, curve: Curve) -> Iterator[str]:
+def _curve(box: PlacedPanel, curve: PlotCurve) -> Iterator[str]:
     """A curve as one path, thinned so that every peak is kept; nothing where it has no points."""
     x, y = np.asarray(curve.x, dtype=float), np.asarray(curve.y, dtype=float)
     is_function = len(x) > 2 and bool(np.all(np.diff(x) >= 0.0))
@@ -202,7 +202,7 @@ def _numbers(values: Sequence[int]) -> str:
     return " ".join(map(str, values)).replace(" -", "-")
 
 
-def _mark(x: int, y: int, mark: Mark) -> Iterator[str]:
+def _mark(x: int, y: int, mark: PlotMark) -> Iterator[str]:
     """A dot as a line without length and with round ends; a star as a polygon."""
     size = FINE * mark.size
     if mark.is_star:

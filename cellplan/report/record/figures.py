@@ -22,7 +22,7 @@ Fold = Callable[..., Any]  # max, min or sum
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class FigureQuantity:
     """A quantity of a program."""
 
     key: str  # of its worst value, in records and tables
@@ -53,21 +53,21 @@ class Shown:
 
 # fmt: off
 _LISTED: Final = (
-    Quantity("cycle_time_s", sum, sum, 1.0, "", None, "duration of the program"),
-    Quantity("parts_per_h", max, max, 1.0, "", None, "programs in an hour, one after the other"),
-    Quantity("load_ratio", max, max, 1.0, "", None, "share of the cycle in which the limits would allow the same motion; 1: the shortest"),
-    Quantity("failed_checks", sum, sum, 1.0, "", None, "checks that failed"),
-    Quantity("max_position_error_mm", max, max, MM, "", 0.0, "largest position error of a tool, at the rows or between them"),
-    Quantity("max_orientation_error_deg", max, max, DEG, "", 0.0, "largest orientation error of a tool, likewise"),
-    Quantity("min_margin_deg", min, min, DEG, "min_margin_joint", None, "smallest distance of a revolute joint from a position limit"),
-    Quantity("max_velocity_ratio", max, max, 1.0, "max_velocity_joint", None, "largest joint velocity as a share of its limit"),
-    Quantity("max_acceleration_ratio", max, max, 1.0, "max_acceleration_joint", None, "largest joint acceleration as a share of its limit, where one counts"),
-    Quantity("min_clearance_mm", min, min, MM, "min_clearance_pair", None, "smallest certified distance of two bodies; null if it was not certified"),
-    Quantity("max_tool_speed_mm_s", max, max, MM, "max_tool_speed_robot", 0.0, "largest speed of a tool tip in the world"),
-    Quantity("max_axis_speed_mm_s", max, max, MM, "max_axis_speed_joint", None, "largest speed of a point on a joint axis: shoulder, elbow or wrist"),
-    Quantity("share_above_250_mm_s", sum, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
-    Quantity("load_s", sum, sum, 1.0, "", None, "for all joints added up, the time that a joint needs for its travel at top speed"),
-    Quantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
+    FigureQuantity("cycle_time_s", sum, sum, 1.0, "", None, "duration of the program"),
+    FigureQuantity("parts_per_h", max, max, 1.0, "", None, "programs in an hour, one after the other"),
+    FigureQuantity("load_ratio", max, max, 1.0, "", None, "share of the cycle in which the limits would allow the same motion; 1: the shortest"),
+    FigureQuantity("failed_checks", sum, sum, 1.0, "", None, "checks that failed"),
+    FigureQuantity("max_position_error_mm", max, max, MM, "", 0.0, "largest position error of a tool, at the rows or between them"),
+    FigureQuantity("max_orientation_error_deg", max, max, DEG, "", 0.0, "largest orientation error of a tool, likewise"),
+    FigureQuantity("min_margin_deg", min, min, DEG, "min_margin_joint", None, "smallest distance of a revolute joint from a position limit"),
+    FigureQuantity("max_velocity_ratio", max, max, 1.0, "max_velocity_joint", None, "largest joint velocity as a share of its limit"),
+    FigureQuantity("max_acceleration_ratio", max, max, 1.0, "max_acceleration_joint", None, "largest joint acceleration as a share of its limit, where one counts"),
+    FigureQuantity("min_clearance_mm", min, min, MM, "min_clearance_pair", None, "smallest certified distance of two bodies; null if it was not certified"),
+    FigureQuantity("max_tool_speed_mm_s", max, max, MM, "max_tool_speed_robot", 0.0, "largest speed of a tool tip in the world"),
+    FigureQuantity("max_axis_speed_mm_s", max, max, MM, "max_axis_speed_joint", None, "largest speed of a point on a joint axis: shoulder, elbow or wrist"),
+    FigureQuantity("share_above_250_mm_s", sum, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
+    FigureQuantity("load_s", sum, sum, 1.0, "", None, "for all joints added up, the time that a joint needs for its travel at top speed"),
+    FigureQuantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
 )
 SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
     "cycle_time_s": Shown("cycle time<br>s", partial(fixed, digits=3), "cycle s", 1.0, "cycle time, in s"),
@@ -80,8 +80,8 @@ SHOWN: Final[Mapping[str, Shown]] = MappingProxyType({
     "min_clearance_mm": Shown("clearance<br>mm", floored, "clearance mm", 1.0, "smallest certified clearance, in mm"),
 })
 # fmt: on
-QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({quantity.key: quantity for quantity in _LISTED})
-SUBJECTS: Final[Mapping[str, Quantity]] = MappingProxyType(
+QUANTITIES: Final[Mapping[str, FigureQuantity]] = MappingProxyType({quantity.key: quantity for quantity in _LISTED})
+SUBJECTS: Final[Mapping[str, FigureQuantity]] = MappingProxyType(
     {quantity.subject: quantity for quantity in _LISTED if quantity.subject}
 )
 

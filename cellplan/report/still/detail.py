@@ -23,7 +23,7 @@ SMALLEST_FRAME: Final = 60  # half edge of the frame round what is enlarged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Window:
+class DetailWindow:
     """A square of the sheet: its left upper corner and its edge."""
 
     x: int
@@ -54,7 +54,7 @@ def is_worth_it(picture: StillPicture, camera: Camera, edge: int) -> bool:
     return len(picture.mark) > 0 and edge / _shown(picture, camera) > ENLARGED * camera.scale
 
 
-def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[tuple[str, int], str]) -> str:
+def detail(picture: StillPicture, camera: Camera, window: DetailWindow, classes: dict[tuple[str, int], str]) -> str:
     """What matters, enlarged in a window without what hides it, with a frame round its place in the picture.
 
     Args:
@@ -86,7 +86,7 @@ def detail(picture: StillPicture, camera: Camera, window: Window, classes: dict[
     )
 
 
-def _framed_place(at: Array, half: float, window: Window) -> str:
+def _framed_place(at: Array, half: float, window: DetailWindow) -> str:
     """Frame round what is enlarged, and lines from it to the window."""
     x, y = round(float(at[0] - half)), round(float(at[1] - half))
     size = round(2.0 * half)

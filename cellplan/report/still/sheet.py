@@ -10,7 +10,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import bounding_box
 from cellplan.report.record.common import shortened
 from cellplan.report.still.camera import Camera, framed
-from cellplan.report.still.detail import Window, detail, is_worth_it, mark
+from cellplan.report.still.detail import DetailWindow, detail, is_worth_it, mark
 from cellplan.report.still.floor import floor_paths, shadow_path
 from cellplan.report.still.painter import Painter
 from cellplan.report.still.picture import StillPicture
@@ -57,7 +57,7 @@ def still_svg(picture: StillPicture) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _framing(picture: StillPicture) -> tuple[Camera, Window | None]:
+def _framing(picture: StillPicture) -> tuple[Camera, DetailWindow | None]:
     """The camera, and the place of an enlarged detail where it shows more."""
     low = np.array([MARGIN, TITLE + LINE * len(picture.notes) + GAP])
     high = np.array([WIDTH - MARGIN, HEIGHT - NAME_BELOW - 100])
@@ -67,7 +67,7 @@ def _framing(picture: StillPicture) -> tuple[Camera, Window | None]:
     axes = best_axes(picture, float(size[0] / size[1]))
     framing = framed(axes, points, low=low, high=narrow)
     if is_worth_it(picture, framing, DETAIL):
-        return framing, Window(x=WIDTH - MARGIN - DETAIL, y=round(float(low[1])), edge=DETAIL)
+        return framing, DetailWindow(x=WIDTH - MARGIN - DETAIL, y=round(float(low[1])), edge=DETAIL)
     return framed(axes, points, low=low, high=high), None
 
 

@@ -15,7 +15,7 @@ AT_ONCE: Final = 128  # [-] configurations placed together: about 10 MB
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
+class PlaceContact:
     """Two bodies that are too near."""
 
     pair: tuple[str, str]  # their names
@@ -23,7 +23,7 @@ class Contact:
     node: int  # node of the motion at which it is so
 
 
-def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool = True) -> list[Contact | None]:
+def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool = True) -> list[PlaceContact | None]:
     """The worst contact of each motion at the first nodes that show one; None for a motion without any.
 
     Args:
@@ -36,7 +36,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
     if stands_by_link(scene.cell, robot) and len(q) > 1:  # its pairs depend on where it stands
         slices = (slice(k, k + 1) for k in range(len(q)))
         return [contacts(scene, robot, X_WB[k], q[k], standing=standing)[0] for k in slices]
-    touching: list[Contact | None] = [None] * len(q)
+    touching: list[PlaceContact | None] = [None] * len(q)
     if not len(q):
         return touching
     placed = scene.moved({robot: X_WB[0]})
@@ -48,7 +48,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
         step = max(1, AT_ONCE // max(1, len(nodes)))
         for some in (places[begin : begin + step] for begin in range(0, len(places), step)):
             for place, contact in _worst(placed, robot, X_WB[some], q[some][:, nodes]).items():
-                touching[some[place]] = Contact(
+                touching[some[place]] = PlaceContact(
                     pair=contact.pair, distance=contact.distance, node=int(nodes[contact.node])
                 )
         places = np.array([place for place in places.tolist() if touching[place] is None], dtype=np.intp)
@@ -57,7 +57,7 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
     return touching
 
 
-def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact]:
+def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, PlaceContact]:
     """The worst contact of motions of shape (K, nodes, nq), by motion and node, for those that have one."""
     table, (count, nodes, joints) = scene.near_table, q.shape
     bases = np.array([np.tile(robot.X_WB, (count * nodes, 1, 1)) for robot in scene.cell.robots])
@@ -67,11 +67,11 @@ def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, Contact
     D = table.forest.displacements(q.reshape(-1, joints), bases)
     near = table.find(scene.engine, D, float(demands.max(initial=0.0)))
     short, motions = near.distances - demands[near.rows], near.samples // nodes
-    worst = dict[int, Contact]()
+    worst = dict[int, PlaceContact]()
     for query in _first_of_each(short, motions).tolist():
         pair = scene.names(scene.pairs[near.rows[query]])
         node = int(near.samples[query] % nodes)
-        worst[int(motions[query])] = Contact(pair=pair, distance=float(near.distances[query]), node=node)
+        worst[int(motions[query])] = PlaceContact(pair=pair, distance=float(near.distances[query]), node=node)
     return worst
 
 
@@ -83,12 +83,12 @@ def _first_of_each(short: Array, motions: Indices) -> Indices:
     return order[first]
 
 
-def _standing(scene: Scene, q: Array) -> Contact | None:
+def _standing(scene: Scene, q: Array) -> PlaceContact | None:
     """The first pair of which one stands too deep in the other, at a configuration of shape (1, nq)."""
     table = scene.near_table
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
     for mounted_depth in mounted_depths(scene, q, table.bodies.poses(D)):
         if mounted_depth.depth > mounted_depth.pair.limit:
             names = (scene.bodies[mounted_depth.pair.first].name, scene.bodies[mounted_depth.pair.second].name)
-            return Contact(pair=names, distance=-mounted_depth.depth, node=0)
+            return PlaceContact(pair=names, distance=-mounted_depth.depth, node=0)
     return None

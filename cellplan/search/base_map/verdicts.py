@@ -14,7 +14,7 @@ from cellplan.model.cell import joint_at
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
 from cellplan.search.base_map.places import Places
-from cellplan.search.kernel.figures import Figures, Peaks
+from cellplan.search.kernel.figures import MotionFigures, Peaks
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run
 
@@ -153,7 +153,7 @@ def _judged(map_job: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
     )
     motions = run(job, layouts)
     with np.errstate(all="ignore"):  # what lost its path is no number
-        figures = Figures.of(job, motions)
+        figures = MotionFigures.of(job, motions)
         allowed = acceleration_limits(map_job.scene)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / allowed), in_magnitude=True).value
     known = {

@@ -25,7 +25,7 @@ from cellplan.scene.near_table import NearbyPairs, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
-from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, Placed, far_away, reaches
+from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, PlacedBody, far_away, reaches
 
 STEP: Final = (
     1e-6  # [m] and [rad] to either side, by which the reach of a body that changes its shape is differentiated
@@ -208,10 +208,10 @@ class CellDistances:
                 columns = np.flatnonzero(by)
                 derivatives[rows[:, None], columns] += change[:, None] * by[columns]
 
-    def _column(self, name: str, X_WB: Array) -> Placed:
+    def _column(self, name: str, X_WB: Array) -> PlacedBody:
         """The column of a robot at its base, as seen from the world."""
         column = self._moving.of_base(name, X_WB)
-        return Placed(column.shape, X_WB @ column.X_LS)
+        return PlacedBody(column.shape, X_WB @ column.X_LS)
 
     def _directions(self, near: LayoutDistances, index: int) -> tuple[Indices, Array]:
         """The pairs of a body, and where the others are, seen from its link: unit directions of shape (M, 3).
@@ -223,7 +223,9 @@ class CellDistances:
         n = near.normals[rows] * np.where(sides == 0, 1.0, -1.0)[:, None]
         return rows, (n[:, None] @ near.D[link, near.keys[rows], :3, :3])[:, 0]
 
-    def _changes(self, near: LayoutDistances, x: Array, base: Array) -> Iterator[tuple[int, Array, Placed, Placed]]:
+    def _changes(
+        self, near: LayoutDistances, x: Array, base: Array
+    ) -> Iterator[tuple[int, Array, PlacedBody, PlacedBody]]:
         """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
         forest = self._scene.near_table.forest
         for name, index in self._moving.columns.items():

@@ -52,7 +52,7 @@ class NeighbourCells:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedBody:
     """A body as a layout has it: its solid, None where it has none, and its pose on its link; see ``SceneBody``."""
 
     shape: Solid | None
@@ -74,43 +74,43 @@ class MovingBodies:
         self._cuts = {body: self._solids + place for place, body in enumerate(scene.cut_from)}
         self._part = next(index for index, body in enumerate(scene.bodies) if body.kind is Kind.PART)
 
-    def of_bases(self, X_WB: Array) -> Iterator[tuple[int, Placed]]:
+    def of_bases(self, X_WB: Array) -> Iterator[tuple[int, PlacedBody]]:
         """Columns below or above bases in the world, shape (robots, 4, 4)."""
         for name, index in self.columns.items():
             yield index, self.of_base(name, X_WB[self._cell.index(name)])
 
-    def of_base(self, name: str, X_WB: Array) -> Placed:
+    def of_base(self, name: str, X_WB: Array) -> PlacedBody:
         """The column of a robot that has one, at its base in the world, shape (4, 4)."""
         robot = self._cell.robot(name)
         solid = None if robot.pedestal is None else robot.pedestal.solid(X_WB)
-        return Placed(None, far_away(self.columns[name])) if solid is None else Placed(*solid)
+        return PlacedBody(None, far_away(self.columns[name])) if solid is None else PlacedBody(*solid)
 
-    def of_tools(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
+    def of_tools(self, cell: Cell) -> Iterator[tuple[int, PlacedBody]]:
         """The part, and of tools that are not those of the scene their bodies and what of them is outside the zone."""
         for robot in cell.robots:
             yield from self.of_tool(cell, robot.name)
         if cell.part is not self._cell.part or cell.carrier is not None:
             yield from self.of_part(cell)
 
-    def of_tool(self, cell: Cell, name: str) -> Iterator[tuple[int, Placed]]:
+    def of_tool(self, cell: Cell, name: str) -> Iterator[tuple[int, PlacedBody]]:
         """Likewise of the tool of one robot; none where it is that of the scene."""
         robot = cell.robot(name)
         if robot.tool is self._cell.robot(name).tool:
             return
         for index, body in zip(self._tools.get(name, []), robot.tool.bodies, strict=True):
-            placed = Placed(body.shape, robot.model.X_BF @ body.X_BS)
+            placed = PlacedBody(body.shape, robot.model.X_BF @ body.X_BS)
             yield index, placed
             if index in self._cuts:
                 tip = (inverse(body.X_BS) @ robot.tool.X_FT)[:3, 3]
                 yield self._cuts[index], _before(placed, tip, cell.checks.contact_zone_mm.si, self._cuts[index])
 
-    def that_differ(self, cell: Cell, robot: str | None) -> Iterator[tuple[int, Placed]]:
+    def that_differ(self, cell: Cell, robot: str | None) -> Iterator[tuple[int, PlacedBody]]:
         """Those of the tool of a robot, or the part where there is none; see ``NeighbourCells``."""
         return self.of_part(cell) if robot is None else self.of_tool(cell, robot)
 
-    def of_part(self, cell: Cell) -> Iterator[tuple[int, Placed]]:
+    def of_part(self, cell: Cell) -> Iterator[tuple[int, PlacedBody]]:
         """The part."""
-        yield self._part, Placed(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)
+        yield self._part, PlacedBody(cell.part.shape, part_body(cell, cell.part, *cell.part.held_by[:1]).X_BS)
 
 
 def far_away(index: int) -> Array:
@@ -118,14 +118,14 @@ def far_away(index: int) -> Array:
     return pose((0.0, 0.0, FAR * (index + 1)))
 
 
-def reaches(placed: Placed, n: Array) -> Array:
+def reaches(placed: PlacedBody, n: Array) -> Array:
     """How far a body reaches from the origin of its link along unit directions there, shape (M, 3), in [m], (M,)."""
     if placed.shape is None:
         return np.zeros(len(n))
     return support(placed.shape, n @ placed.X_LS[:3, :3]) + n @ placed.X_LS[:3, 3]
 
 
-def _before(placed: Placed, tip: Array, zone: float, index: int) -> Placed:
+def _before(placed: PlacedBody, tip: Array, zone: float, index: int) -> PlacedBody:
     """A cylinder round what of a round body lies outside a zone round a tip on its axis; any other body as it is."""
     shape = placed.shape
     if not isinstance(shape, Capsule | Cylinder) or float(np.hypot(tip[0], tip[1])) > ON_AXIS or tip[2] < 0.0:
@@ -140,5 +140,5 @@ def _before(placed: Placed, tip: Array, zone: float, index: int) -> Placed:
     if high >= half:
         return placed
     if high <= low:
-        return Placed(None, far_away(index))
-    return Placed(Cylinder(shape.radius, high - low), placed.X_LS @ pose((0.0, 0.0, 0.5 * (low + high))))
+        return PlacedBody(None, far_away(index))
+    return PlacedBody(Cylinder(shape.radius, high - low), placed.X_LS @ pose((0.0, 0.0, 0.5 * (low + high))))

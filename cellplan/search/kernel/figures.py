@@ -58,7 +58,7 @@ class Peaks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Crests:
+class PeakValues:
     """Values of functions of time at their nodes, or where one is highest among its neighbours that of the parabola.
 
     Attributes:
@@ -70,7 +70,7 @@ class Crests:
     shares: Array
 
     @classmethod
-    def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "Crests":
+    def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "PeakValues":
         """Those of values at times in [s], shapes (N, n) and (N,)."""
         seen = np.abs(values) if in_magnitude else values
         shares = np.zeros((*values.shape, 3))
@@ -91,7 +91,7 @@ class Crests:
         return cls(value=value, shares=shares)
 
     @classmethod
-    def at_nodes(cls, values: Array, *, in_magnitude: bool = False) -> "Crests":
+    def at_nodes(cls, values: Array, *, in_magnitude: bool = False) -> "PeakValues":
         """Those of the nodes alone, of values of shape (N, n)."""
         shares = np.zeros((*values.shape, 3))
         shares[..., 1] = np.sign(values) if in_magnitude else 1.0
@@ -107,7 +107,7 @@ class Crests:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Figures:
+class MotionFigures:
     """What layouts are judged by, of each joint."""
 
     beyond_lower: Peaks  # how far it goes below its lower limit in [rad] or [m]; negative where room is left
@@ -116,7 +116,7 @@ class Figures:
     accelerations: Peaks  # its largest acceleration likewise; 0 without a limit
 
     @classmethod
-    def of(cls, job: Job, motions: Motions) -> "Figures":
+    def of(cls, job: Job, motions: Motions) -> "MotionFigures":
         """The figures of motions; of those that lost a path they are not valid.
 
         Raises:

@@ -98,7 +98,7 @@ class JacobianChanges:
             forces[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
         return forces
 
-    def _put(self, changes: Array, rows: "Way", place: int, blocks: list[Array]) -> None:
+    def _put(self, changes: Array, rows: "FlangeAxes", place: int, blocks: list[Array]) -> None:
         """Add blocks by the own axes, the shared axes and the directions to the rows of a robot's joints."""
         local, shared, layout = (rows.to_joints.T @ block for block in blocks)
         if self._has_own[place]:
@@ -134,7 +134,7 @@ class JacobianChanges:
         return local, shared, layout
 
 
-class Way:
+class FlangeAxes:
     """The axes on the way to the flange of one robot: its joints among all, and the share of each axis in them."""
 
     def __init__(self, columns: slice, to_joints: Array) -> None:
@@ -142,7 +142,7 @@ class Way:
         self.columns, self.to_joints = columns, to_joints
 
     @classmethod
-    def of(cls, job: Job, robot: int) -> "Way":
+    def of(cls, job: Job, robot: int) -> "FlangeAxes":
         """That of a robot, by its place in the cell."""
         placed = job.cell.robots[robot]
         shares = job.tasks.chains.to_joints[:, : len(placed.model.joints), robot]
@@ -153,11 +153,11 @@ class Way:
         return qd[:, self.columns] @ self.to_joints.T
 
 
-def ways(job: Job) -> tuple[list[Way], Way | None]:
+def ways(job: Job) -> tuple[list[FlangeAxes], FlangeAxes | None]:
     """Those of the robot of each relation, and of the positioner."""
     constraints = job.constraints
-    return [Way.of(job, int(robot)) for robot in constraints.operators], (
-        None if constraints.carrier is None else Way.of(job, constraints.carrier)
+    return [FlangeAxes.of(job, int(robot)) for robot in constraints.operators], (
+        None if constraints.carrier is None else FlangeAxes.of(job, constraints.carrier)
     )
 
 

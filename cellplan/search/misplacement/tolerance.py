@@ -15,7 +15,7 @@ HALVINGS: Final = 9  # [-] of the range: to 3 % of that amount
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tolerance:
+class BaseTolerance:
     """How far one base may be off in one direction, all else in place."""
 
     name: str  # address of what is displaced
@@ -29,7 +29,7 @@ class Tolerance:
 
 def tolerances(
     problem: GuardedProblem, start: Array, demands: Demands, effort: Effort, cycle: float
-) -> tuple[Tolerance, ...]:
+) -> tuple[BaseTolerance, ...]:
     """How far each base may be off in every direction, by bisection of all of them together.
 
     Args:
@@ -56,7 +56,7 @@ def tolerances(
         at = 0.5 * (tolerated + np.minimum(missed, FARTHEST))
     size = np.tile(amounts, 2)
     return tuple(
-        Tolerance(
+        BaseTolerance(
             name=problem.names[row % count],
             sign=1.0 if row < count else -1.0,
             unit=directions[row] / size[row],

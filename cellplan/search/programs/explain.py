@@ -6,18 +6,18 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, MeasureKind, Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
-from cellplan.search.programs.program import Program
-from cellplan.search.programs.rows import Linear, PacedRows, Rows
+from cellplan.search.programs.program import LinearProgram
+from cellplan.search.programs.rows import ConstraintRows, Linear, PacedRows
 
 NEAR: Final = 0.02  # [-] usual steps of the region in which the multipliers hold
 COUNTS: Final = 1e-6  # [-] multiplier from which on a row binds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Binding:
+class BindingRow:
     """A demand that keeps the objective from being better.
 
     Attributes:
@@ -27,7 +27,7 @@ class Binding:
             None where it is the objective.
     """
 
-    kind: Kind  # what it is about
+    kind: MeasureKind  # what it is about
     names: tuple[str, str]  # robot and joint, the two bodies, or the robot whose singular values they are
     time: float  # when, in [s] on the clock of the nodes
     share: float
@@ -43,7 +43,7 @@ class Explanation:
             the variable is at its bound, or the point is no local optimum.
     """
 
-    binding: tuple[Binding, ...]  # what binds, the largest share first
+    binding: tuple[BindingRow, ...]  # what binds, the largest share first
     by_variable: Array  # derivatives of the objective by the variables in SI, whatever else is demanded, shape (n,)
     held: Array
 
@@ -51,12 +51,12 @@ class Explanation:
 def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) -> Explanation | None:
     """What binds at a point; None where the program there has no solution."""
     measures = Measures.of(problem, point, demands, effort)
-    program = Program.of(Linear.of(problem, measures), demands, effort.reserve, NEAR).priced(1.0)
+    program = LinearProgram.of(Linear.of(problem, measures), demands, effort.reserve, NEAR).priced(1.0)
     step = program.solve()
     if step is None:
         return None
     solved, unit = step.solved, _unit(measures, demands)
-    binding, gradient, at = list[Binding](), np.zeros(len(point.x)), 0
+    binding, gradient, at = list[BindingRow](), np.zeros(len(point.x)), 0
     for rows in program.rows:
         multipliers = solved.multipliers[at : at + len(rows.lacks)]
         at += len(rows.lacks)
@@ -83,23 +83,25 @@ def _unit(measures: Measures, demands: Demands) -> float:
             return 1.0
 
 
-def _bound(problem: Problem, measures: Measures, rows: Rows, multipliers: Array, unit: float) -> list[Binding]:
+def _bound(
+    problem: Problem, measures: Measures, rows: ConstraintRows, multipliers: Array, unit: float
+) -> list[BindingRow]:
     """The rows of one kind that bind."""
     units = {
-        Kind.DISTANCE: LENGTH,
-        Kind.LOWER_LIMIT: ANGLE,
-        Kind.UPPER_LIMIT: ANGLE,
-        Kind.SINGULAR: SINGULAR,
+        MeasureKind.DISTANCE: LENGTH,
+        MeasureKind.LOWER_LIMIT: ANGLE,
+        MeasureKind.UPPER_LIMIT: ANGLE,
+        MeasureKind.SINGULAR: SINGULAR,
     }
-    bindings = list[Binding]()
-    if rows.kind is Kind.DURATION:
+    bindings = list[BindingRow]()
+    if rows.kind is MeasureKind.DURATION:
         return []
     for row in np.flatnonzero(multipliers > COUNTS).tolist():
         subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)
         if size == ANGLE and not problem.limits.is_revolute[subject]:
             size = LENGTH
         bindings.append(
-            Binding(
+            BindingRow(
                 kind=rows.kind,
                 names=_names(problem, rows.kind, subject, measures),
                 time=float(problem.times[rows.nodes[row]]),
@@ -110,8 +112,8 @@ def _bound(problem: Problem, measures: Measures, rows: Rows, multipliers: Array,
     return bindings
 
 
-def _names(problem: Problem, kind: Kind, subject: int, measures: Measures) -> tuple[str, str]:
+def _names(problem: Problem, kind: MeasureKind, subject: int, measures: Measures) -> tuple[str, str]:
     """What a row is about."""
-    if kind is Kind.SINGULAR and measures.arms is not None:
+    if kind is MeasureKind.SINGULAR and measures.arms is not None:
         return measures.arms.names[subject], "singular values"
-    return problem.pair_names(subject) if kind is Kind.DISTANCE else problem.joint_names(subject)
+    return problem.pair_names(subject) if kind is MeasureKind.DISTANCE else problem.joint_names(subject)

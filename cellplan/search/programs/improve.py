@@ -15,7 +15,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.search.programs.measures import LENGTH, Measures, Missed
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.problem import Point, Problem
-from cellplan.search.programs.program import Program
+from cellplan.search.programs.program import LinearProgram
 from cellplan.search.programs.rows import Linear
 
 WIDEST: Final = 1.5  # [-] usual steps
@@ -140,7 +140,7 @@ class _Climb:
 
     def _step(self, here: _State, linear: Linear) -> _State | None:
         """The state after one program; None where its step is refused. Sets the next region."""
-        program = Program.of(linear, self._demands, self._effort.reserve, self._trust).priced(self._price)
+        program = LinearProgram.of(linear, self._demands, self._effort.reserve, self._trust).priced(self._price)
         self._price = program.price
         bends: Array | None = None
         for _ in range(1 + CORRECTIONS):

@@ -17,7 +17,7 @@ from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.near_pairs import NearPairs, distances_at
+from cellplan.search.programs.near_pairs import PairsAtNodes, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 
@@ -84,7 +84,7 @@ class LayoutProblem:
 
     def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        pairs = NearPairs.of(distances)
+        pairs = PairsAtNodes.of(distances)
         return self.bodies.derivatives(pairs.near, point.x, by_joints.q[pairs.nodes])
 
     def arms(self, point: Point) -> SingularValues:

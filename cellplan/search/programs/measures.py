@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.search.kernel.figures import FIGURES, Crests, refuse_not_finite
-from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve, Timing
+from cellplan.search.kernel.figures import FIGURES, PeakValues, refuse_not_finite
+from cellplan.search.programs.objective import CycleTiming, Demands, Effort, Objective, Reserve
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import ArmValues, Distances, Point, Problem
 
@@ -21,7 +21,7 @@ FARTHEST: Final = 1e3  # [-] beyond a singular value that is not demanded
 ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
 
 
-class Kind(StrEnum):
+class MeasureKind(StrEnum):
     """What a demand is about."""
 
     LOWER_LIMIT = "lower_limit"
@@ -46,17 +46,19 @@ class Measures:
     """
 
     point: Point
-    lower: Crests  # distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq)
-    upper: Crests  # likewise from their upper limits
-    speeds: Crests
-    accelerations: Crests
+    lower: (
+        PeakValues  # distances of the joints from their lower limits, the demanded margin off, negative, shape (N, nq)
+    )
+    upper: PeakValues  # likewise from their upper limits
+    speeds: PeakValues
+    accelerations: PeakValues
     distances: Distances  # near pairs at the keys
     lacks: Array  # by how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,)
     within: float  # distance in [m] beyond what is demanded, from which on pairs are not near
     factor: float  # how many times as long as the nodes the motion must last for all speeds and accelerations
     cycle: float  # shortest cycle in [s]
     arms: ArmValues | None  # least singular values of the arms; None where none are demanded
-    singular: Crests  # shares of what is demanded of them that they miss, negative where they keep it, shape (N, A)
+    singular: PeakValues  # shares of what is demanded of them that they miss, negative where they keep it, shape (N, A)
     pace: Pace | None = None
 
     @classmethod
@@ -67,7 +69,7 @@ class Measures:
             NotFiniteError: A figure of a joint is no finite number.
         """
         times, limits, beyond = problem.times, problem.limits, demands.beyond
-        pace = Pace.of(problem, point) if demands.timing is Timing.RETIMED else None
+        pace = Pace.of(problem, point) if demands.timing is CycleTiming.RETIMED else None
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
         most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
@@ -91,7 +93,7 @@ class Measures:
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
             arms=arms,
-            singular=Crests.of(times, _missing(arms, demands, len(times))),
+            singular=PeakValues.of(times, _missing(arms, demands, len(times))),
             pace=pace,
         )
 
@@ -118,20 +120,20 @@ class Measures:
             allowed.append(np.full(len(loads), 0.5 * reserve.time / SHARE))
         return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
 
-    def values(self, kind: Kind, subjects: Indices, nodes: Indices) -> Array:
+    def values(self, kind: MeasureKind, subjects: Indices, nodes: Indices) -> Array:
         """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
         of_nodes = {
-            Kind.LOWER_LIMIT: self.lower,
-            Kind.UPPER_LIMIT: self.upper,
-            Kind.SPEED: self.speeds,
-            Kind.SINGULAR: self.singular,
+            MeasureKind.LOWER_LIMIT: self.lower,
+            MeasureKind.UPPER_LIMIT: self.upper,
+            MeasureKind.SPEED: self.speeds,
+            MeasureKind.SINGULAR: self.singular,
         }
         if (crests := of_nodes.get(kind)) is not None:
             return crests.value[nodes, subjects]
         match kind:
-            case Kind.ACCELERATION:
+            case MeasureKind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
-            case Kind.DURATION:
+            case MeasureKind.DURATION:
                 return np.full(len(nodes), self.factor)
             case _:
                 distances = self.distances
@@ -181,14 +183,14 @@ class Missed:
         return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
 
 
-def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> Crests:
+def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> PeakValues:
     """Functions of time with values at the nodes of shape (N, n), and their extremes between them where these count."""
     if problem.is_dense:
-        return Crests.at_nodes(values, in_magnitude=in_magnitude)
-    return Crests.of(problem.times, values, in_magnitude=in_magnitude)
+        return PeakValues.at_nodes(values, in_magnitude=in_magnitude)
+    return PeakValues.of(problem.times, values, in_magnitude=in_magnitude)
 
 
-def _loads(problem: Problem, point: Point) -> tuple[Crests, Crests, float]:
+def _loads(problem: Problem, point: Point) -> tuple[PeakValues, PeakValues, float]:
     """Speeds and accelerations under the laws, and how many times as long as the nodes they must last."""
     speeds = _crests(problem, point.qd / problem.limits.velocity, in_magnitude=True)
     accelerations = _crests(problem, point.qdd / problem.acceleration, in_magnitude=True)
@@ -203,11 +205,12 @@ def _missing(arms: ArmValues | None, demands: Demands, nodes: int) -> Array:
     return np.where(is_demanded, 1.0 - arms.values / np.where(is_demanded, demands.singular, 1.0), -FARTHEST)
 
 
-def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[Crests, Crests, float]:
+def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[PeakValues, PeakValues, float]:
     """The same of a retimed motion: at its nodes, as nothing is an extreme between them."""
     factor = pace.seconds / float(problem.times[-1] - problem.times[0])
     speeds, accelerations = (
-        Crests.at_nodes(share * factor**order) for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
+        PeakValues.at_nodes(share * factor**order)
+        for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
     )
     return speeds, accelerations, factor
 

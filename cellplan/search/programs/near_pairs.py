@@ -8,20 +8,20 @@ from cellplan.search.programs.problem import Distances
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NearPairs:
+class PairsAtNodes:
     """Near pairs and the nodes that their keys are."""
 
     near: LayoutDistances  # the pairs
     nodes: Indices  # the nodes, shape (K,)
 
     @classmethod
-    def of(cls, distances: Distances) -> "NearPairs":
+    def of(cls, distances: Distances) -> "PairsAtNodes":
         """Those that distances came from.
 
         Raises:
             TypeError: The distances are not those of ``distances_at``.
         """
-        if not isinstance(distances.detail, NearPairs):
+        if not isinstance(distances.detail, PairsAtNodes):
             raise TypeError("distance_derivatives: expected distances of this problem")
         return distances.detail
 
@@ -42,5 +42,5 @@ def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, with
         values=near.distances,
         demands=near.demands,
         is_own=near.is_own,
-        detail=NearPairs(near=near, nodes=nodes),
+        detail=PairsAtNodes(near=near, nodes=nodes),
     )

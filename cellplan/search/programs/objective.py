@@ -17,7 +17,7 @@ class Objective(StrEnum):
     CHANGE = "change"  # least change from the given values at a given duration
 
 
-class Timing(StrEnum):
+class CycleTiming(StrEnum):
     """How the motion is made as fast as the limits allow."""
 
     LAWS = "laws"  # the cell's time laws, slower or faster as a whole
@@ -39,7 +39,7 @@ class Demands:
     objective: Objective  # what is improved
     margin: Array  # smallest distances of the joints from their limits in [rad] or [m], shape (nq,)
     duration: float | None = None
-    timing: Timing = Timing.LAWS  # how the motion is timed
+    timing: CycleTiming = CycleTiming.LAWS  # how the motion is timed
     clearance: float = 0.0  # added to what the cell demands of every pair but those of one robot's own bodies, in [m]
     singular: Array | None = None
     beyond: Array | None = None

@@ -24,7 +24,7 @@ FEWEST_NODES: Final = 4  # [-] of a stretch: an end at rest takes its direction 
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Stretch:
+class PacedStretch:
     """Nodes from one rest of the path to the next, M of them."""
 
     nodes: Indices  # the nodes, shape (M,)
@@ -52,7 +52,7 @@ class Stretch:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Places:
+class PacePlaces:
     """Where loads are limited, E places: at ``directions[at] * by_direction + curvatures[at] * by_curvature``.
 
     Attributes:
@@ -71,7 +71,7 @@ class Places:
 class Pace:
     """The fastest motion along the path of a point; P places along all its stretches, m of them not at their ends."""
 
-    stretches: tuple[Stretch, ...]  # its stretches from rest to rest
+    stretches: tuple[PacedStretch, ...]  # its stretches from rest to rest
     velocity: Array  # limits of the speeds in [rad/s] or [m/s], shape (nq,)
     acceleration: Array  # limits of the accelerations in [rad/s^2] or [m/s^2], inf for none, shape (nq,)
     squares: Array  # squares c of the speed, 0 at the ends of stretches, shape (P,)
@@ -119,7 +119,7 @@ class Pace:
         """Nodes of all places, shape (P,)."""
         return np.concatenate([np.zeros(0, dtype=np.intp), *(stretch.nodes for stretch in self.stretches)])
 
-    def places(self, squares: Array) -> Places:
+    def places(self, squares: Array) -> PacePlaces:
         """Where loads are limited, at some squares c, shape (P,)."""
         ends = np.cumsum([0, *(len(stretch.nodes) for stretch in self.stretches)])
         left = np.concatenate([np.zeros(0, dtype=np.intp), *(np.arange(a, b - 1) for a, b in pairwise(ends))])
@@ -132,7 +132,7 @@ class Pace:
         at_left = np.stack([halves, np.stack([before, none], axis=1)], axis=1)
         at_right = np.stack([halves, np.stack([none, after], axis=1)], axis=1)
         around = np.stack([left, left + 1], axis=1)
-        return Places(
+        return PacePlaces(
             at=np.concatenate([inner, left, left + 1]),
             is_speed=np.arange(len(inner) + 2 * len(left)) < len(inner),
             by_direction=np.concatenate([speeds, u, u]),
@@ -198,7 +198,7 @@ class Pace:
         return by_variables / limits[:, None]
 
 
-def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ...]:
+def _stretches(times: Array, point: Point, velocity: Array) -> tuple[PacedStretch, ...]:
     """The stretches of a path between rests of all joints and corners that are passed at speed."""
     speeds, accelerations = point.qd / velocity, point.qdd / velocity
     rates = np.linalg.norm(speeds, axis=1)
@@ -217,7 +217,7 @@ def _stretches(times: Array, point: Point, velocity: Array) -> tuple[Stretch, ..
             width, rate, bend = np.diff(times[nodes]), rates[nodes], bends[nodes]
             steps = width * (rate[1:] + rate[:-1]) / 2.0 + width**2 * (bend[:-1] - bend[1:]) / 12.0
             stretches.append(
-                Stretch(
+                PacedStretch(
                     nodes=nodes,
                     rates=safe[nodes],
                     bends=bend,

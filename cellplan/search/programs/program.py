@@ -9,8 +9,8 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.programs.measures import IN_ROOM
 from cellplan.search.programs.objective import Demands, Objective, Reserve
-from cellplan.search.programs.rows import Linear, Rows
-from cellplan.search.programs.solver import Solved, least
+from cellplan.search.programs.rows import ConstraintRows, Linear
+from cellplan.search.programs.solver import ProgramSolution, least
 
 DEAREST: Final = 1e4  # [-] price of slack
 HIGHER: Final = 10.0  # [-] factor of the price
@@ -24,7 +24,7 @@ FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Step:
+class ProgramStep:
     """The solution of a program.
 
     Attributes:
@@ -35,18 +35,18 @@ class Step:
     expected: float  # what it is expected to gain
     left: float  # what is still missed after it, by the rows, in usual units
     before: float  # what is missed before it
-    solved: Solved  # the whole solution
+    solved: ProgramSolution  # the whole solution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Program:
+class LinearProgram:
     """One linear program in the step z, the objective t, the slacks of violated demands and costs of changes.
 
     The time of a retimed motion is convex in the squares of its speed, which are part of the step: it is quadratic in
     them, so that they do not change from one bound to the other.
     """
 
-    rows: Sequence[Rows]  # the rows, stacked
+    rows: Sequence[ConstraintRows]  # the rows, stacked
     box: tuple[Array, Array]  # lower and upper ends of the step in usual steps, shape (n + m,) each
     demands: Demands  # what is demanded
     changed: tuple[Array, Array]  # cost of the present change and of one usual step of each variable, shape (n,) each
@@ -54,7 +54,7 @@ class Program:
     price: float = 1.0  # what a slack of one unit costs
 
     @classmethod
-    def of(cls, linear: Linear, demands: Demands, reserve: Reserve, trust: float) -> "Program":
+    def of(cls, linear: Linear, demands: Demands, reserve: Reserve, trust: float) -> "LinearProgram":
         """The program of a point, for a trust region of some radius in usual steps."""
         problem, x = linear.problem, linear.measures.point.x
         lower = np.minimum(np.maximum((problem.lower - x) / problem.scale, -trust), 0.0)
@@ -74,7 +74,7 @@ class Program:
             curved=curved,
         )
 
-    def priced(self, price: float) -> "Program":
+    def priced(self, price: float) -> "LinearProgram":
         """The same at the least price, from a given one on, at which slack is nearly as small as it can be."""
         program = replace(self, price=price)
         while program.price < DEAREST:
@@ -87,7 +87,7 @@ class Program:
             program = dearer
         return program
 
-    def solve(self, corrections: Array | None = None) -> Step | None:
+    def solve(self, corrections: Array | None = None) -> ProgramStep | None:
         """The best step; None where the solver finds none.
 
         Args:
@@ -116,7 +116,7 @@ class Program:
             return None
         now = np.concatenate([np.zeros(count), [0.0], free, most - free, np.abs(self.changed[0])[:costs]])
         out = slice(count + 1 + slacks, count + 1 + 2 * slacks)
-        return Step(
+        return ProgramStep(
             z=solved.at[:count],
             expected=float(cost @ (now - solved.at) - 0.5 * self.curved @ solved.at[:count] ** 2),
             left=float(solved.at[out].sum()),

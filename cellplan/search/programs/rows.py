@@ -7,8 +7,8 @@ from typing import Final, Self
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.search.kernel.figures import Crests
-from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, Kind, Measures, reserves
+from cellplan.search.kernel.figures import PeakValues
+from cellplan.search.programs.measures import ANGLE, LENGTH, SHARE, SINGULAR, MeasureKind, Measures, reserves
 from cellplan.search.programs.objective import Demands, Objective, Reserve
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import PointDerivatives, Problem
@@ -18,10 +18,10 @@ LEAST_LOAD: Final = 0.5  # [-] shares of limits of a retimed motion from which o
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rows:
+class ConstraintRows:
     """Rows ``lack + gradient z <= aim t``, of a step z in usual steps of the variables and the objective t."""
 
-    kind: Kind  # what they are about
+    kind: MeasureKind  # what they are about
     subjects: Indices  # columns of joints, or numbers of pairs, shape (M,)
     nodes: Indices  # nodes of the motion, shape (M,)
     lacks: Array  # by how much the demand and the room are missed now, in usual units, negative where kept, shape (M,)
@@ -59,7 +59,7 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class PacedRows(Rows):
+class PacedRows(ConstraintRows):
     """Rows about speeds or accelerations of a retimed motion; the squares of the path's speed are unknowns as well."""
 
     pace: Pace  # the motion
@@ -67,7 +67,7 @@ class PacedRows(Rows):
     signs: Array  # signs of the loads, shape (M,)
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
-        """See ``Rows``: with the squares that the step was to have."""
+        """See ``ConstraintRows``: with the squares that the step was to have."""
         pace, inner, count = self.pace, self.pace.inner, len(here.point.x)
         squares = pace.squares.copy()
         squares[inner] *= 1.0 + z[count:]
@@ -75,8 +75,10 @@ class PacedRows(Rows):
         return (self.signs * loads - 1.0) / self.units - (self.lacks + self.gradients @ z)
 
     def of(self, is_selected: Flags) -> Self:
-        """See ``Rows``."""
-        return replace(Rows.of(self, is_selected), places=self.places[is_selected], signs=self.signs[is_selected])
+        """See ``ConstraintRows``."""
+        return replace(
+            ConstraintRows.of(self, is_selected), places=self.places[is_selected], signs=self.signs[is_selected]
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,7 +102,7 @@ class Linear:
             distances=problem.distance_derivatives(point, measures.distances, derivatives),
         )
 
-    def rows(self, demands: Demands, reserve: Reserve, box: Array) -> list[Rows]:
+    def rows(self, demands: Demands, reserve: Reserve, box: Array) -> list[ConstraintRows]:
         """All rows that a step within a box can bind; the ones that bound the objective first.
 
         Args:
@@ -127,13 +129,13 @@ class Linear:
         span = float(self.problem.times[-1] - self.problem.times[0])
         return None if demands.duration is None else demands.duration / span / (1.0 + reserve.time)
 
-    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Reserve) -> Rows:
+    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Reserve) -> ConstraintRows:
         """The duration of a retimed motion: the objective itself, or bounded by a given one."""
         is_aim = demands.objective is Objective.CYCLE
         share, unit, count = self.measures.factor / whole, 1.0 if is_aim else SHARE, len(self.problem.scale)
         saved = 0.5 * share * pace.shares[pace.inner] / unit
-        return Rows(
-            kind=Kind.DURATION,
+        return ConstraintRows(
+            kind=MeasureKind.DURATION,
             subjects=np.zeros(1, dtype=np.intp),
             nodes=np.zeros(1, dtype=np.intp),
             lacks=np.array([(share - 1.0) / unit]),
@@ -143,13 +145,13 @@ class Linear:
             aim=1.0 if is_aim else 0.0,
         )
 
-    def _paced(self, pace: Pace) -> Iterator[Rows]:
+    def _paced(self, pace: Pace) -> Iterator[ConstraintRows]:
         """Speeds and accelerations of a retimed motion."""
         by, point, problem = self.derivatives, self.measures.point, self.problem
         shapes, changes = pace.shapes(point.qd, point.qdd), pace.shapes(by.qd, by.qdd)
         places, loads = pace.places(pace.squares), pace.loads(point.qd, point.qdd, pace.squares)
-        for kind, unit in ((Kind.SPEED, 1.0), (Kind.ACCELERATION, 2.0)):
-            is_kind = places.is_speed == (kind is Kind.SPEED)
+        for kind, unit in ((MeasureKind.SPEED, 1.0), (MeasureKind.ACCELERATION, 2.0)):
+            is_kind = places.is_speed == (kind is MeasureKind.SPEED)
             rows, joints = (
                 part.astype(np.intp) for part in np.nonzero(is_kind[:, None] & (np.abs(loads) > LEAST_LOAD))
             )
@@ -169,22 +171,24 @@ class Linear:
                 signs=signs,
             )
 
-    def _timing(self, whole: float, demands: Demands, reserve: Reserve) -> Iterator[Rows]:
+    def _timing(self, whole: float, demands: Demands, reserve: Reserve) -> Iterator[ConstraintRows]:
         """Speeds and accelerations under the laws: the objective itself, or bounds at a given duration."""
         measures, problem = self.measures, self.problem
         is_aim = demands.objective is Objective.CYCLE
         unit = 1.0 if is_aim else SHARE
-        quantities = [(Kind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
+        quantities = [(MeasureKind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
         if self.derivatives.qdd is not None:
-            quantities.append((Kind.ACCELERATION, measures.accelerations, self.derivatives.qdd, problem.acceleration))
+            quantities.append(
+                (MeasureKind.ACCELERATION, measures.accelerations, self.derivatives.qdd, problem.acceleration)
+            )
         for kind, crests, by, limits in quantities:
-            value = np.sqrt(crests.value) if kind is Kind.ACCELERATION else crests.value
+            value = np.sqrt(crests.value) if kind is MeasureKind.ACCELERATION else crests.value
             nodes, columns = np.nonzero(value > 0.5 * whole)
             gradients = crests.derivatives(nodes, columns, by) / limits[columns, None]
             at = value[nodes, columns]
-            if kind is Kind.ACCELERATION:
+            if kind is MeasureKind.ACCELERATION:
                 gradients /= 2.0 * at[:, None]
-            yield Rows(
+            yield ConstraintRows(
                 kind=kind,
                 subjects=columns,
                 nodes=nodes,
@@ -195,19 +199,19 @@ class Linear:
                 aim=1.0 if is_aim else 0.0,
             )
 
-    def _margins(self, reserve: Reserve, box: Array) -> Iterator[Rows]:
+    def _margins(self, reserve: Reserve, box: Array) -> Iterator[ConstraintRows]:
         """Distances of the joints from their limits."""
         problem, dq = self.problem, self.derivatives.q
         reach = np.abs(dq) @ (problem.scale * box)
         units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
-        sides: Sequence[tuple[Kind, Crests, float]] = (
-            (Kind.LOWER_LIMIT, self.measures.lower, -1.0),
-            (Kind.UPPER_LIMIT, self.measures.upper, 1.0),
+        sides: Sequence[tuple[MeasureKind, PeakValues, float]] = (
+            (MeasureKind.LOWER_LIMIT, self.measures.lower, -1.0),
+            (MeasureKind.UPPER_LIMIT, self.measures.upper, 1.0),
         )
         for kind, crests, sign in sides:
             nodes, columns = np.nonzero(crests.value + reserve.margin + 1.5 * reach > 0.0)
             gradients = sign * crests.derivatives(nodes, columns, dq) / units[columns, None]
-            yield Rows(
+            yield ConstraintRows(
                 kind=kind,
                 subjects=columns,
                 nodes=nodes,
@@ -217,11 +221,11 @@ class Linear:
                 units=units[columns],
             )
 
-    def _apart(self, reserve: Reserve) -> Rows:
+    def _apart(self, reserve: Reserve) -> ConstraintRows:
         """Distances of near pairs."""
         distances = self.measures.distances
-        return Rows(
-            kind=Kind.DISTANCE,
+        return ConstraintRows(
+            kind=MeasureKind.DISTANCE,
             subjects=distances.pairs,
             nodes=distances.nodes,
             lacks=(self.measures.lacks + reserves(distances, reserve)) / LENGTH,
@@ -230,7 +234,7 @@ class Linear:
             units=np.full(len(distances.pairs), LENGTH),
         )
 
-    def _regular(self, demands: Demands, reserve: Reserve) -> Iterator[Rows]:
+    def _regular(self, demands: Demands, reserve: Reserve) -> Iterator[ConstraintRows]:
         """Least singular values of the arms."""
         arms, crests = self.measures.arms, self.measures.singular
         nodes, subjects = (part.astype(np.intp) for part in np.nonzero(crests.value > -NEAR_SINGULAR))
@@ -241,8 +245,8 @@ class Linear:
         by = arms.derivatives(nodes[rows] + sides - 1, subjects[rows], self.derivatives.q)
         gradients = np.zeros((len(nodes), by.shape[1]))
         np.add.at(gradients, rows, shares[rows, sides, None] * by)
-        yield Rows(
-            kind=Kind.SINGULAR,
+        yield ConstraintRows(
+            kind=MeasureKind.SINGULAR,
             subjects=subjects,
             nodes=nodes,
             lacks=(crests.value[nodes, subjects] + reserve.singular) / SINGULAR,
@@ -251,7 +255,7 @@ class Linear:
             units=np.full(len(nodes), SINGULAR),
         )
 
-    def _aimed_apart(self) -> Rows:
+    def _aimed_apart(self) -> ConstraintRows:
         """Distances of near pairs but those of a robot's own bodies, as bounds of the objective."""
         rows = self._apart(Reserve(distance=0.0)).of(~self.measures.distances.is_own)
         return replace(rows, lacks=rows.lacks - self.measures.nearest / LENGTH, aim=1.0)

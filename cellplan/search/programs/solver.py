@@ -14,7 +14,7 @@ PROVED: Final = 1e-6  # [-] by which an answer may miss a row of length 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Solved:
+class ProgramSolution:
     """The least point of a program."""
 
     at: Array  # the point, shape (n,)
@@ -22,7 +22,9 @@ class Solved:
     of_bounds: Array  # the same of the bounds of the variables, negative at lower ones, shape (n,)
 
 
-def least(cost: Array, weights: Array, rows: Array, highest: Array, bounds: tuple[Array, Array]) -> Solved | None:
+def least(
+    cost: Array, weights: Array, rows: Array, highest: Array, bounds: tuple[Array, Array]
+) -> ProgramSolution | None:
     """Minimise ``cost x + 1/2 sum weights x^2`` under ``rows x <= highest`` and bounds.
 
     Args:
@@ -51,4 +53,6 @@ def least(cost: Array, weights: Array, rows: Array, highest: Array, bounds: tupl
     if flag != SOLVED or not np.all(scaled @ solution - top <= PROVED * (1.0 + np.linalg.norm(solution))):
         return None
     multipliers = np.asarray(info["lam"])
-    return Solved(at=solution, multipliers=multipliers[len(cost) :] / lengths, of_bounds=multipliers[: len(cost)])
+    return ProgramSolution(
+        at=solution, multipliers=multipliers[len(cost) :] / lengths, of_bounds=multipliers[: len(cost)]
+    )

@@ -13,7 +13,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.near_pairs import NearPairs, distances_at
+from cellplan.search.programs.near_pairs import PairsAtNodes, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 from cellplan.search.spline_path.derivatives import path_derivatives
 from cellplan.search.spline_path.followed import continued, followed
@@ -88,7 +88,7 @@ class PathProblem:
 
     def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
         """See ``Problem``."""
-        pairs, count, (_, others) = NearPairs.of(distances), len(self.path.names), self._split(point.x)
+        pairs, count, (_, others) = PairsAtNodes.of(distances), len(self.path.names), self._split(point.x)
         near, dq = pairs.near, by_joints.q[pairs.nodes]
         by_path = (near.by_joints[:, None] @ dq[near.keys][..., :count])[:, 0]
         if not len(others):

@@ -11,7 +11,7 @@ from cellplan.model.units import MM
 from cellplan.search.distances.keep_out import in_areas
 from cellplan.search.starts.freedom import FIXED, drawn_within
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.starts.reaching import FreeArm, Goal, Placed, followed, matched, reached
+from cellplan.search.starts.reaching import FreeArm, Goal, PlacedDraws, followed, matched, reached
 
 SETTINGS: Final = 400  # [-] configurations of the holder that are drawn
 MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
@@ -69,7 +69,9 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     x = _drawn_settings(problem, rng)
     layouts = problem.variables.layouts(x, np.tile(problem.start, (len(x), 1)))
     columns, arm = cell.columns(cell.robots[cell.carrier].name), problem.arms[cell.carrier]
-    placed = Placed(q=layouts.start[:, columns], X_WB=layouts.X_WB[:, cell.carrier], X_FT=layouts.X_FT[:, cell.carrier])
+    placed = PlacedDraws(
+        q=layouts.start[:, columns], X_WB=layouts.X_WB[:, cell.carrier], X_FT=layouts.X_FT[:, cell.carrier]
+    )
     usable = np.ones(len(x), dtype=bool)
     goal = problem.goal(cell.carrier, np.eye(4))
     if goal is not None:
@@ -145,7 +147,7 @@ def _abilities(problem: StartProblem, settings: list[Setting], rng: np.random.Ge
 
 def _draws(
     problem: StartProblem, robot: int, setting: Setting, count: int, rng: np.random.Generator
-) -> tuple[Array, Placed]:
+) -> tuple[Array, PlacedDraws]:
     """Variables, shape (count, n), and configurations, bases and tools of an operator drawn within their bounds."""
     arm, model = problem.arms[robot], problem.cell.robots[robot]
     columns = problem.drawn_columns(robot)
@@ -156,7 +158,7 @@ def _draws(
     margin = problem.margin[problem.cell.columns(model.name)]
     lower, upper = np.minimum(arm.lower + margin, arm.upper), np.maximum(arm.upper - margin, arm.lower)
     q = rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (count, len(lower)))
-    return x[row], Placed(q=q, X_WB=layouts.X_WB[row, robot], X_FT=layouts.X_FT[row, robot])
+    return x[row], PlacedDraws(q=q, X_WB=layouts.X_WB[row, robot], X_FT=layouts.X_FT[row, robot])
 
 
 def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
@@ -207,7 +209,7 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     )
 
 
-def _unreached(goal: Goal, arm: FreeArm, at: Placed) -> str:
+def _unreached(goal: Goal, arm: FreeArm, at: PlacedDraws) -> str:
     """That tools do not reach the start of the path; where all stay far away, how far."""
     tips = (at.X_WB @ arm.flanges(at.q) @ at.X_FT)[:, :3, 3]
     nearest = float(np.linalg.norm(tips - (goal.X_WR @ goal.X_RT[0])[:3, 3], axis=1).min())

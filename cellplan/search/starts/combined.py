@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.search.kernel.figures import Figures, Peaks
+from cellplan.search.kernel.figures import MotionFigures, Peaks
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.run import Motions, run
 from cellplan.search.starts.at_rest import Pool, Setting
@@ -104,7 +104,7 @@ def _by_joints(problem: StartProblem, motions: Motions) -> tuple[Array, Array, C
     """Violations, infinite where a path is lost, and cycles in [s], shape (C,) both, and how many fail by what."""
     job, drops = problem.job, Counter[str]()
     with np.errstate(all="ignore"):  # what lost its path is no number
-        figures = Figures.of(job, motions)
+        figures = MotionFigures.of(job, motions)
         lack = np.maximum(0.0, problem.margin - figures.margins).max(axis=1)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / problem.acceleration), in_magnitude=True).value
         times = np.maximum(figures.speeds.value, np.sqrt(rates)).max(axis=1)

@@ -28,7 +28,7 @@ RANDOM: Final = 16  # [-] random layouts that are drawn for one start
 EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
 
 
-class Origin(StrEnum):
+class StartOrigin(StrEnum):
     """Where a start comes from."""
 
     GIVEN = "given"
@@ -44,7 +44,7 @@ class Start:
 
     x: Array  # values of the variables in [m] or [rad], shape (n,)
     start: Array  # start posture with the tools on their paths in [rad] or [m], shape (nq,)
-    origin: Origin  # where it comes from
+    origin: StartOrigin  # where it comes from
     text: str  # the same in words
     violation: float  # 0 where limits, speeds and the distances that were asked are kept; larger the farther off
     cycle: float  # shortest time in [s] of the same motion that keeps speeds and accelerations
@@ -91,10 +91,10 @@ class StartGenerator:
         if index == 0:
             start = self._problem.given_start()[None]
             x = self._problem.with_starts(self._problem.variables.given[None], start)[0]
-            return self._of_layout(Origin.GIVEN, "the given layout", x, start[0])
+            return self._of_layout(StartOrigin.GIVEN, "the given layout", x, start[0])
         if index <= len(self._tries):
             name, x, start = self._tries[index - 1]
-            return self._of_layout(Origin.TRY, f"layout of {name}", x, start)
+            return self._of_layout(StartOrigin.TRY, f"layout of {name}", x, start)
         number = index - len(self._tries) - 1
         rng = generator(f"starts/{index}", self._seed)
         if number % EVERY_RANDOM == EVERY_RANDOM - 1:
@@ -121,7 +121,7 @@ class StartGenerator:
         is_new = followed.is_followed & is_other
         return many[is_new], followed.q[is_new, 0]
 
-    def _of_layout(self, origin: Origin, text: str, x: Array, start: Array) -> Starts:
+    def _of_layout(self, origin: StartOrigin, text: str, x: Array, start: Array) -> Starts:
         """One layout as it is, else with other branches of inverse kinematics of the operators."""
         problem = self._problem
         as_it_is = judged(problem, x[None], start[None])
@@ -130,7 +130,7 @@ class StartGenerator:
         x, starts, reason = branch_starts(problem, x, start, generator(f"branches/{text}", self._seed))
         others = judged(problem, x, starts) if len(x) else as_it_is
         why = f"{text}: {reason or words(others.drops)}"
-        return Starts(starts=self._starts(Origin.BRANCH, f"{text}, other branches", others), reason=why)
+        return Starts(starts=self._starts(StartOrigin.BRANCH, f"{text}, other branches", others), reason=why)
 
     def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
         """Starts with the part at rest first, put together afterwards."""
@@ -147,7 +147,7 @@ class StartGenerator:
             judgement = judged(here, *combined(here, setting, found_bases, rng))
             if len(judgement.x):
                 text = f"sampled with the part at rest, draw {number}"
-                return Starts(starts=self._starts(Origin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
+                return Starts(starts=self._starts(StartOrigin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
             reasons.append(f"no combination follows all paths: {words(judgement.drops)}")
         return Starts(starts=(), reason="".join(reasons[:1]))
 
@@ -163,11 +163,11 @@ class StartGenerator:
         judgement = judged(problem, x, start)
         text = f"drawn within the bounds, draw {number}"
         return Starts(
-            starts=self._starts(Origin.RANDOM, text, judgement),
+            starts=self._starts(StartOrigin.RANDOM, text, judgement),
             reason="" if len(judgement.x) else words(judgement.drops),
         )
 
-    def _starts(self, origin: Origin, text: str, judgement: Judged) -> tuple[Start, ...]:
+    def _starts(self, origin: StartOrigin, text: str, judgement: Judged) -> tuple[Start, ...]:
         """Candidates as starts, spread."""
         return tuple(
             Start(

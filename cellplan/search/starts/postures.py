@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.planning.start.inverse_kinematics import SAME_POSTURE, joint_margin_shares, on_nearest_turns
 from cellplan.search.starts.problem import StartProblem
-from cellplan.search.starts.reaching import BaseBounds, Placed, followed, reached
+from cellplan.search.starts.reaching import BaseBounds, PlacedDraws, followed, reached
 
 SEEDS: Final = 48  # [-] random configurations of each operator; finds all eight branches of an arm with six joints
 BRANCHES: Final = 8  # [-] of an operator that are combined at most
@@ -37,11 +37,11 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
         return start[None, columns]
     fixed = BaseBounds(is_free=np.zeros(4, dtype=bool), lower=np.zeros(3), upper=np.zeros(3))
     X_WB, X_FT = (np.tile(part[0, robot], (len(q), 1, 1)) for part in (layouts.X_WB, layouts.X_FT))
-    placed, has_arrived = reached(arm, goal, fixed, Placed(q=q, X_WB=X_WB, X_FT=X_FT))
+    placed, has_arrived = reached(arm, goal, fixed, PlacedDraws(q=q, X_WB=X_WB, X_FT=X_FT))
     near = placed.q[has_arrived]
     q = np.where(np.all(on_nearest_turns(model, near) == near, axis=1)[:, None], near, on_nearest_turns(model, near))
     q = _distinct(q)
-    path, has_followed = followed(arm, goal, Placed(q=q, X_WB=X_WB[: len(q)], X_FT=X_FT[: len(q)]))
+    path, has_followed = followed(arm, goal, PlacedDraws(q=q, X_WB=X_WB[: len(q)], X_FT=X_FT[: len(q)]))
     margin = joint_margin_shares(model, path[has_followed]).min(axis=(1, 2), initial=np.inf)
     order = np.argsort(-margin, kind="stable")
     return q[has_followed][order[margin[order] >= 0.0]][:BRANCHES]

@@ -59,16 +59,16 @@ class Goal:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Placed:
+class PlacedDraws:
     """Draws of one robot: B of them."""
 
     q: Array  # configurations in [rad] or [m], shape (B, n)
     X_WB: Array  # bases, shape (B, 4, 4)
     X_FT: Array  # tool tips in the flange frames, shape (B, 4, 4)
 
-    def of_places(self, places: Indices | Flags) -> "Placed":
+    def of_places(self, places: Indices | Flags) -> "PlacedDraws":
         """Some of the draws."""
-        return Placed(q=self.q[places], X_WB=self.X_WB[places], X_FT=self.X_FT[places])
+        return PlacedDraws(q=self.q[places], X_WB=self.X_WB[places], X_FT=self.X_FT[places])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,7 +118,7 @@ def matched(goal: Goal, bounds: BaseBounds, X_BT: Array, X_WB: Array) -> tuple[A
     return placed, np.arccos(np.clip(cosine, -1.0, 1.0)) + 2.0 * miss
 
 
-def reached(arm: FreeArm, goal: Goal, bounds: BaseBounds, draws: Placed) -> tuple[Placed, Flags]:
+def reached(arm: FreeArm, goal: Goal, bounds: BaseBounds, draws: PlacedDraws) -> tuple[PlacedDraws, Flags]:
     """Joints and bases changed together until the tools are at the start of the path.
 
     Returns:
@@ -128,7 +128,7 @@ def reached(arm: FreeArm, goal: Goal, bounds: BaseBounds, draws: Placed) -> tupl
     q, X_WB, has_arrived = draws.q.copy(), draws.X_WB.copy(), np.zeros(len(draws.q), dtype=bool)
     at = np.arange(len(q))
     for iteration in range(ITERATIONS):
-        error, J = _linearised(arm, goal, 0, Placed(q=q[at], X_WB=X_WB[at], X_FT=draws.X_FT[at]), bounds.is_free)
+        error, J = _linearised(arm, goal, 0, PlacedDraws(q=q[at], X_WB=X_WB[at], X_FT=draws.X_FT[at]), bounds.is_free)
         largest = np.abs(error).max(axis=1, initial=0.0)
         has_arrived[at[largest < CLOSED]] = True
         going_on = (largest >= CLOSED) & ((largest < FAR) | (iteration < TRIAL))
@@ -139,7 +139,7 @@ def reached(arm: FreeArm, goal: Goal, bounds: BaseBounds, draws: Placed) -> tupl
         joints = q.shape[1]
         q[at] = np.clip(q[at] + move[:, :joints], arm.lower, arm.upper)
         _move_bases(X_WB, at, move[:, joints:], bounds)
-    return Placed(q=q, X_WB=X_WB, X_FT=draws.X_FT), has_arrived
+    return PlacedDraws(q=q, X_WB=X_WB, X_FT=draws.X_FT), has_arrived
 
 
 def _move_bases(X_WB: Array, at: Array, move: Array, bounds: BaseBounds) -> None:
@@ -151,7 +151,7 @@ def _move_bases(X_WB: Array, at: Array, move: Array, bounds: BaseBounds) -> None
         X_WB[at, :3, :3] = rotation_about(UP, change[:, 3]) @ X_WB[at, :3, :3]
 
 
-def followed(arm: FreeArm, goal: Goal, draws: Placed) -> tuple[Array, Flags]:
+def followed(arm: FreeArm, goal: Goal, draws: PlacedDraws) -> tuple[Array, Flags]:
     """Tools led along the whole path, from node to node, with the bases and what the path is on at rest.
 
     Returns:
@@ -174,7 +174,7 @@ def followed(arm: FreeArm, goal: Goal, draws: Placed) -> tuple[Array, Flags]:
     return q, has_followed
 
 
-def _corrected(arm: FreeArm, goal: Goal, node: int, draws: Placed) -> tuple[Array, Flags]:
+def _corrected(arm: FreeArm, goal: Goal, node: int, draws: PlacedDraws) -> tuple[Array, Flags]:
     """Configurations with the tools brought to a node of their path, and which came there, shapes (B, n) and (B,)."""
     q, at, is_near = draws.q.copy(), np.arange(len(draws.q)), np.zeros(len(draws.q), dtype=bool)
     fixed = np.zeros(4, dtype=bool)
@@ -189,7 +189,7 @@ def _corrected(arm: FreeArm, goal: Goal, node: int, draws: Placed) -> tuple[Arra
     return q, is_near
 
 
-def _linearised(arm: FreeArm, goal: Goal, node: int, draws: Placed, is_free: Flags) -> tuple[Array, Array]:
+def _linearised(arm: FreeArm, goal: Goal, node: int, draws: PlacedDraws, is_free: Flags) -> tuple[Array, Array]:
     """Errors of the tools at a node, shape (B, m), and what joints and free base components do, shape (B, m, n + f)."""
     X_BF, screws_B = arm.motion(draws.q)
     X_BT = X_BF @ draws.X_FT

@@ -7,7 +7,7 @@ from typing import Any
 
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
-from cellplan.model.layout import Choice, ChoiceKind
+from cellplan.model.layout import ChoiceKind, LayoutChoice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -15,7 +15,7 @@ class Choices:
     """The discrete choices that a cell file gives."""
 
     cell: Cell
-    chosen: tuple[Choice, ...]  # choices between robots and between modes
+    chosen: tuple[LayoutChoice, ...]  # choices between robots and between modes
     branches: tuple[str, ...]  # names of the robots of which all branches of the start posture are tried
 
     @classmethod
@@ -46,7 +46,7 @@ class Choices:
             if picks != present and self._is_possible(picks):
                 yield self._values(picks)
 
-    def _present(self, choice: Choice) -> str:
+    def _present(self, choice: LayoutChoice) -> str:
         """What the cell has now."""
         return str(self.cell.motion.mode) if choice.kind is ChoiceKind.MODE else self.cell.task(choice.name).robot
 

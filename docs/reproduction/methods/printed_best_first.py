@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from cellplan.planning.methods.support.joint_line import joint_lines
 from cellplan.planning.methods.support.search_cost import SearchCost
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 Array = NDArray[np.float64]
 
 MOST_MOVES: Final = 20_000  # [-] of one sample
 
 
-def printed_best_first(problem: TrackingProblem) -> Callable[[int, Array], Advance]:
+def printed_best_first(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
     """Of all open joints the one whose best move leaves the least cost makes that move and is closed.
 
     When all joints are closed, all are opened again; the search ends when the root of the cost is within the tolerance.
@@ -28,7 +28,7 @@ def printed_best_first(problem: TrackingProblem) -> Callable[[int, Array], Advan
     cost = SearchCost(problem)
     unbounded = np.full(problem.cell.joint_count, np.inf)
 
-    def advance(k: int, q: Array) -> Advance:
+    def advance(k: int, q: Array) -> StepResult:
         problem.first_order(k, q)  # refuses a lost path
         cost.aim(k + 1, q)
         expansion = cost.expand(q)
@@ -44,6 +44,6 @@ def printed_best_first(problem: TrackingProblem) -> Callable[[int, Array], Advan
             is_open |= not is_open.any()
             moves += 1
         left = np.sqrt(expansion.cost) / problem.step(k) if expansion.cost > target else 0.0
-        return Advance(q=expansion.q, iterations=moves, slack=float(left))
+        return StepResult(q=expansion.q, iterations=moves, slack=float(left))
 
     return advance

@@ -9,7 +9,7 @@ from builders.scene_builders import work
 
 from cellplan.certify.free_motion import FreeMotion
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.tools.skew import Mover, ShiftedTool, Way
+from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool
 from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import inverse
 from cellplan.scene.scene import Scene
@@ -18,11 +18,11 @@ SPEED = 0.5  # [m/s]
 TIMES = 0.01 * np.arange(101)
 
 
-def steady(error: float, limit: float) -> Way:
+def steady(error: float, limit: float) -> ErrorGrowth:
     """What a tool of constant speed makes."""
     still = np.zeros(len(TIMES))
     sums = SPEED * TIMES
-    return Way(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still + error, limit=limit)
+    return ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still + error, limit=limit)
 
 
 @pytest.mark.parametrize("error", [0.0, 3e-5])
@@ -48,7 +48,7 @@ def test_a_way_that_is_shorter_than_the_tolerance_allows_any_skew() -> None:
 def test_a_tool_that_moves_for_a_while_only_is_limited_there() -> None:
     still = np.zeros(len(TIMES))
     sums = SPEED * np.clip(TIMES - 0.4, 0.0, 0.1)  # 50 mm from 0.4 to 0.5 s
-    way = Way(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=0.01)
+    way = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=0.01)
 
     allowed, at_s = way.allowed()
 
@@ -60,7 +60,7 @@ def test_a_tool_that_moves_for_a_while_only_is_limited_there() -> None:
 
 def test_twice_the_time_allows_twice_the_skew() -> None:
     still, sums = np.zeros(len(TIMES)), 0.1 * np.sin(0.5 * np.pi * TIMES)
-    way = Way(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=1e-3)
+    way = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=1e-3)
     slower = replace(way, times=2.0 * TIMES, rows=2.0 * TIMES)
 
     assert slower.allowed()[0] == pytest.approx(2.0 * way.allowed()[0])

@@ -15,7 +15,7 @@ from cellplan.model.cell import Mode
 from cellplan.model.exported import Targets
 from cellplan.model.solver import METHODS, Integrator
 from cellplan.pipeline.export.program import EXPORTERS
-from cellplan.search.programs.objective import Objective, Timing
+from cellplan.search.programs.objective import CycleTiming, Objective
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def folder(cells: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         ("solve cells/four_robots.yaml --mode ", [str(mode) for mode in Mode]),
         ("solve cells/four_robots.yaml --method ", list(METHODS)),
         ("solve cells/four_robots.yaml --integrator ", ["auto", *map(str, Integrator)]),
-        ("layout cells/four_robots.yaml --timing ", [str(timing) for timing in Timing]),
+        ("layout cells/four_robots.yaml --timing ", [str(timing) for timing in CycleTiming]),
         ("layout cells/four_robots.yaml --objective ", [str(objective) for objective in Objective]),
         ("layout cells/four_robots.yaml --objective c", ["conforming", "cycle", "clearance", "change"]),
         ("--install-completion ", ["bash", "zsh", "fish"]),

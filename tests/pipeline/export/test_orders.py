@@ -14,7 +14,7 @@ from cellplan.errors import NotVerifiedError
 from cellplan.geometry.shapes import Sphere
 from cellplan.model.cell import Grasp, Robot
 from cellplan.model.task import Frame
-from cellplan.pipeline.export.orders import PhaseSearch, Stretch
+from cellplan.pipeline.export.orders import OrderStretch, PhaseSearch
 from cellplan.pipeline.export.run_programs import RunPhase, RunProgram, spoilt_by_another_order
 from cellplan.scene.scene import Scene
 
@@ -52,7 +52,7 @@ def crossing() -> RunProgram:
     return program(s - 1.0, s - 1.9)
 
 
-def stretches(played: RunProgram) -> list[Stretch]:
+def stretches(played: RunProgram) -> list[OrderStretch]:
     return list(PhaseSearch(CELL, Scene.from_cell(CELL), played, played.phases[0]).stretches())
 
 

@@ -12,7 +12,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout import trial
 from cellplan.pipeline.layout.free_motion import freed
-from cellplan.pipeline.layout.prepared import Prepared, prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch, prepared
 from cellplan.pipeline.layout.result import path_text
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.pipeline.layout.trial import Begin, _Begin
@@ -31,7 +31,7 @@ def request_of_path() -> LayoutRequest:
 
 
 @pytest.fixture(scope="module")
-def ready(request_of_path: LayoutRequest) -> Prepared:
+def ready(request_of_path: LayoutRequest) -> PreparedSearch:
     return prepared(request_of_path)
 
 
@@ -72,7 +72,7 @@ def test_beside_a_path_start_and_weights_mean_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_the_first_path_is_near_the_motion_of_the_cell(ready: Prepared) -> None:
+def test_the_first_path_is_near_the_motion_of_the_cell(ready: PreparedSearch) -> None:
     assert ready.unled is not None
     along = ready.coarse.evaluate(ready.coarse.given, ready.given_start)
     resolved = ready.unled.coarse.evaluate(ready.unled.coarse.given, ready.given_start)
@@ -84,7 +84,7 @@ def test_the_first_path_is_near_the_motion_of_the_cell(ready: Prepared) -> None:
     assert np.degrees(np.abs(along.q[at] - resolved.q)[:, :6]).max() < 2.0
 
 
-def test_perturbations_of_a_path_are_smooth_and_every_tool_follows(ready: Prepared) -> None:
+def test_perturbations_of_a_path_are_smooth_and_every_tool_follows(ready: PreparedSearch) -> None:
     problem = ready.coarse
     assert isinstance(problem, PathProblem)
     point = perturbed_path(problem, problem.given, ready.given_start, generator("test", 0), size=0.6)
@@ -95,7 +95,7 @@ def test_perturbations_of_a_path_are_smooth_and_every_tool_follows(ready: Prepar
     assert np.abs(np.diff(change, 3, axis=0)).max() < 0.2 * np.abs(change).max()
 
 
-def test_the_record_says_how_far_the_path_is_from_the_given_motion(ready: Prepared) -> None:
+def test_the_record_says_how_far_the_path_is_from_the_given_motion(ready: PreparedSearch) -> None:
     x = ready.coarse.given.copy()
     x[:84:6] += np.radians(20.0)  # the first joint, all along
 
@@ -108,14 +108,16 @@ def test_the_record_says_how_far_the_path_is_from_the_given_motion(ready: Prepar
     )
 
 
-def test_paths_begin_at_the_last_motion_that_they_can_follow(ready: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_begin_at_the_last_motion_that_they_can_follow(
+    ready: PreparedSearch, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert ready.unled is not None
     begins = [(ready.unled.coarse.given, ready.given_start + k) for k in range(4)]
     stages = iter(begins[1:])
     path = ready.coarse.given
     followed = {1.0: 0.9, 0.0: 1.4}  # cycles by the place of the stage; nothing follows the later two
 
-    def path_of(_: Prepared, begin: Begin) -> _Begin | None:
+    def path_of(_: PreparedSearch, begin: Begin) -> _Begin | None:
         place = float(begin[1][0] - ready.given_start[0])
         return _Begin(path, begin[1], unled=begin) if round(place) in followed else None
 

@@ -7,14 +7,14 @@ from cellplan import LayoutRequest
 from cellplan.pipeline.layout.prepared import NOT_FOLLOWED
 from cellplan.pipeline.layout.proposals import SIZE, Proposals, choice_text, origin_text
 from cellplan.search.programs.objective import Objective
-from cellplan.study.trial import Outcome, Trial, TrialStatus, Variant
+from cellplan.study.trial import StudyTrial, TrialOutcome, TrialStatus, Variant
 
 REQUEST = LayoutRequest(cell=Path("cell.yaml"))
 
 
-def ended(number: int, cycle: float, status: TrialStatus = TrialStatus.PASSED) -> Trial:
+def ended(number: int, cycle: float, status: TrialStatus = TrialStatus.PASSED) -> StudyTrial:
     figures = {"cycle_s": cycle, "violation": 0.0, "x": [cycle], "start": [0.0]}
-    return Trial(variant=Variant(number, {"kind": "given"}), outcome=Outcome(status=status, figures=figures))
+    return StudyTrial(variant=Variant(number, {"kind": "given"}), outcome=TrialOutcome(status=status, figures=figures))
 
 
 def test_the_first_round_begins_with_the_given_layout_and_those_of_the_user() -> None:
@@ -79,8 +79,8 @@ def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> N
 
 
 def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
-    lost = Outcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
-    finished = [Trial(variant=Variant(number, {"kind": "given"}), outcome=lost) for number in range(SIZE)]
+    lost = TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
+    finished = [StudyTrial(variant=Variant(number, {"kind": "given"}), outcome=lost) for number in range(SIZE)]
 
     following = Proposals(request=REQUEST)(finished)
 

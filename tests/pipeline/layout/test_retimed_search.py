@@ -6,7 +6,7 @@ import pytest
 from builders.layout_search import searched_pair
 
 from cellplan import LayoutResult, load_cell, solve
-from cellplan.search.programs.objective import Timing
+from cellplan.search.programs.objective import CycleTiming
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
 SETTINGS = (
@@ -23,7 +23,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def found(folder: Path) -> LayoutResult:
-    return searched_pair(folder, *SETTINGS, timing=Timing.RETIMED)
+    return searched_pair(folder, *SETTINGS, timing=CycleTiming.RETIMED)
 
 
 def test_the_result_is_retimed_and_passes_solve(found: LayoutResult, folder: Path) -> None:

@@ -12,7 +12,7 @@ from cellplan.model.task import TimeLaw, TimeLawKind
 from cellplan.model.time_law import advance, reached_at
 from cellplan.planning.timing.fixed_rates import AtFixedRate, FixedRate
 from cellplan.planning.timing.path_length import stretches
-from cellplan.planning.timing.retime import JointBounds, Retimer
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 
 STEP = 0.01
 
@@ -39,7 +39,7 @@ def moving(breaks: Array) -> JointPath:
 
 
 def retimer(velocity: float, *kept: FixedRate) -> Retimer:
-    bounds = JointBounds(velocity=np.array([velocity]), acceleration=np.full(1, 1e3), jerk=np.full(1, np.inf))
+    bounds = JointLimitsInTime(velocity=np.array([velocity]), acceleration=np.full(1, 1e3), jerk=np.full(1, np.inf))
 
     def slower(sigma: Array, q: Array) -> float:
         return float(np.abs(np.diff(q[:, 0])).max() / STEP / velocity)

@@ -10,7 +10,7 @@ from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
 from cellplan.model.joint_path import JointPath
 from cellplan.planning.timing.path_length import stretches
-from cellplan.planning.timing.retime import JointBounds, Retimer
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.timing.retimed_path import RetimedPath
 
 JOINTS, WAVES, DEGREE = 24, 5, 8
@@ -34,7 +34,7 @@ def path_of(
     return JointPath(nodes[0][:, 0], breaks, nodes)
 
 
-def shares(bounds: JointBounds, q: Array, step: float) -> tuple[float, float, float]:
+def shares(bounds: JointLimitsInTime, q: Array, step: float) -> tuple[float, float, float]:
     """Largest velocity, acceleration and jerk in rows, with rest before and after them, in shares of the limits."""
     velocity = np.diff(q, axis=0) / step
     rest = np.zeros((1, q.shape[1]))
@@ -47,7 +47,7 @@ def shares(bounds: JointBounds, q: Array, step: float) -> tuple[float, float, fl
     )
 
 
-def retimed(path: JointPath, bounds: JointBounds, *, step: float, feed_share: float = 0.0) -> RetimedPath:
+def retimed(path: JointPath, bounds: JointLimitsInTime, *, step: float, feed_share: float = 0.0) -> RetimedPath:
     def slower(sigma: Array, q: Array) -> float:
         velocity, acceleration, jerk = shares(bounds, q, step)
         feed = feed_share * float(np.diff(sigma).max()) / step
@@ -60,8 +60,8 @@ def retimed(path: JointPath, bounds: JointBounds, *, step: float, feed_share: fl
     return found
 
 
-def bounds_of(velocity: float, acceleration: float, jerk: float = np.inf, joints: int = 1) -> JointBounds:
-    return JointBounds(
+def bounds_of(velocity: float, acceleration: float, jerk: float = np.inf, joints: int = 1) -> JointLimitsInTime:
+    return JointLimitsInTime(
         velocity=np.full(joints, velocity), acceleration=np.full(joints, acceleration), jerk=np.full(joints, jerk)
     )
 
@@ -136,11 +136,11 @@ def test_a_slower_motion_takes_exactly_the_steps_that_it_is_given() -> None:
         assert np.all(np.diff(slower.sigma) > 0.0)
 
 
-def wave(seed: int) -> tuple[Callable[[Array], Array], JointBounds]:
+def wave(seed: int) -> tuple[Callable[[Array], Array], JointLimitsInTime]:
     rng = np.random.default_rng(seed)
     number = np.arange(1, WAVES + 1)
     size, phase = rng.normal(size=(JOINTS, WAVES)) * 0.5 / number, rng.uniform(0, 2 * np.pi, (JOINTS, WAVES))
-    bounds = JointBounds(
+    bounds = JointLimitsInTime(
         velocity=rng.uniform(1.5, 5.0, JOINTS),
         acceleration=rng.uniform(6.0, 25.0, JOINTS),
         jerk=np.full(JOINTS, np.inf),

@@ -12,7 +12,7 @@ from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.rung import Rung
-from cellplan.planning.timing.retime import JointBounds
+from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
 from cellplan.planning.transfer.straight_time import box_widths, shares
 from cellplan.scene.scene import Scene
@@ -81,7 +81,9 @@ def test_a_straight_move_keeps_all_limits_in_its_rows_and_reaches_one(pair: tupl
     ],
 )
 def test_the_time_is_that_of_the_closed_form(velocity: float, acceleration: float, jerk: float, seconds: float) -> None:
-    bounds = JointBounds(velocity=np.array([velocity]), acceleration=np.array([acceleration]), jerk=np.array([jerk]))
+    bounds = JointLimitsInTime(
+        velocity=np.array([velocity]), acceleration=np.array([acceleration]), jerk=np.array([jerk])
+    )
 
     widths = box_widths(np.array([2.0]), bounds, least=1e-4)
 

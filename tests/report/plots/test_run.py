@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 
 from cellplan.errors import InputError
 from cellplan.model.report import Conditioning
-from cellplan.report.plots.figure import Axis
+from cellplan.report.plots.figure import PlotAxis
 from cellplan.report.plots.placing import nice_ticks
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
@@ -189,7 +189,7 @@ def test_thinning_keeps_ends_and_extremes(values: Any) -> None:
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6), st.integers(2, 8))
 def test_ticks_are_even_and_inside(low: float, span: float, count: int) -> None:
-    ticks = nice_ticks(Axis(low=low, high=low + span), count)
+    ticks = nice_ticks(PlotAxis(low=low, high=low + span), count)
     assert len(ticks) <= count + 1
     room = 1e-6 * span + 1e-8 * abs(low)  # ticks are rounded to nine digits
     assert all(low - room <= tick <= low + span + room for tick in ticks)
@@ -209,8 +209,10 @@ def test_a_straightened_curve_stays_within_its_tolerance(values: Any, tolerance:
 
 
 def test_powers_of_ten_are_the_ticks_of_a_logarithmic_axis() -> None:
-    assert nice_ticks(Axis(low=1e-3, high=0.3, is_log=True), 4) == pytest.approx([1e-3, 1e-2, 1e-1])
-    assert nice_ticks(Axis(low=1e-11, high=2.0, is_log=True), 4) == pytest.approx([1e-11, 1e-9, 1e-7, 1e-5, 1e-3, 0.1])
+    assert nice_ticks(PlotAxis(low=1e-3, high=0.3, is_log=True), 4) == pytest.approx([1e-3, 1e-2, 1e-1])
+    assert nice_ticks(PlotAxis(low=1e-11, high=2.0, is_log=True), 4) == pytest.approx(
+        [1e-11, 1e-9, 1e-7, 1e-5, 1e-3, 0.1]
+    )
 
 
 def test_singular_values_are_drawn_along_the_motion_with_their_smallest(drawn: dict[str, bytes]) -> None:

@@ -7,24 +7,35 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cellplan.report.plots.figure import Axis, Curve, Figure, Key, Limit, Mark, Note, Panel, line, value_axis
+from cellplan.report.plots.figure import (
+    Figure,
+    LegendKey,
+    Limit,
+    Note,
+    PlotAxis,
+    PlotCurve,
+    PlotMark,
+    PlotPanel,
+    line,
+    value_axis,
+)
 from cellplan.report.plots.palette import ON_DARK
 from cellplan.report.plots.placing import placed
 from cellplan.report.plots.svg import FINE, THINNING_TOL, inline_svg, svg_text
 
 TIMES = np.linspace(0.0, 2.0, 4001)
-X = Axis(low=0.0, high=2.0, label="time in s", unit="s", is_time=True)
+X = PlotAxis(low=0.0, high=2.0, label="time in s", unit="s", is_time=True)
 HEADROOM = 1.0 + THINNING_TOL  # [-] coordinates: rounding of a point, and how far a thinned curve may lie beside it
 
 
-def drawn(*items: object, y: Axis, x: Axis = X):
-    return panels(svg_text(Figure(title="t", x=x, panels=[Panel(title="p", y=y, items=items)])))[0]
+def drawn(*items: object, y: PlotAxis, x: PlotAxis = X):
+    return panels(svg_text(Figure(title="t", x=x, panels=[PlotPanel(title="p", y=y, items=items)])))[0]
 
 
 def test_curves_limits_and_marks_lie_where_their_values_are() -> None:
     values = 3.0 * np.sin(7.0 * TIMES)
     limits = Limit(2.5, "2.5"), Limit(-2.0, is_upper=False)
-    panel = drawn(*limits, Curve("sine", TIMES, values), Mark(0.25, 1.5), y=value_axis(-3.0, 3.0, unit="mm"))
+    panel = drawn(*limits, PlotCurve("sine", TIMES, values), PlotMark(0.25, 1.5), y=value_axis(-3.0, 3.0, unit="mm"))
 
     fine = panel.resolution[1]
     assert panel.limits == pytest.approx([2.5, -2.0], abs=fine)
@@ -37,10 +48,10 @@ def test_curves_limits_and_marks_lie_where_their_values_are() -> None:
 
 
 def test_a_logarithmic_scale_shows_ratios_and_ends_at_its_lower_edge() -> None:
-    axis = Axis(low=1e-6, high=0.3, unit="mm", is_log=True)
+    axis = PlotAxis(low=1e-6, high=0.3, unit="mm", is_log=True)
     values = np.where(TIMES < 1.0, 2e-4 * np.exp(TIMES), 0.0)
 
-    panel = drawn(Limit(0.1, "tolerance"), Curve("error", TIMES, values), y=axis)
+    panel = drawn(Limit(0.1, "tolerance"), PlotCurve("error", TIMES, values), y=axis)
 
     decade = np.log(10.0) * panel.resolution[1]
     assert panel.limits == pytest.approx([0.1], rel=decade)
@@ -55,10 +66,10 @@ def test_a_logarithmic_scale_shows_ratios_and_ends_at_its_lower_edge() -> None:
 
 @given(arrays(float, st.integers(3, 2000), elements=st.floats(-50.0, 50.0)))
 def test_a_thinned_curve_lies_within_a_tenth_of_a_point_of_every_kept_peak(values: np.ndarray) -> None:
-    x = Axis(low=0.0, high=float(len(values) - 1), label="sample")
+    x = PlotAxis(low=0.0, high=float(len(values) - 1), label="sample")
     y = value_axis(-50.0, 50.0)
 
-    panel = drawn(Curve("c", np.arange(float(len(values))), values), y=y, x=x)
+    panel = drawn(PlotCurve("c", np.arange(float(len(values))), values), y=y, x=x)
 
     shown = panel.curves["c"][:, 1]
     assert shown.max() == pytest.approx(values.max(), abs=HEADROOM * panel.resolution[1])
@@ -69,21 +80,23 @@ def test_a_gap_stays_a_gap() -> None:
     values = np.where((TIMES > 0.5) & (TIMES < 1.0), np.nan, 1.0)
 
     text = svg_text(
-        Figure(title="t", x=X, panels=[Panel(title="p", y=value_axis(0.0, 2.0), items=[Curve("c", TIMES, values)])])
+        Figure(
+            title="t", x=X, panels=[PlotPanel(title="p", y=value_axis(0.0, 2.0), items=[PlotCurve("c", TIMES, values)])]
+        )
     )
 
     path = text.split('data-name="c" d="')[1].split('"')[0]
     assert path.count("M") == 2
     assert "data-name" not in svg_text(
-        Figure(title="t", x=X, panels=[Panel(title="p", y=X, items=[Curve("c", TIMES, np.nan * TIMES)])])
+        Figure(title="t", x=X, panels=[PlotPanel(title="p", y=X, items=[PlotCurve("c", TIMES, np.nan * TIMES)])])
     )
 
 
 def test_a_plane_is_to_scale_whatever_its_sides_are() -> None:
     square = line([[0, 0], [100, 0], [100, 100], [0, 100]], colour="#000000", width=1.0)
     for across, up in ((300.0, 200.0), (150.0, 900.0)):
-        x, y = Axis(low=-50.0, high=across - 50.0, label="x"), Axis(low=-20.0, high=up - 20.0, label="y")
-        figure = Figure(title="t", x=x, panels=[Panel(title="", y=y, items=[square])], is_plane=True)
+        x, y = PlotAxis(low=-50.0, high=across - 50.0, label="x"), PlotAxis(low=-20.0, high=up - 20.0, label="y")
+        figure = Figure(title="t", x=x, panels=[PlotPanel(title="", y=y, items=[square])], is_plane=True)
 
         panel = panels(svg_text(figure))[0]
 
@@ -94,14 +107,16 @@ def test_a_plane_is_to_scale_whatever_its_sides_are() -> None:
 
 def test_every_word_of_names_stays_a_word() -> None:
     name = '"><script>alert(1)</script>&amp;'
-    panel = Panel(
+    panel = PlotPanel(
         title=name,
         note=name,
-        y=Axis(low=0.0, high=1.0, unit=name),
-        items=[Curve(name, TIMES, 0.5 * TIMES), Note(1.0, 0.5, name), Limit(0.7, name)],
-        keys=[Key(name, "#000000")],
+        y=PlotAxis(low=0.0, high=1.0, unit=name),
+        items=[PlotCurve(name, TIMES, 0.5 * TIMES), Note(1.0, 0.5, name), Limit(0.7, name)],
+        keys=[LegendKey(name, "#000000")],
     )
-    figure = Figure(title=name, x=Axis(low=0.0, high=2.0, label=name), panels=[panel], legend=[Key(name)], text=name)
+    figure = Figure(
+        title=name, x=PlotAxis(low=0.0, high=2.0, label=name), panels=[panel], legend=[LegendKey(name)], text=name
+    )
 
     text = svg_text(figure)
 
@@ -111,7 +126,7 @@ def test_every_word_of_names_stays_a_word() -> None:
 
 
 def test_a_picture_says_what_it_shows_and_reads_on_dark_pages() -> None:
-    panel = Panel(title="A1, in deg", note="margin 3.0", y=X, items=[])
+    panel = PlotPanel(title="A1, in deg", note="margin 3.0", y=X, items=[])
 
     text = svg_text(Figure(title="joints", x=X, panels=[panel]))
 
@@ -126,7 +141,7 @@ def test_a_picture_says_what_it_shows_and_reads_on_dark_pages() -> None:
 
 def test_coordinates_are_hundredths_of_points() -> None:
     panel = drawn(y=value_axis(0.0, 1.0))
-    figure = svg_text(Figure(title="t", x=X, panels=[Panel(title="p", y=X, items=[])]))
+    figure = svg_text(Figure(title="t", x=X, panels=[PlotPanel(title="p", y=X, items=[])]))
     width = float(figure.split('data-size="')[1].split(" ")[0])
 
     assert panel.resolution[0] == pytest.approx(2.0 / (FINE * width))
@@ -136,7 +151,7 @@ def test_a_note_beside_a_long_title_is_written_smaller_than_one_beside_a_short_t
     axis = value_axis(0.0, 1.0)
     sizes = []
     for title in ("speed", "their manipulability, in 10⁻⁶"):
-        panel = Panel(title=title, y=axis, items=(), note="smallest 3.9 at 0.81 s")
+        panel = PlotPanel(title=title, y=axis, items=(), note="smallest 3.9 at 0.81 s")
         figure = Figure(title="t", x=X, panels=[panel] * 3, columns=3)
         sizes.append(next(each.size for box in placed(figure).panels for each in box.words if each.kind == "note"))
 

@@ -11,7 +11,7 @@ from cellplan.model.cell import Cell
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Linearisation
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 from cellplan.search.kernel.derivatives import differentiate, equations
-from cellplan.search.kernel.figures import Figures
+from cellplan.search.kernel.figures import MotionFigures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import run
 from cellplan.search.kernel.screws import Directions
@@ -62,8 +62,8 @@ def test_derivatives_of_the_reference_cell_are_those_of_its_run(reference: Simpl
     for place in range(directions.count):
         assert off_by(found.q[..., place], q[..., place]) < 0.005
     for name, values in (("speeds", found.qd / job.limits.velocity[:, None]), ("beyond_upper", found.q)):
-        peaks = getattr(Figures.of(job, motion), name)
-        sides = [getattr(Figures.of(job, each), name).value for each in (ahead, behind)]
+        peaks = getattr(MotionFigures.of(job, motion), name)
+        sides = [getattr(MotionFigures.of(job, each), name).value for each in (ahead, behind)]
         assert off_by(peaks.derivatives(0, values), ((sides[0] - sides[1]) / (2 * STEP)).T) < 0.005
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cellplan.errors import NotFiniteError
-from cellplan.search.kernel.figures import Crests, Figures, Peaks
+from cellplan.search.kernel.figures import MotionFigures, Peaks, PeakValues
 from cellplan.search.kernel.run import run
 
 T = np.sort(np.concatenate([np.linspace(0.0, 3.0, 40), [1.0]]))
@@ -40,12 +40,12 @@ def test_a_corner_at_a_double_node_is_no_parabola(turn: float) -> None:
 def test_margins_of_joints_without_limits_are_infinite_and_the_others_stay_as_they_are() -> None:
     values = np.stack([2.0 - (T - 1.234) ** 2, np.full_like(T, -np.inf)], axis=1)
 
-    peaks, crests = Peaks.of(T, values[None]), Crests.of(T, values)
+    peaks, crests = Peaks.of(T, values[None]), PeakValues.of(T, values)
 
     np.testing.assert_array_equal(peaks.value[0, 1], -np.inf)
     np.testing.assert_array_equal(crests.value[:, 1], -np.inf)
     np.testing.assert_array_equal(peaks.value[:, :1], Peaks.of(T, values[None, :, :1]).value)
-    np.testing.assert_array_equal(crests.value[:, :1], Crests.of(T, values[:, :1]).value)
+    np.testing.assert_array_equal(crests.value[:, :1], PeakValues.of(T, values[:, :1]).value)
 
 
 @pytest.mark.parametrize(("what", "value"), [("q", np.nan), ("q", np.inf), ("qd", np.nan)])
@@ -57,7 +57,7 @@ def test_a_figure_that_is_no_number_names_its_joint(reference: SimpleNamespace, 
     name = f"{reference.cell.robots[1].name}/{reference.cell.robots[1].model.joint_names[1]}"
 
     with pytest.raises(NotFiniteError, match=rf"^{name}: expected a finite .* in the search, got (nan|inf)$"):
-        Figures.of(reference.job, replace(motions, **{what: broken}))
+        MotionFigures.of(reference.job, replace(motions, **{what: broken}))
 
 
 def test_what_is_no_number_in_a_motion_that_lost_its_path_does_not_count(reference: SimpleNamespace) -> None:
@@ -65,6 +65,6 @@ def test_what_is_no_number_in_a_motion_that_lost_its_path_does_not_count(referen
     q, lost_at = motions.q.copy(), motions.lost_at.copy()
     q[0], lost_at[0] = np.nan, 0.5
 
-    figures = Figures.of(reference.job, replace(motions, q=q, lost_at=lost_at))
+    figures = MotionFigures.of(reference.job, replace(motions, q=q, lost_at=lost_at))
 
-    np.testing.assert_array_equal(figures.margins[1:], Figures.of(reference.job, motions).margins[1:])
+    np.testing.assert_array_equal(figures.margins[1:], MotionFigures.of(reference.job, motions).margins[1:])

@@ -11,7 +11,7 @@ from cellplan.planning.layout_screening import Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.search.kernel.derivatives import differentiate
-from cellplan.search.kernel.figures import Figures
+from cellplan.search.kernel.figures import MotionFigures
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.run import Motions, run, run_near
 from cellplan.search.kernel.screws import Directions
@@ -32,7 +32,7 @@ def test_speeds_and_margins_are_those_of_the_accurate_mode(reference: SimpleName
 
     assert exact.is_followed.sum() > 6
     np.testing.assert_array_equal(motions.is_followed, exact.is_followed)
-    kept, figures = exact.is_followed, Figures.of(reference.job, motions)
+    kept, figures = exact.is_followed, MotionFigures.of(reference.job, motions)
     fastest, expected = figures.speeds.value[kept].max(axis=1), exact.speed_ratios[kept].max(axis=1)
     np.testing.assert_allclose(fastest, expected, rtol=0.005)
     np.testing.assert_allclose(figures.margins[kept], exact.margins[kept], atol=np.radians(0.1))

@@ -9,7 +9,7 @@ import pytest
 
 from cellplan import load_cell, solve
 from cellplan.model.settings.layout import MisplacementEntry
-from cellplan.pipeline.layout.prepared import Prepared
+from cellplan.pipeline.layout.prepared import PreparedSearch
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.search.distances.cell_distances import CellDistances
@@ -30,7 +30,7 @@ AMOUNTS = MisplacementEntry(position_mm=2.0, orientation_deg=0.2)
 
 def displaced_cell(cell: Path, settings: tuple[str, ...] = ()) -> SimpleNamespace:
     request = LayoutRequest(cell=cell, settings=settings)
-    ready = Prepared.of(request, searched_cell(request))
+    ready = PreparedSearch.of(request, searched_cell(request))
     of = BaseDisplacements.of(ready.variables, ready.variables.given, AMOUNTS)
     problem = GuardedProblem.like(ready.problem(33), variables=of, bodies=CellDistances.of(ready.scene, of))
     point = problem.evaluate(of.given, ready.given_start)

@@ -8,7 +8,7 @@ from builders.toy_problem import Toy
 
 from cellplan.search.programs.explain import Explanation, explain
 from cellplan.search.programs.improve import improve
-from cellplan.search.programs.measures import Kind
+from cellplan.search.programs.measures import MeasureKind
 from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
 
 EXACT = Effort(within=20.0, reserve=Reserve(margin=0.0, distance=0.0, within_robot=0.0, time=0.0))
@@ -24,7 +24,7 @@ def explained(toy: Toy, demands: Demands) -> Explanation:
 
 def test_two_joints_that_are_equally_fast_share_the_cycle() -> None:
     found = explained(Toy(), Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
-    shares = {each.names[1]: each.share for each in found.binding if each.kind is Kind.SPEED}
+    shares = {each.names[1]: each.share for each in found.binding if each.kind is MeasureKind.SPEED}
     assert shares == pytest.approx({"joint_0": 2.0 / 3.0, "joint_1": 1.0 / 3.0}, abs=1e-3)
     np.testing.assert_allclose(found.by_variable, 0.0, atol=1e-2)
 
@@ -32,7 +32,7 @@ def test_two_joints_that_are_equally_fast_share_the_cycle() -> None:
 def test_a_margin_that_binds_costs_what_its_limit_would_gain() -> None:
     near = replace(Toy(), upper_limit=3.5)
     found = explained(near, Demands(objective=Objective.CYCLE, margin=np.zeros(2)))
-    limit = next(each for each in found.binding if each.kind is Kind.UPPER_LIMIT)
+    limit = next(each for each in found.binding if each.kind is MeasureKind.UPPER_LIMIT)
     assert limit.names == ("robot", "joint_0")
     assert limit.time == pytest.approx(2.0)
     assert limit.gain == pytest.approx(2.0, rel=1e-2)  # cycle 2 (6 - 2 x0) s at x0 = limit / 2

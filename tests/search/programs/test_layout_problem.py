@@ -14,7 +14,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import Job
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.measures import Kind, Measures
+from cellplan.search.programs.measures import MeasureKind, Measures
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.programs.rows import Linear
 from cellplan.search.variables.variables import Variables
@@ -47,7 +47,7 @@ def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) 
     here = Measures.of(problem, point, demands, effort)
     count = len(problem.names)
     rows = Linear.of(problem, here).rows(demands, effort.reserve, np.full(count, 0.5))
-    assert {each.kind for each in rows} == set(Kind) - {Kind.DURATION}
+    assert {each.kind for each in rows} == set(MeasureKind) - {MeasureKind.DURATION}
     z = np.random.default_rng(1).uniform(-1.0, 1.0, count)
     sides = []
     for sign in (1.0, -1.0):
@@ -58,7 +58,9 @@ def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) 
     for each in rows:
         before, after = (side.values(each.kind, each.subjects, each.nodes) for side in reversed(sides))
         seen = (after - before) / (2.0 * STEP * each.units)
-        is_smooth = ~np.isnan(seen) & ((each.lacks < 10.0) | (each.kind is not Kind.DISTANCE))  # none deep inside
+        is_smooth = ~np.isnan(seen) & (
+            (each.lacks < 10.0) | (each.kind is not MeasureKind.DISTANCE)
+        )  # none deep inside
         errors = np.abs(seen - each.gradients @ z)[is_smooth]
         assert len(errors) >= 4
         assert np.quantile(errors, 0.9) <= 0.02 * np.abs(seen[is_smooth]).max()

@@ -10,15 +10,15 @@ from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.speed_profile import fastest_profile
 from cellplan.search.programs.explain import explain
 from cellplan.search.programs.improve import improve
-from cellplan.search.programs.measures import Kind, Measures
-from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve, Timing
+from cellplan.search.programs.measures import MeasureKind, Measures
+from cellplan.search.programs.objective import CycleTiming, Demands, Effort, Objective, Reserve
 from cellplan.search.programs.pace import Pace
 from cellplan.search.programs.problem import Point
 from cellplan.search.programs.rows import Linear
 
 EXACT = Effort(iterations=60, within=20.0, least_gain=1e-7, reserve=Reserve(margin=0.0, distance=0.0, time=0.0))
 NONE = np.zeros(2)
-DEMANDS = Demands(objective=Objective.CYCLE, margin=NONE, timing=Timing.RETIMED)
+DEMANDS = Demands(objective=Objective.CYCLE, margin=NONE, timing=CycleTiming.RETIMED)
 STEP = 1e-6
 
 
@@ -128,12 +128,12 @@ def test_multipliers_are_the_derivative_of_the_retimed_cycle() -> None:
     assert found is not None
     assert found.by_variable[0] == pytest.approx(-1.25, abs=0.02)
     assert sum(each.share for each in found.binding) == pytest.approx(1.0, abs=0.01)
-    assert {each.kind for each in found.binding} == {Kind.SPEED, Kind.ACCELERATION}
+    assert {each.kind for each in found.binding} == {MeasureKind.SPEED, MeasureKind.ACCELERATION}
 
 
 def test_a_duration_is_kept_by_a_retimed_motion() -> None:
     toy = replace(Toy(), acceleration=np.array([1.0, np.inf]))
-    demands = Demands(objective=Objective.CHANGE, margin=NONE, duration=4.5, timing=Timing.RETIMED)
+    demands = Demands(objective=Objective.CHANGE, margin=NONE, duration=4.5, timing=CycleTiming.RETIMED)
     found = improve(toy, toy.given, NONE, demands, EXACT)
     assert found is not None
     assert found.is_conforming
@@ -149,5 +149,5 @@ def test_steps_of_rows_show_how_they_bend() -> None:
     z: Array = np.concatenate([[1e-4, 0.0], np.full(len(box) - 2, 1e-4)])
     there = Measures.of(toy, at(toy, 1.0 + 0.5e-4), DEMANDS, EXACT)
     for rows in Linear.of(toy, here).rows(DEMANDS, EXACT.reserve, box):
-        if rows.kind in (Kind.SPEED, Kind.ACCELERATION):
+        if rows.kind in (MeasureKind.SPEED, MeasureKind.ACCELERATION):
             assert np.abs(rows.bends(here, there, z)).max() < 1e-7

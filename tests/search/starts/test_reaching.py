@@ -11,7 +11,7 @@ from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import reaching_configurations, within_limits
 from cellplan.search.starts.at_rest import pool, settings
 from cellplan.search.starts.postures import branches
-from cellplan.search.starts.reaching import BaseBounds, Placed, followed, matched, reached
+from cellplan.search.starts.reaching import BaseBounds, PlacedDraws, followed, matched, reached
 from tests.search.starts.conftest import DRAWS
 
 COUNT = 60
@@ -25,7 +25,7 @@ def abb(four_robots):
     layouts = problem.variables.layouts(problem.variables.given[None], problem.start[None])
     goal = problem.goal(index, problem.part_pose(layouts))
     arm, rng = problem.arms[index], generator("draws")
-    draws = Placed(
+    draws = PlacedDraws(
         q=rng.uniform(arm.lower, arm.upper, (COUNT, 6)),
         X_WB=np.array([pose((0.0, 0.0, 0.3), (0.0, 0.0, yaw)) for yaw in rng.uniform(-3.0, 3.0, COUNT)]),
         X_FT=np.tile(layouts.X_FT[0, index], (COUNT, 1, 1)),
@@ -86,7 +86,7 @@ def test_a_configuration_on_the_path_matches_with_no_miss(abb):
 def test_the_tool_follows_the_whole_path_round_its_corners(abb):
     problem, index, goal, arm, draws = abb
     start = problem.start[problem.cell.columns("abb")][None]
-    placed = Placed(q=start, X_WB=problem.cell.robots[index].X_WB[None], X_FT=draws.X_FT[:1])
+    placed = PlacedDraws(q=start, X_WB=problem.cell.robots[index].X_WB[None], X_FT=draws.X_FT[:1])
     q, has_followed = followed(arm, goal, placed)
 
     assert has_followed.all()
@@ -102,7 +102,7 @@ def test_branches_are_those_of_the_inverse_kinematics_that_stay_within_limits_on
     q = reaching_configurations(ScrewChain(robot), goal.relation, goal.X_RT[0], X_WP=goal.X_WR, seeds=seeds)
     q = within_limits(robot.model, q)
     bases, tools = np.tile(robot.X_WB, (len(q), 1, 1)), np.tile(draws.X_FT[0], (len(q), 1, 1))
-    path, has_followed = followed(arm, goal, Placed(q=q, X_WB=bases, X_FT=tools))
+    path, has_followed = followed(arm, goal, PlacedDraws(q=q, X_WB=bases, X_FT=tools))
     stays = has_followed & np.all((path >= arm.lower) & (path <= arm.upper), axis=(1, 2))
 
     assert len(found) == stays.sum() >= 1
@@ -117,7 +117,7 @@ def test_a_pool_has_bases_that_reach_and_says_what_became_of_the_others(turntabl
     found = pool(problem, robot, setting, rng)
     layouts = problem.variables.layouts(found.x, np.tile(problem.start, (len(found.x), 1)))
     goal = problem.goal(robot, setting.X_WP)
-    placed = Placed(q=found.q, X_WB=layouts.X_WB[:, robot], X_FT=layouts.X_FT[:, robot])
+    placed = PlacedDraws(q=found.q, X_WB=layouts.X_WB[:, robot], X_FT=layouts.X_FT[:, robot])
     X_WT = placed.X_WB @ problem.arms[robot].flanges(placed.q) @ placed.X_FT
 
     assert 0 < len(found.q) <= 40

@@ -13,7 +13,7 @@ from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.starts import pools
 from cellplan.search.starts.combined import judged
 from cellplan.search.starts.contacts import Contacts
-from cellplan.search.starts.generator import Origin, StartGenerator
+from cellplan.search.starts.generator import StartGenerator, StartOrigin
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 from tests.search.starts.conftest import CELLS, DRAWS, prepared
@@ -57,7 +57,7 @@ def test_a_sampled_start_without_violation_passes_solve_and_is_the_same_again(tu
     again, other = (StartGenerator(turntable, seed=seed).at(1) for seed in (3, 4))
     best = sampled.starts[0]
 
-    assert best.origin is Origin.SAMPLED
+    assert best.origin is StartOrigin.SAMPLED
     assert best.violation == 0.0
     assert solve(turntable.variables.cell(best.x, best.start)).passed
     assert [start.x.tobytes() for start in again] == [start.x.tobytes() for start in sampled]
@@ -68,7 +68,7 @@ def test_a_sampled_start_without_violation_passes_solve_and_is_the_same_again(tu
 def test_the_given_layout_is_the_first_start(turntable):
     (given,) = StartGenerator(turntable, seed=0).at(0)
 
-    assert given.origin is Origin.GIVEN
+    assert given.origin is StartOrigin.GIVEN
     assert given.violation == 0.0
     np.testing.assert_allclose(given.x, turntable.variables.given, atol=1e-9)
 
@@ -85,7 +85,7 @@ def test_a_layout_of_another_file_is_a_start(four_robots):
     start = np.concatenate([robot.start for robot in other.robots])
     (tried,) = StartGenerator(four_robots, seed=0, tries=[("four_robots.yaml", x, start)]).at(1)
 
-    assert tried.origin is Origin.TRY
+    assert tried.origin is StartOrigin.TRY
     assert tried.text == "layout of four_robots.yaml"
 
 

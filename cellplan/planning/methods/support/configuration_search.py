@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.search_cost import Expansion, SearchCost
-from cellplan.planning.tracking.problem import Advance, TrackingProblem
+from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 POSITION_MARGIN: Final = 1e-11  # [rad] or [m] that a search stays inside a limit: rounding of the written tables
 SPEED_MARGIN_FRACTION: Final = 1e-7  # share of a velocity limit left unused: rounding of the tables over one step
@@ -61,7 +61,9 @@ class ConfigurationSearch:
         self._target = settings.tolerance_mm.si**2
         self._rounds = settings.rounds
 
-    def advance(self, k: int, start: Array, bounds: Bounds, improve: Pass, *, momentum: Array | None = None) -> Advance:
+    def advance(
+        self, k: int, start: Array, bounds: Bounds, improve: Pass, *, momentum: Array | None = None
+    ) -> StepResult:
         """Search for the configuration at the sample after k.
 
         Args:
@@ -87,7 +89,7 @@ class ConfigurationSearch:
             used += more
             expansion = improved if improved.cost < (1.0 - MIN_GAIN_FRACTION) * expansion.cost else expansion
         left = np.sqrt(expansion.cost) / self._problem.step(k) if expansion.cost > self._target else 0.0
-        return Advance(q=expansion.q, iterations=used, slack=float(left))
+        return StepResult(q=expansion.q, iterations=used, slack=float(left))
 
     def _repeat(self, expansion: Expansion, bounds: Bounds, improve: Pass, rounds: int) -> tuple[Expansion, int]:
         """Pass after pass; the best expansion and the rounds used."""

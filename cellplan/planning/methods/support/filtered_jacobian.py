@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array
-from cellplan.planning.tracking.problem import Advance, FirstOrder, TrackingProblem
+from cellplan.planning.tracking.problem import FirstOrder, StepResult, TrackingProblem
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 Law = Callable[[Array, Array], Array]  # from Theta, shape (nq, m), and J, shape (m, nq), to B, shape (nq, m)
@@ -79,7 +79,7 @@ class FilteredMotion:
         self._reach = np.any(problem.signs != 0.0, axis=0)
         self.theta: Array | None = None
 
-    def advance(self, k: int, q: Array) -> Advance:
+    def advance(self, k: int, q: Array) -> StepResult:
         """One step, in as many sub-steps as it needs; between two times the desired twist is held.
 
         Raises:
@@ -93,7 +93,7 @@ class FilteredMotion:
             share, speeds = self._sub_step(tasks, xdot, moves, longest=1.0 - passed, step=step)
             q = q + speeds * (share * step)
             passed, evaluations = passed + share, evaluations + 1
-        return Advance(q=q, iterations=evaluations)
+        return StepResult(q=q, iterations=evaluations)
 
     def _sub_step(
         self, tasks: FirstOrder, xdot: Array, moves: Array, *, longest: float, step: float
