@@ -35,7 +35,7 @@ METHOD = '''"""Least norm: joint velocities by the Moore-Penrose inverse."""
 
 import numpy as np
 
-from cellplan.planning.tracking.problem import Advance
+from cellplan.planning.tracking.problem import StepResult
 
 
 def least_norm(problem):
@@ -43,7 +43,7 @@ def least_norm(problem):
 
     def advance(k, q):
         tasks = problem.first_order(k, q)
-        return Advance(q=q + np.linalg.pinv(tasks.J) @ (tasks.twist + problem.gain * tasks.error) * problem.step(k))
+        return StepResult(q=q + np.linalg.pinv(tasks.J) @ (tasks.twist + problem.gain * tasks.error) * problem.step(k))
 
     return advance
 '''
@@ -85,7 +85,7 @@ def read_semicolons(frame, files):
 SEMICOLONS = replace(CSV, name="semicolons", title="with semicolons", render=render_semicolons, read=read_semicolons)
 '''
 FIGURE = {
-    "_LISTED: Final = (\n": 'Quantity("travel_s", max, max, 1.0, "", None, "longest travel at top speed"),',
+    "_LISTED: Final = (\n": 'FigureQuantity("travel_s", max, max, 1.0, "", None, "longest travel at top speed"),',
     "MappingProxyType({\n": '"travel_s": Shown("travel<br>s", small, "travel s", 1.0, "t"),',
     "KEY: Final = (\n": '"travel_s",',
     "velocity_ratio(use)\n": '        yield "travel_s", use.joint, use.travel / use.velocity_limit\n',
@@ -96,7 +96,7 @@ KIND = '''"""How far each joint of a cell travels: the work, and its record, tex
 from cellplan.model.report import CAUTION
 from cellplan.pipeline.solve import solve
 from cellplan.pipeline.write_run import versions
-from cellplan.report.page.kind import Kind
+from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
 from cellplan.report.record.common import as_json, number
 from cellplan.report.record.rows import listed_table
@@ -118,7 +118,7 @@ def write_travels(record, folder):
     (folder / "travels.html").write_text(template("travels.html").render(r=record, caution=CAUTION))
 
 
-TRAVELS = Kind(
+TRAVELS = ResultKind(
     name="travels",
     title="Travels",
     file="travels.json",

@@ -81,9 +81,8 @@ def comparison_record(
 def comparison_table(record: Record) -> str:
     """The comparison as CSV: a row for each variant, with its status, its figures and the load of every robot."""
     robots = robot_names(record)
-    rows: list[list[Any]] = [
-        ["name", "status", *SINGLE, *(f"load_s {robot}" for robot in robots), "not_in_program", "reason"]
-    ]
+    loads_of = [f"load_s {robot}" for robot in robots]
+    rows: list[list[Any]] = [["name", "status", *SINGLE, *loads_of, "not_in_program", "reason"]]
     for variant in record["variants"]:
         figures = variant["figures"]
         loads = [figures["robots"].get(robot, {}).get("load_s") if figures else None for robot in robots]
