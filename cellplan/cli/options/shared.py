@@ -67,7 +67,7 @@ HowTimed = Annotated[
     option(
         "--timing NAME",
         "laws: by the time laws of the cell; retimed: as fast as the limits allow everywhere.",
-        autocompletion=one_of("cellplan.search.programs.objective:Timing"),
+        autocompletion=one_of("cellplan.search.programs.objective:CycleTiming"),
     ),
 ]
 Distance = Annotated[str | None, option("--clearance LENGTH", "Required clearance, such as 10mm.")]

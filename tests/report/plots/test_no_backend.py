@@ -10,9 +10,9 @@ PROGRAM = """
 import os, sys
 before = os.environ.get("MPLBACKEND")
 from cellplan.report.plots.canvas import paint
-from cellplan.report.plots.figure import Axis, Figure, Panel
-x = Axis(low=0.0, high=1.0)
-paint(Figure(title="0", x=x, panels=[Panel(title="0", y=x, items=[])]), "png")
+from cellplan.report.plots.figure import Figure, PlotAxis, PlotPanel
+x = PlotAxis(low=0.0, high=1.0)
+paint(Figure(title="0", x=x, panels=[PlotPanel(title="0", y=x, items=[])]), "png")
 import matplotlib
 assert os.environ.get("MPLBACKEND") == before
 print(matplotlib.rcParams._get("backend"))
