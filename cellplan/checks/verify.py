@@ -142,7 +142,7 @@ def with_clearance(
         is_reported: See ``with_clocks``.
         progress: Called with the stage and the fraction done.
     """
-    q = stacked(scene.cell, report.q)
+    q = scene.cell.stacked(report.q)
     completed_report = completed(report, run_clearance(scene, schedule, q, progress=progress))
     return with_clocks(completed_report, scene, schedule, is_reported=is_reported, progress=progress)
 
@@ -187,11 +187,6 @@ def completed(report: Report, certified: Clearance) -> Report:
     """The report of ``verify_motion`` with the clearance of the same run."""
     clearance, checks = certified
     return replace(report, checks=(*report.checks, *checks), clearance=clearance)
-
-
-def stacked(cell: Cell, q: Mapping[str, Array]) -> Array:
-    """Positions of all robots side by side, shape (N, nq)."""
-    return np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
 
 
 def _errors(

@@ -347,6 +347,10 @@ class Cell(Presented):
             first = last
         raise KeyError(robot)
 
+    def stacked(self, q: Mapping[str, Array]) -> Array:
+        """Positions of all robots side by side, shape (N, nq), from those of each robot in [rad] or [m], (N, n)."""
+        return np.concatenate([q[robot.name] for robot in self.robots], axis=1)
+
     @property
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""

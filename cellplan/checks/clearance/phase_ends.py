@@ -111,15 +111,15 @@ def with_phase_ends(cell: Cell, phases: Sequence[JudgedPhase]) -> list[Report]:
 def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
     """Ends of phases at which others begin; those of further cycles only if something else is played around them."""
     placed, rows = list[_Placed](), list[tuple[Array, Array]]()
-    begin, cycles = 0.0, 1 if cell.program is None else min(cell.program.cycles, 3)
+    begin, cycles = 0.0, 1 if cell.program is None else min(cell.program.cycles, 3)  # a third repeats the second
     for place, phase in list(enumerate(phases)) * cycles:
         report = phase.report
         if len(report.times) > 1:
             scene = scene_of_run(phase.scene, [scheduled.task.name for scheduled in phase.schedule.tasks])
             placed.append(_Placed(place=place, scene=scene, schedule=phase.schedule, report=report, begin=begin))
-            rows.append((begin + report.times[:-1], _stacked(cell, report)[:-1]))
+            rows.append((begin + report.times[:-1], cell.stacked(report.q)[:-1]))
             begin = placed[-1].end
-    last = _stacked(cell, placed[-1].report)[-1:]
+    last = cell.stacked(placed[-1].report.q)[-1:]
     times, q = (np.concatenate(parts) for parts in zip(*rows, (np.array([begin]), last), strict=True))
     known = set[tuple[bytes, tuple[int, ...]]]()
     for before, after in pairwise(placed):
@@ -130,11 +130,6 @@ def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
         if key not in known:
             known.add(key)
             yield end
-
-
-def _stacked(cell: Cell, report: Report) -> Array:
-    """Positions of all robots side by side in [rad] or [m], shape (N, nq)."""
-    return np.concatenate([report.q[robot.name] for robot in cell.robots], axis=1)
 
 
 def _across(end: _End, pair: PairSkew) -> PairSkew:

@@ -161,7 +161,7 @@ def _tools(
     if cell.carrier is None:
         return
     carrier, apart = cell.robots[cell.carrier].name, {frozenset(pair) for pair in _apart(cell)}
-    stacked = np.concatenate([q[robot.name] for robot in cell.robots], axis=1)
+    stacked = cell.stacked(q)
     arms = LeverArms(scene, stacked)
     steps, by_task = arms.steps(stacked), {depth.task: depth for depth in depths}
     movers = {robot: Mover.of(scene, arms, robot, q=q[robot], steps=steps) for robot in q}

@@ -75,7 +75,7 @@ class ErrorsBetweenRows:
             q: Positions by robot in [rad] or [m], shape (N, n) each.
         """
         self._scene, self._schedule, self._q = scene, schedule, q
-        stacked = np.concatenate([q[robot.name] for robot in scene.cell.robots], axis=1)
+        stacked = scene.cell.stacked(q)
         self._arms = LeverArms(scene, stacked)
         self._moved = self._arms.steps(stacked)
         self._jumped, self._share = _within_steps(schedule.times, schedule.jumps)

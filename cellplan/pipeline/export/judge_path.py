@@ -20,7 +20,6 @@ from cellplan.checks.tools.between_checks import (
 )
 from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
-from cellplan.checks.verify import stacked
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Relation
 from cellplan.model.motion import Schedule, TaskSchedule
@@ -57,7 +56,7 @@ class PathRows:
     @property
     def stacked(self) -> Array:
         """Positions of all robots, shape (M, nq)."""
-        return stacked(self.scene.cell, self.q)
+        return self.scene.cell.stacked(self.q)
 
     @property
     def is_off(self) -> bool:
@@ -150,7 +149,7 @@ def _checks(rows: PathRows) -> list[Check]:
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     checks += check_depths(cell, _depths(rows, schedule))
     checks += check_locked(cell, schedule.times, q)
-    checks += check_mounting(scene, stacked(cell, q), schedule.times)
+    checks += check_mounting(scene, cell.stacked(q), schedule.times)
     return checks
 
 
@@ -206,7 +205,7 @@ def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple
 def clearance_findings(rows: PathRows) -> Iterator[str]:
     """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
     scene = _demanding(rows)
-    q = stacked(scene.cell, rows.q)[rows.is_break]
+    q = scene.cell.stacked(rows.q)[rows.is_break]
     if certify(scene, q, with_minimum=False, with_curves=False).is_kept:
         return
     bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs

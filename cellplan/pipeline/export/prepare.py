@@ -69,7 +69,7 @@ def prepare(
     choice.refuse_for(dialect)
     shared = shared or Shared(run)
     robots = exported_robots(run.cell, dialect, choice.robots)
-    skew = run_skew(run, progress=progress) if Promise.TIMED in dialect.promises else None
+    skew = run_skew(run) if Promise.TIMED in dialect.promises else None
     promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise)
     frame = frame_of(run, robots, promised.promise, choice)
     raise_findings(unmet_demands(run, dialect, frame, choice))

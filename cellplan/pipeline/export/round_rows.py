@@ -16,7 +16,6 @@ from cellplan.cache import nothing_kept
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_depths
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
-from cellplan.checks.verify import stacked
 from cellplan.export.corners import LARGEST_SHARE, may_round, row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.geometry.arrays import Array, Flags
@@ -207,7 +206,7 @@ class _Choice:
         """Lower the shares of some rows of each robot until no two bodies come nearer by more in [m] at one of them."""
         if np.isinf(reach):
             return
-        arms = LeverArms(scene, stacked(scene.cell, self._played.at(self._played.run_times)))
+        arms = LeverArms(scene, scene.cell.stacked(self._played.at(self._played.run_times)))
         most = {}
         for name in self._chosen:
             executed = self._played.rows[name]

@@ -4,11 +4,9 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from cellplan.checks.clearance.skew import allowed_skew, has_clocks
-from cellplan.model.progress import Progress, silent
+from cellplan.checks.clearance.skew import has_clocks
 from cellplan.model.skew import MOST_SKEW, PairSkew
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.run_programs import scenes_of
 from cellplan.report.text.skew import demand_text
 from cellplan.report.text.skew import skew_text as report_text
 
@@ -62,26 +60,19 @@ class RunSkew:
         return f"a cycle of {self.cycle * pair.stated / pair.allowed:.4g} s or more would keep it"
 
 
-def run_skew(run: VerifiedRun, *, progress: Progress = silent) -> RunSkew | None:
-    """How far the starts of the controllers of a run may be apart; None where its cell states no two controllers.
+def run_skew(run: VerifiedRun) -> RunSkew | None:
+    """How far the starts of the controllers of a run may be apart, the ends of its phases included.
 
-    Args:
-        progress: Called with the stage and the fraction done.
+    Returns:
+        None where its cell states no two controllers.
     """
-    if not has_clocks(run.cell):
-        return None
-    clock_pairs: dict[tuple[str, str], ClockPair] = {}
-    for scene, motion in zip(scenes_of(run), run.motions, strict=True):
-        q = {name: motion.tables[name].q for name in (robot.name for robot in run.cell.robots)}
-        report = motion.report.skew  # found by the same function when the run was verified
-        if report is None:
-            report = allowed_skew(scene, motion.schedule, q, motion.report.depths, progress=progress)
-        for pair in report.pairs:
-            key = (pair.first, pair.second)
-            clock_pair = _clock_pair(pair, motion.name)
-            if key not in clock_pairs or clock_pair.allowed < clock_pairs[key].allowed:
-                clock_pairs[key] = clock_pair
-    return RunSkew(pairs=tuple(clock_pairs.values()), cycle=float(run.motion.times[-1]))
+    least: dict[tuple[str, str], ClockPair] = {}
+    for motion in run.motions:
+        for pair in () if motion.report.skew is None else motion.report.skew.pairs:
+            key, allowed = (pair.first, pair.second), _clock_pair(pair, motion.name)
+            if key not in least or allowed.allowed < least[key].allowed:
+                least[key] = allowed
+    return RunSkew(pairs=tuple(least.values()), cycle=float(run.motion.times[-1])) if has_clocks(run.cell) else None
 
 
 def skew_text(seconds: float) -> str:

@@ -9,7 +9,6 @@ import numpy as np
 from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.verify import stacked
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell
@@ -103,7 +102,7 @@ def _is_apart(program: TimedProgram) -> bool:
     """Whether all distances are proved to be kept, and mounted bodies are mounted as they should be."""
     for one in program.solution.runs:
         scene = scene_of_run(one.scene or program.scene, [it.task.name for it in one.schedule.tasks])
-        q = stacked(scene.cell, one.report.q)
+        q = scene.cell.stacked(one.report.q)
         if not all(check.passed for check in check_mounting(scene, q, one.schedule.times)):
             return False
         if not certify(scene, q, with_minimum=False).is_kept:

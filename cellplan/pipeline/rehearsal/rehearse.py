@@ -136,7 +136,7 @@ def _rehearse_run(
         schedule=run.schedule,
         moving=run.moving,
         judged_from=_judged_from(run.schedule),
-        q=np.concatenate([run.report.q[robot.name] for robot in cell.robots], axis=1),
+        q=cell.stacked(run.report.q),
     )
     made = []
     for number in range(trials):

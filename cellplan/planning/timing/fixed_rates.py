@@ -46,7 +46,7 @@ class AtRest:
         return float(np.diff(self.spans, axis=1).sum())
 
     def rows(self, count: int) -> Array:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         if not len(self.spans):
             return np.linspace(self.begin, self.end, count + 1)
         passed = np.append(0.0, np.cumsum(np.diff(self.spans, axis=1).ravel()))
@@ -58,7 +58,7 @@ class AtRest:
 
     @property
     def is_fixed(self) -> bool:
-        """See ``Rows``."""
+        """See ``TimedRows``."""
         return True
 
 
@@ -78,11 +78,11 @@ class AtFixedRate:
 
     @property
     def is_fixed(self) -> bool:
-        """See ``Rows``: whether all of the stretch is demanded."""
+        """See ``TimedRows``: whether all of the stretch is demanded."""
         return bool((self._freedom(self._grid()) == 0.0).all())
 
     def rows(self, count: int) -> Array:
-        """See ``Rows``; the rate where nothing is demanded is that which takes so many steps."""
+        """See ``TimedRows``; the rate where nothing is demanded is that which takes so many steps."""
         sigma, share = np.linspace(self.piece.sigma[0], self.piece.sigma[-1], count + 1), np.arange(count + 1)
         if self.is_fixed:
             return sigma
