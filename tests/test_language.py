@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,12 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent / "cellplan"
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 WORDS = frozenset({"asked", "beside", "each", "found", "kept", "own", "room"})
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """The syntax tree of a file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def bound_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
@@ -36,7 +43,7 @@ def test_no_name_of_the_package_is_a_word_that_fits_anything() -> None:
     named = [
         f"{path.relative_to(PACKAGE.parent).as_posix()}:{line}: {name}"
         for path in SOURCES
-        for line, name in bound_names(ast.parse(path.read_text(encoding="utf-8")))
+        for line, name in bound_names(tree_of(path))
         if name.lower().strip("_") in WORDS
     ]
 
@@ -75,10 +82,7 @@ def described_without_a_parameter(node: ast.FunctionDef) -> list[str]:
 
 def test_docstrings_describe_parameters_by_their_names() -> None:
     functions = [
-        (path.name, node)
-        for path in SOURCES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef)
+        (path.name, node) for path in SOURCES for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef)
     ]
     wrong = {f"{file}: {node.name}": described_without_a_parameter(node) for file, node in functions}
 

@@ -11,7 +11,13 @@ from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds, joint_path,
 from cellplan.scene.scene import Scene
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
-FASTEST = {"motion.timing": "fastest", "acceleration": {"full_speed_in_s": [0.25, 0.2, 0.15]}}
+FASTEST = {
+    "motion.timing": "fastest",
+    "motion.step_s": 0.004,
+    "acceleration": {"full_speed_in_s": [0.25, 0.2, 0.15]},
+    "tasks.circle.tolerance.between_rows_mm": 10,  # so that joints bind, not the errors between rows
+    "tasks.circle.tolerance.between_rows_deg": 10,
+}
 
 
 @pytest.fixture(scope="module")
