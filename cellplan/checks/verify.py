@@ -30,7 +30,7 @@ from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.idle import idle_robots
 from cellplan.model.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
@@ -142,7 +142,7 @@ def with_clearance(
         is_reported: See ``with_clocks``.
         progress: Called with the stage and the fraction done.
     """
-    q = scene.cell.stacked(report.q)
+    q = stacked_positions(scene.cell, report.q)
     completed_report = completed(report, run_clearance(scene, schedule, q, progress=progress))
     return with_clocks(completed_report, scene, schedule, is_reported=is_reported, progress=progress)
 

@@ -347,10 +347,6 @@ class Cell(Presented):
             first = last
         raise KeyError(robot)
 
-    def stacked(self, q: Mapping[str, Array]) -> Array:
-        """Positions of all robots side by side, shape (N, nq), from those of each robot in [rad] or [m], (N, n)."""
-        return np.concatenate([q[robot.name] for robot in self.robots], axis=1)
-
     @property
     def joint_count(self) -> int:
         """Length of the stacked joint vector."""
@@ -365,3 +361,8 @@ class Cell(Presented):
 def joint_at(cell: Cell, column: int) -> tuple[str, str]:
     """Names of the robot and of its joint at a place in the stacked joint vector of a cell."""
     return [(robot.name, joint) for robot in cell.robots for joint in robot.model.joint_names][column]
+
+
+def stacked_positions(cell: Cell, q: Mapping[str, Array]) -> Array:
+    """Positions of all robots side by side, shape (N, nq), from those of each robot in [rad] or [m], (N, n)."""
+    return np.concatenate([q[robot.name] for robot in cell.robots], axis=1)

@@ -10,7 +10,7 @@ from cellplan.checks.verify import completed, run_clearance, verify_motion, with
 from cellplan.io.run.clock_table import render_clock
 from cellplan.io.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
 from cellplan.model.branches import Branches, MovedStart
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.motion import Motion, Program
 from cellplan.model.phase import Phase
 from cellplan.model.plan import Plan
@@ -149,7 +149,7 @@ def certified(
     phases = []
     for run in solution.runs:
         run_scene = run.scene or scene
-        q = run_scene.cell.stacked(run.report.q)
+        q = stacked_positions(run_scene.cell, run.report.q)
         clearance = (
             run_clearance(run_scene, run.schedule, q, progress=progress)
             if early is None
@@ -190,7 +190,7 @@ def _runs(
         schedule, phase_motion = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         if early is not None:
-            early.begin(scenes[place], schedule, cell.stacked({table.robot: table.q for table in rows}))
+            early.begin(scenes[place], schedule, stacked_positions(cell, {table.robot: table.q for table in rows}))
         report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
         runs.append(Run(phase=phase, schedule=schedule, motion=phase_motion, program=program, report=report))

@@ -23,7 +23,7 @@ from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse
-from cellplan.model.cell import Cell, Relation
+from cellplan.model.cell import Cell, Relation, stacked_positions
 from cellplan.model.motion import Schedule
 from cellplan.model.report import Report
 from cellplan.model.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit
@@ -117,9 +117,9 @@ def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
         if len(report.times) > 1:
             scene = scene_of_run(phase.scene, [scheduled.task.name for scheduled in phase.schedule.tasks])
             placed.append(_Placed(place=place, scene=scene, schedule=phase.schedule, report=report, begin=begin))
-            rows.append((begin + report.times[:-1], cell.stacked(report.q)[:-1]))
+            rows.append((begin + report.times[:-1], stacked_positions(cell, report.q)[:-1]))
             begin = placed[-1].end
-    last = cell.stacked(placed[-1].report.q)[-1:]
+    last = stacked_positions(cell, placed[-1].report.q)[-1:]
     times, q = (np.concatenate(parts) for parts in zip(*rows, (np.array([begin]), last), strict=True))
     known = set[tuple[bytes, tuple[int, ...]]]()
     for before, after in pairwise(placed):

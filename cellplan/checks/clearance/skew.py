@@ -19,7 +19,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolWays
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import ToolDepth
@@ -161,7 +161,7 @@ def _tools(
     if cell.carrier is None:
         return
     carrier, apart = cell.robots[cell.carrier].name, {frozenset(pair) for pair in _apart(cell)}
-    stacked = cell.stacked(q)
+    stacked = stacked_positions(cell, q)
     arms = LeverArms(scene, stacked)
     steps, by_task = arms.steps(stacked), {depth.task: depth for depth in depths}
     movers = {robot: Mover.of(scene, arms, robot, q=q[robot], steps=steps) for robot in q}

@@ -25,7 +25,7 @@ from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_
 from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.between_rows import BetweenError, BetweenRows
-from cellplan.model.cell import Relation
+from cellplan.model.cell import Relation, stacked_positions
 from cellplan.model.motion import Schedule
 from cellplan.model.report import ClosureAccuracy, TaskAccuracy
 from cellplan.model.task import TIME_TOLERANCE, Frame, Task
@@ -75,7 +75,7 @@ class ErrorsBetweenRows:
             q: Positions by robot in [rad] or [m], shape (N, n) each.
         """
         self._scene, self._schedule, self._q = scene, schedule, q
-        stacked = scene.cell.stacked(q)
+        stacked = stacked_positions(scene.cell, q)
         self._arms = LeverArms(scene, stacked)
         self._moved = self._arms.steps(stacked)
         self._jumped, self._share = _within_steps(schedule.times, schedule.jumps)

@@ -21,7 +21,7 @@ from cellplan.checks.tools.between_checks import (
 from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.model.cell import Relation
+from cellplan.model.cell import Relation, stacked_positions
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
 from cellplan.model.task import Task
@@ -56,7 +56,7 @@ class PathRows:
     @property
     def stacked(self) -> Array:
         """Positions of all robots, shape (M, nq)."""
-        return self.scene.cell.stacked(self.q)
+        return stacked_positions(self.scene.cell, self.q)
 
     @property
     def is_off(self) -> bool:
@@ -149,7 +149,7 @@ def _checks(rows: PathRows) -> list[Check]:
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
     checks += check_depths(cell, _depths(rows, schedule))
     checks += check_locked(cell, schedule.times, q)
-    checks += check_mounting(scene, cell.stacked(q), schedule.times)
+    checks += check_mounting(scene, stacked_positions(cell, q), schedule.times)
     return checks
 
 
@@ -205,7 +205,7 @@ def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple
 def clearance_findings(rows: PathRows) -> Iterator[str]:
     """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
     scene = _demanding(rows)
-    q = scene.cell.stacked(rows.q)[rows.is_break]
+    q = stacked_positions(scene.cell, rows.q)[rows.is_break]
     if certify(scene, q, with_minimum=False, with_curves=False).is_kept:
         return
     bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs

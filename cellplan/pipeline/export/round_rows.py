@@ -20,7 +20,7 @@ from cellplan.export.corners import LARGEST_SHARE, may_round, row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
-from cellplan.model.cell import Relation
+from cellplan.model.cell import Relation, stacked_positions
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.task import Frame, Task
 from cellplan.pipeline.export.judge import played_programs
@@ -206,7 +206,7 @@ class _Choice:
         """Lower the shares of some rows of each robot until no two bodies come nearer by more in [m] at one of them."""
         if np.isinf(reach):
             return
-        arms = LeverArms(scene, scene.cell.stacked(self._played.at(self._played.run_times)))
+        arms = LeverArms(scene, stacked_positions(scene.cell, self._played.at(self._played.run_times)))
         most = {}
         for name in self._chosen:
             executed = self._played.rows[name]

@@ -13,7 +13,7 @@ from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.cell_errors import CellErrors
 from cellplan.model.check_kinds import TOOL_ERRORS
 from cellplan.model.motion import Motion, Schedule
@@ -136,7 +136,7 @@ def _rehearse_run(
         schedule=run.schedule,
         moving=run.moving,
         judged_from=_judged_from(run.schedule),
-        q=cell.stacked(run.report.q),
+        q=stacked_positions(cell, run.report.q),
     )
     made = []
     for number in range(trials):
