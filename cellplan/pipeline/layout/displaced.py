@@ -11,7 +11,7 @@ from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.progress import silent
 from cellplan.pipeline.early_clearance import EarlyClearance
 from cellplan.pipeline.fastest.scaling import scaled_values
@@ -102,7 +102,7 @@ def _is_apart(program: TimedProgram) -> bool:
     """Whether all distances are proved to be kept, and mounted bodies are mounted as they should be."""
     for one in program.solution.runs:
         scene = scene_of_run(one.scene or program.scene, [it.task.name for it in one.schedule.tasks])
-        q = scene.cell.stacked(one.report.q)
+        q = stacked_positions(scene.cell, one.report.q)
         if not all(check.passed for check in check_mounting(scene, q, one.schedule.times)):
             return False
         if not certify(scene, q, with_minimum=False).is_kept:
