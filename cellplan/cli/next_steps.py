@@ -19,9 +19,6 @@ def after_check(cell: Path, checked: Cell, *, passed: bool, allow_dirs: Sequence
 
     Args:
         cell: The cell file, as the user named it.
-        checked: The cell with its changes.
-        passed: Whether it passed.
-        allow_dirs: Further folders that the files it names may lie in.
     """
     if passed:
         return [_line("solve", str(cell), *_settings(checked.origin.changes), *_folders(allow_dirs))]
@@ -29,15 +26,7 @@ def after_check(cell: Path, checked: Cell, *, passed: bool, allow_dirs: Sequence
 
 
 def after_solve(cell: Path, solved: Cell, failed: Iterable[str], *, run: Path, allow_dirs: Sequence[Path]) -> list[str]:
-    """What to type after a cell was solved.
-
-    Args:
-        cell: The cell file, as the user named it.
-        solved: The cell with its changes.
-        failed: Names of the failed checks.
-        run: The run folder.
-        allow_dirs: Further folders that the files it names may lie in.
-    """
+    """What to type after a cell was solved."""
     names = set(failed)
     if not names:
         return [export_line(run, cell, allow_dirs)]

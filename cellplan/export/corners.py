@@ -20,10 +20,6 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
     These are all rows but the first and the last one, marks, rows at which the process of any robot of the program goes
     on or off, and rows at which a robot rests or its tool has to stop. Robots that move in step round the same rows:
     those that none of the moving ones must not round.
-
-    Args:
-        program: Rows of the robots that are exported.
-        promise: Whether robots move in step.
     """
     switches = _switch_times(program)
     flags = {}

@@ -24,9 +24,6 @@ def render_csv(job: ExportJob) -> dict[str, str]:
 
     A program from home to home is one file for each robot.
 
-    Args:
-        job: What is written; every row has its time.
-
     Raises:
         InputError: A joint or a time cannot be written with the decimals of the format.
     """
@@ -39,10 +36,6 @@ def render_csv(job: ExportJob) -> dict[str, str]:
 
 def read_csv(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly: the rows of each program.
-
-    Args:
-        frame: Robots and programs.
-        files: Text by path, as ``render_csv`` gives it.
 
     Raises:
         InputError: With file and line, when a text is not such a file; a file is missing, or is one too many.

@@ -27,7 +27,6 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]
 
     Args:
         frame: The robots that are exported; all robots of the cell take part in the handshake.
-        robot: Name of the robot.
 
     Raises:
         InputError: A signal is not stated in the cell.
@@ -62,7 +61,6 @@ def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:
 
     Args:
         frame: The robots that are exported, of a cell of several robots.
-        robot: Name of the robot.
 
     Raises:
         InputError: A signal is not stated in the cell.

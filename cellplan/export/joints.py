@@ -48,10 +48,7 @@ def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DE
     """Positions of the controller as numbers of a file, rounded, none beyond a limit when they are read back.
 
     Args:
-        robot: The robot, whose limits and zero hold.
         q: Positions of the model in [rad] or [m], shape (N, n).
-        decimals: Of the numbers.
-        angle: Unit of turning joints.
 
     Returns:
         The numbers, shape (N, n), exact multiples of the last decimal but for the last bit.

@@ -39,10 +39,6 @@ def render_json(job: ExportJob) -> dict[str, str]:
 def read_json(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly; spaces and line breaks between values may be others.
 
-    Args:
-        frame: What is exported.
-        files: Text by path.
-
     Raises:
         InputError: With file and line, when a text is not such a file.
     """

@@ -45,11 +45,7 @@ class Value:
         return _line(self.text, self.at)
 
     def refused(self, expected: str) -> InputError:
-        """The error that something else stands here.
-
-        Args:
-            expected: What should stand here.
-        """
+        """The error that something else stands here."""
         return _refused(self.file, self.text, self.at, expected)
 
     def members(self, keys: Collection[str]) -> "dict[str, Value]":
@@ -108,7 +104,6 @@ class Value:
         """Make sure that the value is a given one.
 
         Args:
-            expected: The value.
             free: Keys of objects whose values may be any.
 
         Raises:

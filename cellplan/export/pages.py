@@ -79,10 +79,6 @@ def program_paths(
     The last part may become longer by the ending of a page.
 
     Args:
-        frame: What is exported.
-        dialect: The format.
-        longest: Most characters of a name.
-        reserved: Words of the language.
         taken: Pattern of the names that points and other data have.
 
     Raises:
@@ -104,10 +100,7 @@ def _page_names(names: Iterable[str], *, longest: int, reserved: Iterable[str], 
     No name ends like one of a page, so that ``weld_001`` is the first page of ``weld`` and nothing else.
 
     Args:
-        names: Names in the cell, in their order.
         longest: Most characters of the name of a page.
-        reserved: Words of the language.
-        taken: Pattern of the names that points and other data have.
     """
     used, result = set(reserved), dict[str, str]()
     for name in names:
@@ -156,10 +149,7 @@ def is_rounded(
     Rows that stand on a neighbour are no corner that could be rounded.
 
     Args:
-        job: What is written, with the share of the segments.
-        program: Rows of the robots in the program.
         numbers: Its positions as they are written, shape (N, n).
-        pages: Rows of each page.
     """
     flags: NDArray[np.bool_] = row_shares(job, program)[robot] > 0.0
     flags[[page[-1] for page in pages]] = False

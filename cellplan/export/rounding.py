@@ -28,7 +28,6 @@ def rounded_inside(joint: Joint, q: Array, decimals: int) -> Array:
     Each is the nearest one, unless that lies outside: 169.99996 does not become 170.0000 where the limit is 169.99999.
 
     Args:
-        joint: The joint, whose limits hold.
         q: Positions within its limits, in [rad] or [m], shape (N,).
         decimals: Of a degree or a millimetre.
 

@@ -27,7 +27,6 @@ def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
     """Comment lines of a note, each with the sign of a comment before it.
 
     Args:
-        note: Any text.
         sign: What begins a comment: ``;`` or ``!``.
         forbidden: Characters that may not stand in one, which become question marks.
     """
@@ -45,7 +44,6 @@ def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] 
 
     Args:
         names: Names in the cell, in their order: the same names always give the same result.
-        longest: Most characters.
         reserved: Words of the language, in any case.
     """
     taken = {word.lower() for word in reserved}

@@ -92,9 +92,6 @@ def line_error(file: str, line: int, expected: str, got: str) -> InputError:
     """The error that a line of a file holds something else.
 
     Args:
-        file: Its name in messages.
-        line: The line, from 1.
-        expected: What should stand there.
         got: What stands there, of which the first characters are shown.
     """
     return mismatch_error(file, line, expected, repr(got[:60]))
@@ -104,9 +101,6 @@ def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputErr
     """The error that something else was found at a line of a file.
 
     Args:
-        file: Its name in messages.
-        line: The line, from 1.
-        expected: What should be there.
         actual: What is there, in words.
     """
     return InputError(f"{file}:{line}: expected {expected}, got {actual}")

@@ -30,9 +30,6 @@ class ChildStock:
         """Result of ``function(*arguments)``, worked out in a child process; as ``in_child``.
 
         Args:
-            function: A function of a module; the child imports it from there.
-            *arguments: Plain data.
-            guard: Names for messages, and limits.
             prepare: What a process does first that has not done so, its argument and limits: imports, for which the
                 limits of the job are too narrow.
 

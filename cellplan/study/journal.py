@@ -32,7 +32,6 @@ class Journal:
         Args:
             folder: Folder of the study, which exists.
             header: What the study is about: a journal with another header is not continued.
-            resume: Whether trials of an earlier journal count.
 
         Raises:
             InputError: The earlier journal cannot be read, or is that of another study.

@@ -34,11 +34,8 @@ class Recorder:
         """Begin with what the journal holds.
 
         Args:
-            state: When the study was begun, and where it ends.
-            progress: Called after every trial.
             compared: What makes one trial better than another; None for nothing.
             enough: Whether a trial ends the study; None for never.
-            noun: What a trial is called.
         """
         self.journal, self._state, self._progress = journal, state, progress
         self._compared, self._enough, self._noun = compared, enough, noun
@@ -65,8 +62,6 @@ class Recorder:
         """Record a trial, in its place once those before it are there.
 
         Args:
-            variant: Its number and values.
-            outcome: What came of it.
             again: Works out a trial that counts again, so that its figures are those of this machine; None where they
                 are anyway.
         """

@@ -27,8 +27,6 @@ class Flight:
 
         Args:
             evaluate: Outcome of a variant; sent to the workers, so it must be picklable.
-            executor: What the trials are submitted to.
-            limits: Those of each trial.
         """
         self._evaluate, self._executor, self._limits = packed(evaluate), executor, limits
         self._slots: int = getattr(executor, "count", BEGUN)
@@ -113,9 +111,7 @@ def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> I
     """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself.
 
     Args:
-        variants: What is evaluated.
         evaluate: Outcome of a variant; must be picklable for more than one worker.
-        workers: Number of processes.
     """
     if min(workers, len(variants)) <= 1:
         yield (evaluate(variant) for variant in variants)

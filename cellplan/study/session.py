@@ -48,10 +48,7 @@ class Crew:
         """Prepare.
 
         Args:
-            evaluate: Outcome of a variant.
             workers: Number of processes, or an executor, which stays open.
-            limits: Those of each trial.
-            size: Number of trials in a round.
         """
         self._evaluate, self._workers, self._limits, self._size = evaluate, workers, limits, size
         self._opened = ExitStack()
@@ -98,15 +95,7 @@ class Crew:
 
 
 def run_rounds(propose: Propose, size: int, stop: Stop, record: Recorder, crew: Crew) -> StoppedBy:
-    """Work out round after round; why the study has ended.
-
-    Args:
-        propose: Values of the trials of the next round.
-        size: Number of trials in a round.
-        stop: Where it ends at the latest.
-        record: Where trials are recorded.
-        crew: What works them out.
-    """
+    """Work out round after round; why the study has ended."""
     number, last = 0, 0.0
     while True:
         begin = number * size

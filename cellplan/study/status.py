@@ -80,7 +80,6 @@ class StudyStatus:
         """The status of a study.
 
         Args:
-            done: Number of trials that are recorded.
             compared: What makes one better than another; None for nothing.
             state: Its state; None once it has ended.
             is_running: Whether it runs; else it has ended or was killed.

@@ -82,8 +82,6 @@ class Study:
             evaluate: Outcome of a variant, whose values are those proposed; sent to worker processes, so it must be
                 picklable. It may keep in itself what it has read, but nothing that changes a later outcome.
             workers: Number of processes; or an executor, which stays open, such as ``Workers`` begun earlier.
-            stop: Where the study ends.
-            limits: Those of each trial.
             resume: Whether trials that the folder holds already are not evaluated again.
             progress: Called with one line about the study and the fraction done.
 

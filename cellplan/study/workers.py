@@ -67,8 +67,6 @@ class Workers(ThreadPoolExecutor):
         """Start the processes.
 
         Args:
-            count: Number of processes.
-            modules: Names of modules that trials need.
             first: What each process works out before its first trial, to keep it: a function of a module, bound to
                 plain data. What it raises is ignored: trials meet it again.
             at_once: Number of processes that start now; the others with their first trials. None for all.

@@ -45,8 +45,6 @@ def refuse_ignored(command: Any, ctx: Any, args: list[str]) -> None:
 
     Args:
         command: The command, or the program itself with its own options.
-        ctx: The context in which its words are read.
-        args: The words.
 
     Raises:
         InputError: An option with one value is given twice, or one has no meaning with or without another.

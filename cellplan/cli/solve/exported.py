@@ -18,15 +18,7 @@ SCHEMA: Final = "cellplan.exported/1"
 def result_of_one(
     run: "VerifiedRun", folder: Path, form: str, *, files: Sequence[str], record: Mapping[str, Any]
 ) -> Result:
-    """What to say of one format.
-
-    Args:
-        run: The verified run.
-        folder: Where its programs are.
-        form: Name of the format.
-        files: Paths of its programs in the folder.
-        record: What its ``export.json`` says.
-    """
+    """What to say of one format."""
     about = {"schema": SCHEMA, "status": "exported", "exit": int(ExitStatus.PASSED), "folder": str(folder)}
     what = {"format": form, "run": run.digest, "files": list(files), "remarks": list(run.remarks), "export": record}
     lines = [f"{run.cell.name}: exported", *promise_lines(record), *notes(run.remarks), f"programs: {folder}"]

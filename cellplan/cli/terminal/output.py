@@ -42,7 +42,6 @@ def show(lines: Sequence[str], *, passed: bool | None = None) -> None:
     """Show a result to a person: styled and wrapped on a terminal, the same lines as they are elsewhere.
 
     Args:
-        lines: The verdict, and what stands below it.
         passed: The verdict; None for a result that neither passes nor fails.
 
     Raises:

@@ -18,11 +18,7 @@ Listener = Callable[[str, float], None]
 
 @contextlib.contextmanager
 def progress_listener(*, quiet: bool) -> Iterator[Listener]:
-    """A callback for the progress of stages, valid within the ``with`` statement; times of stages if they are desired.
-
-    Args:
-        quiet: Whether no progress is shown.
-    """
+    """A callback for the progress of stages, valid within the ``with`` statement; times of stages where desired."""
     if STAGES.isEnabledFor(logging.INFO):
         times = StageTimes()
         yield lambda stage, _share: times.at(stage)

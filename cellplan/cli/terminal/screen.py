@@ -36,7 +36,6 @@ def screen_text(lines: Sequence[str], *, passed: bool | None, width: int) -> str
     """Lines with signs and colours, wrapped at a width; colours are left out if NO_COLOR is set.
 
     Args:
-        lines: The verdict, and what stands below it.
         passed: The verdict; None for a result that neither passes nor fails.
         width: Columns of the terminal.
     """

@@ -49,7 +49,6 @@ class WatchPage:
 
         Args:
             phase: One of working, passed, failed and error.
-            lines: What to say about it.
             run: The run folder of a new result.
         """
         if run is not None:

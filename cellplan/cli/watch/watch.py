@@ -32,12 +32,7 @@ def watch(
     and begun anew.
 
     Args:
-        work: One round.
-        cell: The cell file.
-        schema: Schema of the JSON objects.
         as_json: Whether each round gives one JSON object on a line of its own, instead of text.
-        quiet: Whether nothing but results is shown.
-        page: Shows the latest result.
 
     Raises:
         InterruptedWorkError: Always, at the end.

@@ -24,8 +24,6 @@ def read_krl(
     """Read the files of an export back, strictly: positions and marks; these programs state neither times nor process.
 
     Args:
-        frame: Which robots and programs.
-        files: Text by path.
         paths: Path of each main module without its ending, by program and robot.
 
     Raises:

@@ -65,8 +65,6 @@ def read_data(
     """Declarations of a robot, their values compared with the cell.
 
     Args:
-        unit: The robot.
-        modules: Its modules, by file.
         part: Where the part is held; None for a robot without targets on it.
 
     Raises:

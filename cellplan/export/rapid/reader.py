@@ -48,10 +48,6 @@ class _Task(NamedTuple):
 def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """The rows of each program that exported files hold.
 
-    Args:
-        frame: The export, without its rows.
-        files: Text by path.
-
     Raises:
         InputError: With file and line, where a text is not such a program or breaks a rule of MultiMove.
     """

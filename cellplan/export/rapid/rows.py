@@ -72,7 +72,6 @@ def _rounding(unit: RapidUnit, moves: Sequence[RapidMove], q: Array, p: Array) -
     """Share of the shorter neighbouring segment within which each row is rounded, shape (N,).
 
     Args:
-        unit: The robot.
         q: Its rows, NaN at targets on the part, shape (N, n).
         p: Tool on the part in [m] at these, NaN at all others, shape (N, 3).
     """

@@ -41,7 +41,6 @@ def part_targets(unit: RapidUnit, q: Array, X_PT: Array) -> list[str]:
     """Targets ``[[3],[4],[4],[6]]`` of tool tips on the part: place, quaternion, configuration, external axes.
 
     Args:
-        unit: The robot.
         q: Its joints in [rad] or [m], shape (N, n), whose configuration is stated.
         X_PT: Its tool tip in the part frame, shape (N, 4, 4), in [m].
 

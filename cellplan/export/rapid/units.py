@@ -105,11 +105,7 @@ def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
 
 
 def works_on_part(frame: ExportFrame, robot: str) -> bool:
-    """Whether a robot may be programmed with targets on the part: it has an arm and a task there, and does not hold it.
-
-    Args:
-        robot: Name of the robot.
-    """
+    """Whether a robot may have targets on the part: it has an arm and a task there, and does not hold it."""
     cell = frame.cell
     tasks = [task for task in cell.tasks if task.robot == robot and task.relative_to is Frame.PART]
     return (

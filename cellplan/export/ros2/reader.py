@@ -53,10 +53,6 @@ def read_ros2(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows
     Speeds have to fit the positions: each lies among the slopes of the two steps before it and of the two after it,
     or beyond them by no more than they differ. The parts of a split trajectory follow on one another.
 
-    Args:
-        frame: What is exported.
-        files: Text by path.
-
     Raises:
         InputError: With file and line, when a text is not such a file.
     """

@@ -72,12 +72,8 @@ def stream_record(
     """The record beside a stream.
 
     Args:
-        frame: What is exported.
-        program: Name of the program.
-        robot: Name of the robot.
         quanta: Written positions as whole numbers of the last decimal, in the order of the columns, shape (N, n).
         digest: SHA-256 of the stream.
-        notes: What is promised of it.
 
     Raises:
         InputError: The controller follows a stream with a latency that is not stated, or counts an axis in a way that

@@ -78,10 +78,6 @@ def _require_name(frame: ExportFrame, name: str) -> None:
 def read_stream(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly: rows at rest at both ends, and figures that are those of the rows.
 
-    Args:
-        frame: What is exported.
-        files: Text by path.
-
     Raises:
         InputError: With file and line, when a text is not such a file.
     """

@@ -143,10 +143,6 @@ class _Statements:
 def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly; spaces, comments and empty lines may be others.
 
-    Args:
-        frame: What is exported.
-        files: Text by path.
-
     Raises:
         InputError: With file and line, when a text is not such a file.
     """

@@ -77,7 +77,6 @@ def require_turns(joints: Sequence[str], numbers: Array, *, row_of: Sequence[str
     """Make sure that no position is beyond two turns.
 
     Args:
-        joints: Names of the joints.
         numbers: Written positions in [rad], shape (N, 6).
         row_of: Where each row stands, for messages.
 

@@ -27,8 +27,6 @@ def read_val3(
     """Read the files of an export back, strictly: positions, marks, zones; they state neither times nor process.
 
     Args:
-        frame: Which robots and programs.
-        files: Text by path.
         paths: Folder of each project, by program and robot.
 
     Raises:

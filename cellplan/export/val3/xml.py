@@ -76,7 +76,6 @@ def parse(text: str, file: str, root: str, space: str) -> Val3Element:
 
     Args:
         text: Its text; a mark of the byte order before it is left out.
-        file: Its name in messages.
         root: Name of the element that holds all others.
         space: Its namespace.
 

@@ -78,7 +78,6 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
     """Names of the robots that a format writes, in the order of the cell.
 
     Args:
-        dialect: The format.
         chosen: Names of the robots that are asked for; empty for all whose controller plays the format.
 
     Raises:

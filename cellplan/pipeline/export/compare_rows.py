@@ -21,13 +21,7 @@ SOLVED_ROOM: Final = 1e-4  # [rad] or [m] positions that are worked out again fr
 
 
 def other_rows(dialect: Dialect, job: ExportJob, read: tuple[ProgramRows, ...]) -> Iterator[str]:
-    """What differs between the rows that were written and those that were read, the first of each robot.
-
-    Args:
-        dialect: The format, whose decimals count.
-        job: What was written.
-        read: What its reader found.
-    """
+    """What differs between the rows that were written and those that were read, the first of each robot."""
     if len(read) != len(job.programs):
         yield f"expected {len(job.programs)} programs, read {len(read)}"
         return

@@ -77,9 +77,6 @@ def judge(
     times of the rows that were written: no tool is then farther from its desired path than from the desired pose.
 
     Args:
-        dialect: The format.
-        job: What was written.
-        read: What the reader found, program by program.
         lead: Time in [s] by which the rows are later than those of the run, see ``resample.lead_time``.
         shared: What exports of the run share: rows that are played alike, to the last bit, are judged once.
     """

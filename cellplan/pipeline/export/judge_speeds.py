@@ -46,7 +46,6 @@ def joint_findings(played: ExecutedProgram, *, accelerations: bool) -> Iterator[
     """Speeds beyond the limits of a joint, and accelerations where they are what a controller plays.
 
     Args:
-        played: The program.
         accelerations: Whether accelerations and jerk count too: not where a controller rounds its rows or plans its
             own profile between them.
     """

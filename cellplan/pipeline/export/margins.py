@@ -90,7 +90,6 @@ def off_chords(played: ExecutedProgram, times: Array) -> Array:
     """How far joints that run a cubic may be off straight motion between times, in [rad] or [m], shape (M - 1, nq).
 
     Args:
-        played: A program.
         times: Times in [s] that hold all its rows within them, shape (M,).
     """
     off = []
@@ -116,9 +115,6 @@ def tool_margins(arms: LeverArms, scene: Scene, relation: Relation, off: Array) 
     """No tool point moves on the part by more in [m], nor turns by more in [rad], in each step, shape (M, 2).
 
     Args:
-        arms: Lever arms of the cell.
-        scene: The cell made computable.
-        relation: The task or the grasp.
         off: How far all joints may be off, each by itself, in [rad] or [m], shape (M, nq).
     """
     chain = arms.tool(relation.robot, seen_by=_holder(scene, relation))
@@ -135,9 +131,6 @@ def tool_corners(arms: LeverArms, scene: Scene, relation: Relation, q: Array, co
     largest of the three sums counts.
 
     Args:
-        arms: Lever arms of the cell.
-        scene: The cell made computable.
-        relation: The task or the grasp.
         q: Straight motion in [rad] or [m], shape (M, nq).
         corners: How far all joints may be off at these times, see ``corners_at``, shape (M, nq).
     """
@@ -196,7 +189,6 @@ def raised(arms: LeverArms, scene: Scene, off: Array, *, in_step: bool = True) -
     Pairs that need not keep a distance are to keep this much.
 
     Args:
-        arms: Lever arms of the cell.
         off: How far all joints may be off, in [rad] or [m], shape (M, nq).
         in_step: Whether both bodies of a pair are off in the same step; or else each in any.
     """

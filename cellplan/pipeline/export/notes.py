@@ -13,12 +13,7 @@ NOISE: Final = 1e-6  # [deg] or [mm] deviations below it differ from processor t
 
 
 def export_notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> tuple[str, ...]:
-    """Notes for the head of every file, of any characters.
-
-    Args:
-        prepared: What is written.
-        judgement: What was found in what was read back.
-    """
+    """Notes for the head of every file, of any characters."""
     return tuple(_notes(run, prepared, judgement))
 
 

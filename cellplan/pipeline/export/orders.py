@@ -70,9 +70,6 @@ class Orders:
 def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[Orders, ...]:
     """Marks of every program of a run, between which every order of the robots is certified.
 
-    Args:
-        progress: Called with the stage and the fraction done.
-
     Raises:
         NotVerifiedError: With the robots, the phase and the distance where marks do not suffice.
     """
@@ -111,10 +108,7 @@ def certify_written(
 
     Args:
         run: The run, whose rows are those of robots that are not exported.
-        orders: Marks of its programs.
-        read: What a reader found in the programs, marks included.
         corners: How far each robot may be off at its rows by rounding, see ``margins.robot_corners``, by program.
-        progress: Called with the stage and the fraction done.
     """
     for order, rows, off in zip(orders, read, corners, strict=True):
         for name, robot_rows in rows.robots.items():
@@ -136,10 +130,7 @@ def blocked_orders(
 
     Args:
         run: The run, whose rows are those of robots that are not exported.
-        orders: Marks of the program.
-        rows: Its rows, with as many marks.
         corners: How far each robot may be off at its rows by rounding, in [rad] or [m], shape (N, n), by robot.
-        progress: Called with the stage and the fraction done.
     """
     scenes = scenes_of(run)
     program = next(program for program in run_programs(run) if program.name == orders.program)
@@ -169,7 +160,6 @@ class PhaseSearch:
 
         Args:
             scene: Its scene while the tasks of the phase are worked on.
-            program: The program of all robots.
         """
         self._scene, self._phase = scene, phase
         self._times = program.times[phase.first : phase.last + 1]

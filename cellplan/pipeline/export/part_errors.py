@@ -34,9 +34,7 @@ class ToolsOnPart:
 
         Args:
             cell: The cell, as it is in a phase.
-            chains: Kinematics by robot.
             tasks: Names of the tasks that are worked on in the phase.
-            robots: Names of the robots.
         """
         holder = {grasp.robot for grasp in cell.part.held_by[:1]}
         limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si

@@ -30,10 +30,6 @@ def with_part_poses(frame: ExportFrame, programs: Sequence[ProgramRows]) -> tupl
 
     These are the rows to which a tool moves while it is in process; all rows but the first where no process is stated.
 
-    Args:
-        frame: An export with targets on the part.
-        programs: Its programs, with the joints of all robots.
-
     Raises:
         InputError: No robot has a task on a part that is held, or the robots are not synchronised.
     """
@@ -62,9 +58,6 @@ def joints_of_part_poses(
 
     A target moves the tool straight on the part from row to row, while all that is judged moves the joints evenly. The
     two must agree in the middle between rows, where they are farthest apart.
-
-    Args:
-        read: What their reader found.
 
     Raises:
         NotVerifiedError: A target is not met near the written joints, states another configuration, or is so far from

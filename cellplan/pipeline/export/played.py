@@ -61,7 +61,6 @@ class ExecutedProgram:
             full: All rows of all robots, as in the run.
             files: What was read, and what was written; times that were not read are those that were written.
             shares: Within which rows are rounded, by robot, where what was read does not say so.
-            interpolation: How the target moves joints.
             lead: Time in [s] by which rows are later than those of the run.
         """
         rows, (read, written) = {}, files
@@ -156,8 +155,6 @@ class ExecutedProgram:
         """Times in [s] from begin to end, between which joints move evenly, or on a part of a cubic taken as even.
 
         Args:
-            begin: First time.
-            end: Last time.
             with_run: Whether the rows of the run are among them.
             with_corners: Whether the times are among them at which the rounding of a row begins and ends.
         """

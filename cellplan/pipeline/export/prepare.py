@@ -57,10 +57,7 @@ def prepare(
     """Choose promise, marks and rows of an export.
 
     Args:
-        dialect: The format.
-        choice: What the caller chose.
         shared: What exports of the run share; None for this one only.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The format cannot write this, or something is not stated in the cell.

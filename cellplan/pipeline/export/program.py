@@ -145,10 +145,7 @@ def exported(
     """The files of an export and its record, after all checks were made on what is read from them.
 
     Args:
-        form: Name of the format.
-        choice: What was chosen.
         shared: What exports of the run share; None for this one only.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: The format cannot hold what was chosen, or something is not stated in the cell.

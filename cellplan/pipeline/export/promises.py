@@ -64,9 +64,6 @@ def choose_promise(
     """The best promise that a format can keep for some robots of a run, or the one that is asked for.
 
     Args:
-        run: The run, verified or only read.
-        dialect: The format.
-        robots: Names of the robots that are exported.
         skew: How far the starts of controllers may be apart; None where it is unknown, or there is one only.
         requested: The only promise that will do; None for the best.
 

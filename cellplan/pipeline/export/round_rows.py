@@ -53,9 +53,7 @@ def with_rounding(
     """A job with the share of its segments within which each row is rounded.
 
     Args:
-        dialect: The format.
         job: What is to be written; its own share does not count.
-        shared: What exports of the run share.
         read: Its rows as a reader finds them, with the decimals of the format; None for the rows as they are.
         orders: Marks of its programs; empty where robots do not wait for one another.
         lead: Time in [s] by which rows are later than those of the run.

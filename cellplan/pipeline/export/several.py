@@ -120,9 +120,7 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
     """Refuse an export of which none of the formats can be, as the files of the run say already.
 
     Args:
-        run: The run as it was read, before anything is verified.
         formats: Names of formats, and whether each was asked for by its name.
-        choice: What of the run, and how.
         folder: Where the folders of the formats would go.
 
     Raises:

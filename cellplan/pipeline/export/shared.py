@@ -53,7 +53,6 @@ class Shared:
 
         Args:
             key: What the result depends on besides the run.
-            make: Finds it.
         """
         if key not in self._results:
             self._results[key] = make()

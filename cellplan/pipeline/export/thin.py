@@ -54,10 +54,8 @@ def thinned(
     where that is less: of the tools on the part, and of further holders.
 
     Args:
-        scene: The cell made computable.
         program: Rows of all robots of the cell on one clock; those that are in no group are left out of the result.
         groups: Names of the robots of each controller; one group for all robots of a synchronised export.
-        limits: The tolerances.
         essential_rows: Further rows that stay, and the phases in which tools are judged.
 
     Raises:
@@ -134,7 +132,6 @@ class _RowGroup:
         """Choose rows of a phase until its tools and holders keep their tolerances.
 
         Args:
-            tools: The tools and holders.
             phase: The rows, both ends included, which are chosen already.
             full: Positions of all robots in these rows, as in the run, by robot.
             count: Groups that share the tolerance of each.

@@ -34,10 +34,6 @@ class Written:
 def write(run: VerifiedRun, prepared: PreparedExport, *, progress: Progress = silent) -> Written:
     """Render the files of an export, read them back, and judge what was read; then say so in their heads.
 
-    Args:
-        prepared: What is to be written.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: Something cannot be written in this format.
         NotVerifiedError: A check fails on what was read.
@@ -50,12 +46,7 @@ def write(run: VerifiedRun, prepared: PreparedExport, *, progress: Progress = si
 
 
 def with_notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement) -> Written:
-    """The files of an export that say in their heads what was found in them.
-
-    Args:
-        prepared: What is to be written.
-        judgement: What was found in what was read back.
-    """
+    """The files of an export that say in their heads what was found in them."""
     job = replace(prepared.job, notes=export_notes(run, prepared, judgement))
     return Written(job=job, files=prepared.dialect.render(job), judgement=judgement)
 
@@ -73,11 +64,6 @@ def judged(
     run: VerifiedRun, prepared: PreparedExport, read: tuple[ProgramRows, ...], *, progress: Progress = silent
 ) -> Judgement:
     """Make all checks on what was read.
-
-    Args:
-        prepared: What was to be written.
-        read: What was read.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         NotVerifiedError: A check fails.

@@ -37,8 +37,6 @@ def page_findings(
 
     Args:
         stored: The run; its reports are known to say what was found.
-        motions: What was found.
-        drawn: The pictures of it.
     """
     yield from foreign_drawings(stored, drawings)
     for motion in motions:

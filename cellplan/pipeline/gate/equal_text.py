@@ -15,8 +15,6 @@ def is_same(got: Any, expected: Any, *, noise: float = NOISE) -> bool:
     A whole number is a count: it is the same or another one.
 
     Args:
-        got: The one value.
-        expected: The other.
         noise: Difference of numbers in their printed unit below which stands the noise of the arithmetic.
     """
     are_numbers = all(isinstance(value, int | float) and not isinstance(value, bool) for value in (got, expected))

@@ -101,7 +101,6 @@ def judged(
     Args:
         texts: The table of each robot, by its name.
         phases: What they were written from: of these only kinds, scenes and numbers of rows are used.
-        places: The phases of the run.
 
     Raises:
         InputError: A table is not whole.

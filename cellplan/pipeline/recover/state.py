@@ -152,7 +152,6 @@ def stopped_state(
     """The state of a run at a time, some robots at another one.
 
     Args:
-        places: The phases of the run.
         at: Time of the program in [s].
         frozen: Time of the program at which a robot stands instead, by its name.
         keep: Names of the robots that are to stand still.

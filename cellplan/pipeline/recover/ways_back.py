@@ -25,8 +25,6 @@ class WaysBack:
         """Prepare; nothing is planned yet.
 
         Args:
-            places: The phases of the run.
-            fixed: Names of the robots that are to stand still.
             refused: See above.
         """
         self._places, self._state, self._fixed, self.refused = places, state, set(fixed), refused

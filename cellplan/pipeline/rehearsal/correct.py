@@ -73,9 +73,6 @@ def correct_from_pass_to_pass(
 
     Args:
         job: The program as it was solved, and what it is for.
-        system: The measuring system.
-        rng: Where its noise comes from.
-        rounds: Maximum number of corrections.
         on_round: Called with the number of each round that begins.
     """
     executions = _Executions(job, real, system, rng)

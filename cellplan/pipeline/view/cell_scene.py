@@ -33,10 +33,6 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
 
     Where no start is found the robots stand at the starts and homes that are given, others in the middle of their
     ranges, and the scene says why.
-
-    Args:
-        geometries: Takes the shapes.
-        progress: Called with the stage and the fraction done.
     """
     failures: list[tuple[str, str]] = []  # subject and message
     scene = Scene.from_cell(cell)
@@ -74,7 +70,6 @@ def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Sce
 
     Args:
         what: What is in its way, in words.
-        geometries: Takes the shapes.
     """
     q, names = blocked.tried.q, [body.name for body in blocked.scene.bodies]
     times: Array = TRY_STEP * np.arange(len(q), dtype=np.float64)

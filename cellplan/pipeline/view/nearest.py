@@ -53,7 +53,6 @@ def nearest_record(stretches: Sequence[ViewedStretch], times: Array, q: Array, r
     """The closest pair of bodies that move against each other and are to keep a clearance, at some rows.
 
     Args:
-        stretches: The scenes of the motion, one after the other.
         times: Times of all rows in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         rows: The rows, ascending.

@@ -61,10 +61,6 @@ class ViewedPhase:
 def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:
     """The scene of a run.
 
-    Args:
-        cell: The cell that was solved.
-        geometries: Takes the shapes.
-
     Raises:
         InputError: The series of the run do not fit its cell.
     """
@@ -108,7 +104,6 @@ def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> Motio
     Args:
         times: Times of the rows in [s], shape (N,).
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        phases: Name, begin and end of each phase.
     """
     every = max(1, math.ceil(q.size / MOST_NUMBERS))
     rows = np.unique(np.append(np.arange(0, len(times), every), len(times) - 1))
@@ -125,7 +120,6 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Vi
     """The phases of the program in their order; those of further cycles repeat the first.
 
     Args:
-        cell: The cell that was solved.
         labels: Names of the phases of one cycle; a run of a single task has others, all in one scene.
     """
     phases = [phase for phase in stored.record["phases"] if phase["in_program"]]

@@ -77,11 +77,7 @@ def study_scenes(
     """A scene for each of the best layouts.
 
     Args:
-        record: The result of the search.
-        cell: The cell that the layouts are made of.
         file: Where the result was read from.
-        geometries: Takes the shapes.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         InputError: A layout does not fit the cell.
@@ -111,7 +107,6 @@ def placed_scene(first: Scene | None, cell: Cell) -> Scene:
 
     Args:
         first: The scene of another layout of the same cell; None for the first one.
-        cell: The cell with the layout.
 
     Raises:
         InputError: The bodies of the cell cannot be meant.

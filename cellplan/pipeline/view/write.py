@@ -97,11 +97,6 @@ def _target(request: ViewRequest, usual: Path) -> Path:
 def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
     """Write the 3-D page of a run whose cell is at hand into its folder.
 
-    Args:
-        folder: The run folder.
-        cell: The cell that was solved.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: The run was changed meanwhile, or the page cannot be written.
     """
@@ -114,7 +109,6 @@ def write_view_of_blocked(error: BlockedTransferError, target: Path) -> bool:
     """Write the 3-D page of the best try of a transfer move that was not found; False where it is not known.
 
     Args:
-        error: What was in the way.
         target: The page; an older one there is replaced.
 
     Raises:

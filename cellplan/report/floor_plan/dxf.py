@@ -153,8 +153,6 @@ def _draw_dimension(document: "Drawing", dimension: Dimension, *, corner: Array,
 
     Args:
         corner: Left lower corner of the first row of dimensions, shape (2,).
-        height: Height of texts.
-        number: Number of the dimension.
     """
     along, across = np.eye(2)[[dimension.axis, 1 - dimension.axis]]
     at = float(corner @ across) - 3.0 * height * dimension.row

@@ -47,7 +47,6 @@ def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind)
         times: Times of the samples in [s], shape (N,).
         error: In SI units, shape (N, 3).
         allowed: Its tolerance in SI units.
-        kind: How it is shown.
     """
     total = np.linalg.norm(error, axis=1)
     unit, scale = kind.units[0]

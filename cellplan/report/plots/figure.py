@@ -45,9 +45,6 @@ def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = Fa
     """An axis for values, with some room at its ends.
 
     Args:
-        low: Smallest value to show.
-        high: Largest value to show.
-        unit: Unit of the values.
         is_floored: Whether the axis begins at the smallest value itself.
     """
     padding = PADDING_FRACTION * (high - low) or 1.0

@@ -14,7 +14,6 @@ def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> di
     """Every figure as SVG and in the requested formats, by file name.
 
     Args:
-        figures: Figures by name.
         formats: Further formats, of ``FORMATS``.
 
     Raises:

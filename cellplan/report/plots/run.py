@@ -36,7 +36,6 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     ``velocities_<robot>``, and ``singularity``, as far as the run has what they show.
 
     Args:
-        report: What is drawn.
         cell: Where tolerances, the required clearance and the order of the robots come from.
     """
     colours = robot_colours(cell)

@@ -44,7 +44,6 @@ def framed(axes: Array, points: Array, *, low: Array, high: Array) -> Camera:
     """The camera that shows points in the world, shape (N, 3), as large as a rectangle of the sheet allows.
 
     Args:
-        points: What is to be seen.
         low: Left upper corner of the rectangle, shape (2,).
         high: Right lower corner, shape (2,).
     """

@@ -58,7 +58,6 @@ def detail(picture: StillPicture, camera: Camera, window: DetailWindow, classes:
     """What matters, enlarged in a window without what hides it, with a frame round its place in the picture.
 
     Args:
-        window: Where the detail is.
         classes: Names of the classes of materials and tones, which are added to.
     """
     scale = window.edge / _shown(picture, camera)
