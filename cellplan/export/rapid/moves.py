@@ -43,23 +43,14 @@ STOP: Final = Zone(0.0, 0.0, 0.0)
 
 
 class RapidMove(NamedTuple):
-    r"""A move of a program.
+    r"""A move of a program."""
 
-    Attributes:
-        statement: Where it stands.
-        target: Text of its target.
-        is_cartesian: Whether this is a target on the part.
-        number: Its ``\ID``; None without one.
-        duration: Its ``\T`` in [s]; 0 for the first move.
-        zone: How it is rounded.
-    """
-
-    statement: RapidStatement
-    target: str
-    is_cartesian: bool
-    number: int | None
-    duration: float
-    zone: Zone
+    statement: RapidStatement  # where it stands
+    target: str  # text of its target
+    is_cartesian: bool  # whether this is a target on the part
+    number: int | None  # its ``\ID``; None without one
+    duration: float  # its ``\T`` in [s]; 0 for the first move
+    zone: Zone  # how it is rounded
 
     @property
     def is_fine(self) -> bool:

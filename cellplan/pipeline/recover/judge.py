@@ -29,42 +29,25 @@ Apart = tuple[ComingApart, float | None]  # a pair, and the time in [s] from whi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Nearest:
-    """Where two bodies that keep what is demanded of them come nearest.
+    """Where two bodies that keep what is demanded of them come nearest."""
 
-    Attributes:
-        distance: Proved distance in [m].
-        demand: What is demanded in [m].
-        pair: Names of the bodies.
-        at_s: When, in [s] of the recovery.
-    """
-
-    distance: float
-    demand: float
-    pair: tuple[str, str]
-    at_s: float
+    distance: float  # proved distance in [m]
+    demand: float  # what is demanded in [m]
+    pair: tuple[str, str]  # names of the bodies
+    at_s: float  # when, in [s] of the recovery
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimedPhase:
-    """A phase of a recovery on its clock, as it was judged.
+    """A phase of a recovery on its clock, as it was judged."""
 
-    Attributes:
-        kind: What is done.
-        robots: Names of the robots that move.
-        words: The same for people.
-        begin: Time in [s] at which it begins.
-        end: Time in [s] at which it ends.
-        place: Place of the phase of the program that is played backwards; None for what is not.
-        nearest: Smallest distance in it of the pairs that keep their demand; None without such pairs.
-    """
-
-    kind: str
-    robots: tuple[str, ...]
-    words: str
-    begin: float
-    end: float
-    place: int | None
-    nearest: Nearest | None
+    kind: str  # what is done
+    robots: tuple[str, ...]  # names of the robots that move
+    words: str  # the same for people
+    begin: float  # time in [s] at which it begins
+    end: float  # time in [s] at which it ends
+    place: int | None  # place of the phase of the program that is played backwards; None for what is not
+    nearest: Nearest | None  # smallest distance in it of the pairs that keep their demand; None without such pairs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -72,13 +55,11 @@ class RecoveryJudgement:
     """What was found on the written tables of a recovery.
 
     Attributes:
-        checks: All checks.
-        phases: The phases on their clock.
         apart: Pairs that begin nearer than is demanded, with the time in [s] from which on each keeps its demand.
     """
 
-    checks: tuple[Check, ...]
-    phases: tuple[TimedPhase, ...]
+    checks: tuple[Check, ...]  # all checks
+    phases: tuple[TimedPhase, ...]  # the phases on their clock
     apart: tuple[Apart, ...]
 
     @property

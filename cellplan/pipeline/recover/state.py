@@ -92,23 +92,14 @@ class RunPlaces:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StoppedState:
-    """Where a cell has stopped.
+    """Where a cell has stopped."""
 
-    Attributes:
-        at: Time of the program in [s].
-        times: Time of the program at which each robot stands, by its name.
-        standing: Names of the robots that are to stand still.
-        q: Stacked joint positions in [rad] or [m], shape (nq,).
-        place: Place of the phase of ``at``.
-        lying: Where the part lies; None while it is held, or fixed anyway.
-    """
-
-    at: float
-    times: Mapping[str, float]
-    standing: tuple[str, ...]
-    q: Array
-    place: int
-    lying: PartPlaceEntry | None
+    at: float  # time of the program in [s]
+    times: Mapping[str, float]  # time of the program at which each robot stands, by its name
+    standing: tuple[str, ...]  # names of the robots that are to stand still
+    q: Array  # stacked joint positions in [rad] or [m], shape (nq,)
+    place: int  # place of the phase of ``at``
+    lying: PartPlaceEntry | None  # where the part lies; None while it is held, or fixed anyway
 
     @property
     def is_on_program(self) -> bool:
