@@ -11,9 +11,10 @@ import numpy as np
 
 from cellplan.export.dialect import Dialect
 from cellplan.export.json_tree import INDENT, Raw, Value, Written, dumped, parsed
+from cellplan.export.lines import line_error
 from cellplan.export.rounding import from_file_unit, rounded_inside
 from cellplan.export.text import fixed
-from cellplan.export.timed_rows import NANO, file_path, line_error, nanoseconds, require_paths, shared_clock
+from cellplan.export.timed_rows import NANO, file_path, nanoseconds, require_paths, shared_clock
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows

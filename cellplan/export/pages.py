@@ -1,7 +1,7 @@
 """Programs in the language of a maker: whose robots, which names and pages, how fast, and which rows are rounded."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final
 
 import numpy as np
@@ -139,6 +139,34 @@ def program_rows(job: ExportJob, robots: Iterable[str], program: ProgramRows) ->
         got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in robot_rows.items())
         raise InputError(f"program '{program.name or job.frame.cell.name}': expected rows, and equal marks, got {got}")
     return robot_rows
+
+
+def read_programs(
+    frame: ExportFrame,
+    files: Mapping[str, str],
+    paths: Mapping[tuple[str | None, str], str],
+    rows_of: Callable[[ExportFrame, str, dict[str, str], str], RobotRows],
+    *,
+    ending: str = "",
+) -> tuple[ProgramRows, ...]:
+    """Programs as a reader finds them, which takes the files of each robot out of those that are left.
+
+    Args:
+        paths: Path of each program, by its name and robot.
+        ending: Of the file that is named when robots have different numbers of marks.
+
+    Raises:
+        InputError: They have, or a file is one too many.
+    """
+    programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
+    left = dict(files)
+    for (program, robot), path in paths.items():
+        programs[program][robot] = rows_of(frame, robot, left, path)
+        if len({len(rows.marks) for rows in programs[program].values()}) > 1:
+            raise InputError(f"{path}{ending}: expected as many marks as the programs of the other robots have")
+    if left:
+        raise InputError(f"{min(left)}: expected no such file in this export")
+    return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
 def is_rounded(

@@ -353,6 +353,16 @@ def test_a_loop_without_its_end_is_refused() -> None:
     assert re.fullmatch(r"alpha/start.pgx:\d+: expected endFor, got 'waitEndMove\(\)'", said)
 
 
+def test_a_loop_before_the_end_of_a_program_is_refused() -> None:
+    job, files = written("marks")
+    local = '<Locals><Local name="n" type="num" xsi:type="array" size="1"/></Locals>\n    <Code>'
+    text = files["alpha/start.pgx"].replace("<Code>", local).replace("\nend]]", "\n  for n=1 to 2\nend]]")
+
+    said = message(job, {**files, "alpha/start.pgx": text})
+
+    assert re.fullmatch(r"alpha/start.pgx:\d+: expected endFor, got 'for n=1 to 2'", said)
+
+
 def test_robots_that_do_not_meet_equally_often_are_refused() -> None:
     job, files = written("marks")
     text = re.sub(r"(?s)  waitEndMove\(\)\n  .*?(?=  movej\(jRow\[1\])", "", files["beta/start.pgx"], count=1)

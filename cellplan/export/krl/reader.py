@@ -7,11 +7,12 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.errors import InputError
 from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.joints import Axes, from_numbers
 from cellplan.export.krl.names import WHOLE
-from cellplan.export.krl.text import KrlModule, KrlStatement, located, read_module
+from cellplan.export.krl.text import KrlModule, read_module
+from cellplan.export.lines import Statement
+from cellplan.export.pages import read_programs
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
 
 MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
@@ -29,56 +30,12 @@ def read_krl(
     Raises:
         InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
     """
-    programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
-    left = dict(files)
-    for (program, robot), path in paths.items():
-        programs[program][robot] = _rows(frame, robot, _played(frame, robot, left, path))
-        if len({len(rows.marks) for rows in programs[program].values()}) > 1:
-            raise InputError(f"{path}.src: expected as many marks as the programs of the other robots have")
-    if left:
-        raise InputError(f"{min(left)}: expected no such file in this export")
-    return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
+    return read_programs(frame, files, paths, _rows, ending=".src")
 
 
-def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_KrlPlayer":
-    """A main module and its pages, from begin to end; takes their files out of those that are left."""
-    main = read_module(left, path)
-    player = _KrlPlayer(frame=frame, robot=robot, path=path)
-    for statement in main.statements:
-        if statement.kind == "CALL":
-            page = read_module(left, player.called(main, statement))
-            if page.externals:
-                raise located(f"{page.path}.src", min(page.externals.values()), "no declaration in a page", "one")
-            player.begin(page)
-            for inner in page.statements:
-                player.play(page, inner)
-            player.finish(page)
-        else:
-            player.play(main, statement)
-    _refuse_other_declarations(main, player)
-    if player.calls == 0:
-        player.finish(main)
-    if player.lowered and not player.marks:
-        raise located(f"{path}.src", player.lowered, "a handshake at a row, as its output is lowered", "none")
-    return player
-
-
-def _refuse_other_declarations(main: KrlModule, player: "_KrlPlayer") -> None:
-    """Make sure that what is declared is called, and that a main module of pages has no points."""
-    source = f"{main.path}.src"
-    name = main.path.rpartition("/")[2]
-    calls = {f"{name}_{number:03d}" for number in range(1, player.calls + 1)}
-    for declared, line in main.externals.items():
-        if declared not in calls:
-            raise located(source, line, "declarations of pages that are called", declared)
-    if player.calls and main.points:
-        raise located(f"{main.path}.dat", min(main.lines.values()), "no point in a program of pages", "one")
-    player.require_setup(source, main.end)
-
-
-def _rows(frame: ExportFrame, robot: str, player: "_KrlPlayer") -> RobotRows:
-    """Rows of the model from the numbers of the points."""
-    placed = frame.robot(robot)
+def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> RobotRows:
+    """Rows of the model from the numbers of the points; takes the files of one robot out of those that are left."""
+    player, placed = _played(frame, robot, left, path), frame.robot(robot)
     axes, numbers = Axes.of(placed), np.array(player.rows, dtype=np.float64)
     written = np.zeros((len(numbers), len(placed.model.joints)))
     written[:, axes.arm] = numbers[:, :6]
@@ -89,6 +46,40 @@ def _rows(frame: ExportFrame, robot: str, player: "_KrlPlayer") -> RobotRows:
         marks=tuple(player.marks),
         rounding=np.array(player.rounding) / WHOLE,
     )
+
+
+def _played(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> "_KrlPlayer":
+    """A main module and its pages, from begin to end; takes their files out of those that are left."""
+    main = read_module(left, path)
+    player = _KrlPlayer(frame=frame, robot=robot, path=path)
+    for statement in main.statements:
+        if statement.kind == "CALL":
+            page = read_module(left, player.called(main, statement))
+            if page.externals:
+                raise next(iter(page.externals.values())).error("no declaration in a page", "one")
+            player.begin(page)
+            for inner in page.statements:
+                player.play(page, inner)
+            player.finish(page)
+        else:
+            player.play(main, statement)
+    _refuse_other_declarations(main, player)
+    if player.calls == 0:
+        player.finish(main)
+    if player.lowered and not player.marks:
+        raise player.lowered.error("a handshake at a row, as its output is lowered", "none")
+    return player
+
+
+def _refuse_other_declarations(main: KrlModule, player: "_KrlPlayer") -> None:
+    """Make sure that what is declared is called, and that a main module of pages has no points."""
+    calls = {f"{main.name}_{number:03d}" for number in range(1, player.calls + 1)}
+    for declared, line in main.externals.items():
+        if declared not in calls:
+            raise line.error("declarations of pages that are called", declared)
+    if player.calls and main.points:
+        raise next(iter(main.lines.values())).error("no point in a program of pages", "one")
+    player.require_setup(main.end)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -107,44 +98,42 @@ class _KrlPlayer:
     rounding: list[int] = field(default_factory=list)  # how far each row is, in [%]; 0 for a stop
     share: int = 0  # how far rows are from here on, in [%]; 0 before it is set
     step: int = 0  # number of instructions of a handshake that were met
-    lowered: int = 0  # line at which its output was lowered before the first motion, 0 if it was not
+    lowered: Statement | None = None  # where its output was lowered before the first motion
     names: list[str] | None = None  # points of the module that are still to come
 
-    def play(self, module: KrlModule, statement: KrlStatement) -> None:
+    def play(self, module: KrlModule, statement: Statement) -> None:
         """Follow one statement."""
         if self.step and statement.kind not in {"OUT", "WAIT"}:
-            expected = f"the rest of the handshake ({self._expected()})"
-            raise located(f"{module.path}.src", statement.line, expected, statement.text)
+            raise statement.error(f"the rest of the handshake ({self._expected()})")
         if statement.kind in {"OUT", "WAIT"}:
             self._signal(module, statement)
         elif statement.kind == "PTP":
             self._move(module, statement)
         elif statement.kind == "VEL_PTP":
             if not 0.0 < float(statement.words[0] or 0) <= 100.0:
-                raise located(f"{module.path}.src", statement.line, "a speed above 0 and up to 100", statement.text)
+                raise statement.error("a speed above 0 and up to 100")
             self.speed = True
         elif statement.kind == "APO":
-            self.share = _share(module, statement)
+            self.share = _share(statement)
         else:
             self._set(module, statement)
 
-    def called(self, main: KrlModule, statement: KrlStatement) -> str:
+    def called(self, main: KrlModule, statement: Statement) -> str:
         """Path of the page that a call is for."""
-        source, name = f"{main.path}.src", main.path.rpartition("/")[2]
-        expected = f"{name}_{self.calls + 1:03d}"
+        expected = f"{main.name}_{self.calls + 1:03d}"
         if (self.rows and not self.calls) or self.step:
-            raise located(source, statement.line, "no call in a program with motions of its own", statement.text)
+            raise statement.error("no call in a program with motions of its own")
         if statement.words[0] != expected:
-            raise located(source, statement.line, f"{expected}()", statement.text)
-        self.require_setup(source, statement.line)
+            raise statement.error(f"{expected}()")
+        self.require_setup(statement)
         self.calls += 1
         return f"{self.path}_{self.calls:03d}"
 
-    def require_setup(self, source: str, line: int) -> None:
+    def require_setup(self, at: Statement) -> None:
         """Refuse a motion before everything is set that motions need."""
         missing = [kind for kind in _SETUP if kind not in self.settings]
         if missing:
-            raise located(source, line, f"{missing[0]} to be set before the first motion", "none")
+            raise at.error(f"{missing[0]} to be set before the first motion", "none")
 
     def begin(self, module: KrlModule) -> None:
         """Begin with the points of a module."""
@@ -152,24 +141,22 @@ class _KrlPlayer:
 
     def finish(self, module: KrlModule) -> None:
         """Make sure that a module with motions ends in order."""
-        source = f"{module.path}.src"
         if self.step:
-            raise located(source, module.end, f"the rest of the handshake ({self._expected()})", "the end")
+            raise module.end.error(f"the rest of the handshake ({self._expected()})", "the end")
         if self.names is None or not module.points:
-            raise located(source, module.end, "at least one motion", "none")
+            raise module.end.error("at least one motion", "none")
         if self.names:
-            unused = self.names[-1]
-            raise located(f"{module.path}.dat", module.lines[unused], "points that are used", unused.upper())
+            raise module.lines[self.names[-1]].error("points that are used", self.names[-1].upper())
         if self.rounded:
-            raise located(source, module.end, "an exact stop at the last row", "C_PTP")
+            raise module.end.error("an exact stop at the last row", "C_PTP")
 
-    def _set(self, module: KrlModule, statement: KrlStatement) -> None:
+    def _set(self, module: KrlModule, statement: Statement) -> None:
         """What is set once, before the first motion."""
-        source, value = f"{module.path}.src", statement.words[0] if statement.words else None
+        value = statement.words[0] if statement.words else None
         if self.rows or module.path != self.path:
-            raise located(source, statement.line, "settings before the first motion", statement.text)
+            raise statement.error("settings before the first motion")
         if statement.kind in self.settings:
-            raise located(source, statement.line, "each setting once", statement.text)
+            raise statement.error("each setting once")
         expected = None
         if statement.kind in {"TOOL", "BASE"}:
             number = self._stated(statement.kind)
@@ -179,7 +166,7 @@ class _KrlPlayer:
         elif statement.kind == "ADVANCE" and int(value or 0) > MOST_ADVANCE:
             expected = f"a number from 0 to {MOST_ADVANCE}"
         if expected:
-            raise located(source, statement.line, expected, statement.text)
+            raise statement.error(expected)
         self.settings.add(statement.kind)
 
     def _stated(self, kind: str) -> int:
@@ -189,25 +176,24 @@ class _KrlPlayer:
             return 0
         return (control.tool_number if kind == "TOOL" else control.base_number) or 0
 
-    def _move(self, module: KrlModule, statement: KrlStatement) -> None:
+    def _move(self, module: KrlModule, statement: Statement) -> None:
         """A motion to the next point of the module."""
-        source = f"{module.path}.src"
-        self.require_setup(source, statement.line)
+        self.require_setup(statement)
         if not self.speed:
-            raise located(source, statement.line, "a speed before the first motion", statement.text)
+            raise statement.error("a speed before the first motion")
         if self.calls and module.path == self.path:
-            raise located(source, statement.line, "no motion in a program that calls pages", statement.text)
+            raise statement.error("no motion in a program that calls pages")
         if self.names is None:
             self.begin(module)
         name = str(statement.words[0]).lower()
         if name not in module.points:
-            raise located(source, statement.line, f"a point of {module.path}.dat", statement.text)
+            raise statement.error(f"a point of {module.path}.dat")
         if not self.names or self.names[-1] != name:
             order = self.names[-1].upper() if self.names else "no further motion"
-            raise located(source, statement.line, f"points in their order, each once ({order})", statement.text)
+            raise statement.error(f"points in their order, each once ({order})")
         self.rounded = statement.words[1] is not None
         if self.rounded and not self.share:
-            raise located(source, statement.line, "$APO.CPTP to be set before C_PTP", statement.text)
+            raise statement.error("$APO.CPTP to be set before C_PTP")
         self.names.pop()
         self.rounding.append(self.share if self.rounded else 0)
         self.rows.append(self._values(module, name))
@@ -218,49 +204,43 @@ class _KrlPlayer:
         count = len(axes.arm) + len(axes.external)
         if any(map(isnan, values[:count])) or any(value != 0.0 and not isnan(value) for value in values[count:]):
             expected = f"values for the {count} axes of the robot and for no other"
-            raise located(f"{module.path}.dat", module.lines[name], expected, name.upper())
+            raise module.lines[name].error(expected, name.upper())
         return values[:count]
 
-    def _signal(self, module: KrlModule, statement: KrlStatement) -> None:
+    def _signal(self, module: KrlModule, statement: Statement) -> None:
         """An instruction of a handshake."""
-        source, expected = f"{module.path}.src", self._steps()
-        row = len(self.rows) - 1
+        expected, row = handshake_steps(self.frame, self.robot), len(self.rows) - 1
         if expected and not self.lowered:
             first = lowering_step(self.frame, self.robot)
             if row >= 0 or self.calls or _step(statement) != first:
-                before = f"$OUT[{first.signal}]=FALSE before the first motion"
-                raise located(source, statement.line, before, statement.text)
-            self.lowered = statement.line
+                raise statement.error(f"$OUT[{first.signal}]=FALSE before the first motion")
+            self.lowered = statement
             return
         is_main = self.calls > 0 and module.path == self.path
         if not expected or row < 0 or self.rounded or is_main or row in self.marks:
-            raise located(source, statement.line, "signals only once after an exact stop at a mark", statement.text)
+            raise statement.error("signals only once after an exact stop at a mark")
         if _step(statement) != expected[self.step]:
-            raise located(source, statement.line, f"the handshake of the cell ({self._expected()})", statement.text)
+            raise statement.error(f"the handshake of the cell ({self._expected()})")
         self.step = (self.step + 1) % len(expected)
         if self.step == 0:
             self.marks.append(row)
 
-    def _steps(self) -> tuple[HandshakeStep, ...]:
-        """Instructions at a mark."""
-        return handshake_steps(self.frame, self.robot)
-
     def _expected(self) -> str:
         """The next instruction of a handshake."""
-        step = self._steps()[self.step]
+        step = handshake_steps(self.frame, self.robot)[self.step]
         state = "TRUE" if step.is_on else "FALSE"
         return f"WAIT FOR $IN[{step.signal}]=={state}" if step.waits else f"$OUT[{step.signal}]={state}"
 
 
-def _share(module: KrlModule, statement: KrlStatement) -> int:
+def _share(statement: Statement) -> int:
     """How far the rows that follow are rounded, in [%]."""
     share = int(statement.words[0] or 0)
     if not 1 <= share <= 100:
-        raise located(f"{module.path}.src", statement.line, "a share of 1 to 100", statement.text)
+        raise statement.error("a share of 1 to 100")
     return share
 
 
-def _step(statement: KrlStatement) -> HandshakeStep:
+def _step(statement: Statement) -> HandshakeStep:
     """A signal statement as a step of a handshake."""
     words = statement.words
     if statement.kind == "OUT":

@@ -8,16 +8,9 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.export.joints import Angle, from_numbers
+from cellplan.export.lines import line_error, lines_of, mismatch_error, truncated_error
 from cellplan.export.ros2.names import DECIMALS, ENDING, SHORTEST, file_name, joint_names, of_model, quoted
-from cellplan.export.timed_rows import (
-    NANO,
-    file_path,
-    line_error,
-    lines_of,
-    mismatch_error,
-    require_paths,
-    truncated_error,
-)
+from cellplan.export.timed_rows import NANO, file_path, require_paths
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows

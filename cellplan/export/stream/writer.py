@@ -18,6 +18,7 @@ from cellplan.errors import InputError, raise_findings, refusals
 from cellplan.export.dialect import Dialect
 from cellplan.export.joints import from_numbers, to_numbers
 from cellplan.export.json_tree import dumped, parsed
+from cellplan.export.lines import line_error, lines_of, mismatch_error
 from cellplan.export.stream.record import (
     DECIMALS,
     FREE,
@@ -27,7 +28,7 @@ from cellplan.export.stream.record import (
     stream_record,
     whole_cycle,
 )
-from cellplan.export.timed_rows import file_path, line_error, lines_of, mismatch_error, require_paths, times_of
+from cellplan.export.timed_rows import file_path, require_paths, times_of
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 

@@ -9,15 +9,8 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.export.joints import ARM, Angle, from_numbers
-from cellplan.export.timed_rows import (
-    cycle_of,
-    file_path,
-    line_error,
-    lines_of,
-    mismatch_error,
-    require_paths,
-    truncated_error,
-)
+from cellplan.export.lines import line_error, lines_of, mismatch_error, truncated_error
+from cellplan.export.timed_rows import cycle_of, file_path, require_paths
 from cellplan.export.urscript.rows import move_acceleration
 from cellplan.export.urscript.text import (
     ENDING,

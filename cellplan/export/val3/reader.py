@@ -3,14 +3,16 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.joints import from_numbers
-from cellplan.export.val3.code import Call, Loop, Node, Reset, SetOutput, StandStill, Val3Move, WaitFor, read_code
+from cellplan.export.lines import Statement
+from cellplan.export.pages import read_programs
+from cellplan.export.val3.code import Loop, Node, read_code
 from cellplan.export.val3.data import Data, read_data
 from cellplan.export.val3.names import START, STOP, input_link, output_link
 from cellplan.export.val3.xml import PARAMETER_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE, Val3Element, parse
@@ -32,29 +34,24 @@ def read_val3(
     Raises:
         InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
     """
-    programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
-    left = dict(files)
-    for (program, robot), path in paths.items():
-        player = _Val3Player(frame=frame, robot=robot, project=_project(left, path))
-        player.play_all()
-        placed = frame.robot(robot)
-        q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
-        rounding = tool_shares(placed, q, np.array(player.zones) / MM)
-        programs[program][robot] = RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
-        if len({len(rows.marks) for rows in programs[program].values()}) > 1:
-            raise InputError(f"{path}: expected as many marks as the programs of the other robots have")
-    if left:
-        raise InputError(f"{min(left)}: expected no such file in this export")
-    return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
+    return read_programs(frame, files, paths, _rows)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Val3Program:
+def _rows(frame: ExportFrame, robot: str, left: dict[str, str], path: str) -> RobotRows:
+    """Rows of one robot; takes the files of its project out of those that are left."""
+    player = _Val3Player(frame=frame, robot=robot, project=_project(left, path))
+    player.play_all()
+    placed = frame.robot(robot)
+    q = from_numbers(placed, np.array(player.rows, dtype=np.float64).reshape(-1, 6))
+    rounding = tool_shares(placed, q, np.array(player.zones) / MM)
+    return RobotRows(robot=robot, q=q, marks=tuple(player.marks), rounding=rounding)
+
+
+class _Val3Program(NamedTuple):
     """A program of a project."""
 
-    file: str
     code: Sequence[Node]  # its statements
-    end: int  # line of its ``end``
+    end: Statement  # its ``end``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,8 +135,7 @@ def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data
     code.require()
     if code.children or program.text.strip():
         raise code.error("text alone", "an element")
-    statements, end = read_code(code, counters)
-    return _Val3Program(file=file, code=statements, end=end)
+    return _Val3Program(*read_code(code, counters))
 
 
 def _local(local: Val3Element) -> str:
@@ -169,7 +165,7 @@ class _Val3Player:
     stands: bool = True  # whether the robot has come to a stop after its last motion
     is_exact: bool = True  # whether the last motion ends in its row
     step: int = 0  # number of instructions of a handshake that were met
-    lowered: int = 0  # line of ``start`` at which its output was lowered before the first motion, 0 if it was not
+    lowered: Statement | None = None  # where its output was lowered before the first motion
     steps: int = 0  # number of statements that were done
 
     def play_all(self) -> None:
@@ -180,14 +176,14 @@ class _Val3Player:
         """
         start, stop = (self.project.programs[name] for name in (START, STOP))
         for node in stop.code:
-            if not isinstance(node, Reset):
-                raise _error(stop.file, node.line, "resetMotion() alone in stop", node.text)
+            if _statement(node).kind != "RESET":
+                raise _statement(node).error("resetMotion() alone in stop")
         self._play(start, start.code, {})
         if not self.rows or not self.stands or self.step:
             missing = "at least one motion" if not self.rows else "the rest of the handshake"
-            raise _error(start.file, start.end, "waitEndMove()" if not self.stands else missing, "the end")
+            raise start.end.error("waitEndMove()" if not self.stands else missing, "the end")
         if self.lowered and not self.marks:
-            raise _error(start.file, self.lowered, "a handshake at a row, as its output is lowered", "none")
+            raise self.lowered.error("a handshake at a row, as its output is lowered", "none")
         for name in self.project.programs:
             if name not in {START, STOP, *self.calls}:
                 raise InputError(f"{self.project.path}/{name}.pgx: expected a program that start calls, got another")
@@ -198,95 +194,96 @@ class _Val3Player:
     def _play(self, program: _Val3Program, nodes: Sequence[Node], counters: Mapping[str, int]) -> None:
         """Follow statements."""
         for node in nodes:
+            statement = _statement(node)
             self.steps += 1
             if self.steps > MOST_STEPS:
-                raise _error(program.file, node.line, f"at most {MOST_STEPS} statements to be done", node.text)
-            if self.step and not isinstance(node, (SetOutput, WaitFor)):
-                raise _error(program.file, node.line, f"the rest of the handshake ({self._expected()})", node.text)
-            if isinstance(node, Val3Move):
-                self._move(program, node, counters)
-            elif isinstance(node, StandStill):
-                self._stand(program, node)
-            elif isinstance(node, Call):
-                self._call(program, node)
-            elif isinstance(node, Loop):
+                raise statement.error(f"at most {MOST_STEPS} statements to be done")
+            if self.step and statement.kind not in {"SET", "WAIT"}:
+                raise statement.error(f"the rest of the handshake ({self._expected()})")
+            if isinstance(node, Loop):
                 for value in node.values:
                     self._play(program, node.body, {**counters, node.counter: value})
-            elif isinstance(node, Reset):
-                raise _error(program.file, node.line, "resetMotion() in stop alone", node.text)
+            elif statement.kind == "MOVE":
+                self._move(program, statement, counters)
+            elif statement.kind == "STAND":
+                self._stand(statement)
+            elif statement.kind == "CALL":
+                self._call(program, statement)
+            elif statement.kind == "RESET":
+                raise statement.error("resetMotion() in stop alone")
             else:
-                self._signal(program, node)
+                self._signal(statement)
 
-    def _stand(self, program: _Val3Program, node: StandStill) -> None:
+    def _stand(self, node: Statement) -> None:
         """A wait for the end of all motions."""
         if not self.is_exact:
-            raise _error(program.file, node.line, "an exact stop before it (blend off)", node.text)
+            raise node.error("an exact stop before it (blend off)")
         self.stands = True
 
-    def _call(self, program: _Val3Program, node: Call) -> None:
+    def _call(self, program: _Val3Program, node: Statement) -> None:
         """A call of a page."""
-        if program.file != self.project.programs[START].file or node.name in {START, STOP, *self.calls}:
-            raise _error(program.file, node.line, "each page called once by start", node.text)
-        if node.name not in self.project.programs:
-            raise _error(program.file, node.line, "a program of the project", node.text)
+        name = str(node.words[0])
+        if program is not self.project.programs[START] or name in {START, STOP, *self.calls}:
+            raise node.error("each page called once by start")
+        if name not in self.project.programs:
+            raise node.error("a program of the project")
         if self.rows and not self.calls:
-            raise _error(program.file, node.line, "no call in a program with motions of its own", node.text)
-        self.calls.append(node.name)
-        page = self.project.programs[node.name]
+            raise node.error("no call in a program with motions of its own")
+        self.calls.append(name)
+        page = self.project.programs[name]
         before = len(self.rows)
         self._play(page, page.code, {})
         if len(self.rows) == before or self.step or not self.is_exact:
-            raise _error(page.file, page.end, "motions, the last of which ends in an exact stop", "the end")
+            raise page.end.error("motions, the last of which ends in an exact stop", "the end")
 
-    def _move(self, program: _Val3Program, node: Val3Move, counters: Mapping[str, int]) -> None:
+    def _move(self, program: _Val3Program, node: Statement, counters: Mapping[str, int]) -> None:
         """A motion to the next value of its data."""
-        if self.calls and program.file == self.project.programs[START].file:
-            raise _error(program.file, node.line, "no motion in a program that calls pages", node.text)
-        joints = self._value(program, node, counters, 0, "jointRx")
-        self._value(program, node, counters, 1, "tool")
-        descriptor = self._value(program, node, counters, 2, "mdesc")
-        name, index = node.names[0], _index(node, counters, 0)
+        if self.calls and program is self.project.programs[START]:
+            raise node.error("no motion in a program that calls pages")
+        joints, _, descriptor = (
+            self._value(node, counters, place, kind) for place, kind in enumerate(("jointRx", "tool", "mdesc"))
+        )
+        name, index = str(node.words[0]), _index(node, counters, 0)
         if index != self.used.get(name, 0):
-            raise _error(program.file, node.line, f"{name}[{self.used.get(name, 0)}]: all values in order", node.text)
+            raise node.error(f"{name}[{self.used.get(name, 0)}]: all values in order")
         self.used[name] = index + 1
         self.rows.append([float(joints.get(f"j{axis}", "0")) for axis in range(1, 7)])
         zone = max(float(descriptor.get(side, "0")) for side in ("leave", "reach"))
         self.is_exact = descriptor.get("blend", "off") == "off"
         if not self.is_exact and (descriptor["blend"] != "joint" or not zone > 0.0):
-            raise _error(program.file, node.line, "a blend of joints with leave or reach, or off", node.text)
+            raise node.error("a blend of joints with leave or reach, or off")
         self.zones.append(0.0 if self.is_exact else zone)
         self.stands = False
 
-    def _value(
-        self, program: _Val3Program, node: Val3Move, counters: Mapping[str, int], place: int, kind: str
-    ) -> Mapping[str, str]:
+    def _value(self, node: Statement, counters: Mapping[str, int], place: int, kind: str) -> Mapping[str, str]:
         """The value that an argument of a motion names."""
-        name, index = node.names[place], _index(node, counters, place)
+        name, index = str(node.words[2 * place]), _index(node, counters, place)
         data = self.project.data.get(name)
         if data is None or data.kind != kind:
-            raise _error(program.file, node.line, f"data of the type {kind}", name)
+            raise node.error(f"data of the type {kind}", name)
         if index is None or not 0 <= index < data.size:
-            raise _error(program.file, node.line, f"an index of {name} from 0 to {data.size - 1}", node.text)
+            raise node.error(f"an index of {name} from 0 to {data.size - 1}")
         return data.values[index]
 
-    def _signal(self, program: _Val3Program, node: SetOutput | WaitFor) -> None:
+    def _signal(self, node: Statement) -> None:
         """An instruction of a handshake."""
         expected, row = handshake_steps(self.frame, self.robot), len(self.rows) - 1
         is_first = bool(expected) and not self.lowered and row < 0 and not self.calls
         if not is_first and (not expected or row < 0 or not self.stands or row in self.marks):
-            raise _error(program.file, node.line, "signals only once after waitEndMove() at a mark", node.text)
-        data = self.project.data.get(node.name)
+            raise node.error("signals only once after waitEndMove() at a mark")
+        name, is_on = str(node.words[0]), node.words[1] == "true"
+        data = self.project.data.get(name)
         if data is None or data.kind != "dio":
-            raise _error(program.file, node.line, "data of the type dio", node.name)
+            raise node.error("data of the type dio", name)
         if not is_first and not self.lowered:
             first = lowering_step(self.frame, self.robot).signal
-            raise _error(program.file, node.line, f"{first}=false before the first motion", node.text)
+            raise node.error(f"{first}=false before the first motion")
         step = lowering_step(self.frame, self.robot) if is_first else expected[self.step]
         link = input_link(step.signal) if step.waits else output_link(step.signal)
-        if (isinstance(node, WaitFor), node.is_on, data.values[0].get("link")) != (step.waits, step.is_on, link):
-            raise _error(program.file, node.line, f"the handshake of the cell ({_shown(step)})", node.text)
+        if (node.kind == "WAIT", is_on, data.values[0].get("link")) != (step.waits, step.is_on, link):
+            raise node.error(f"the handshake of the cell ({_shown(step)})")
         if is_first:
-            self.lowered = node.line
+            self.lowered = node
             return
         self.step = (self.step + 1) % len(expected)
         if self.step == 0:
@@ -303,12 +300,12 @@ def _shown(step: HandshakeStep) -> str:
     return f"wait for {step.signal}=={state}" if step.waits else f"{step.signal}={state}"
 
 
-def _index(node: Val3Move, counters: Mapping[str, int], place: int) -> int | None:
-    """Value of the index of an argument; None for a name that no loop counts."""
-    index = node.indices[place]
-    return index if isinstance(index, int) else counters.get(index)
+def _statement(node: Node) -> Statement:
+    """A statement, or that with which a loop begins."""
+    return node.head if isinstance(node, Loop) else node
 
 
-def _error(file: str, line: int, expected: str, got: str) -> InputError:
-    """One located line."""
-    return InputError(f"{file}:{line}: expected {expected}, got {got[:60]!r}")
+def _index(node: Statement, counters: Mapping[str, int], place: int) -> int | None:
+    """Value of the index of an argument, 0 without one; None for a name that no loop counts."""
+    index = node.words[2 * place + 1] or "0"
+    return int(index) if index.isdecimal() else counters.get(index)
