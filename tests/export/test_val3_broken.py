@@ -341,26 +341,17 @@ def test_loops_that_do_not_fit_the_rows_are_refused(loop: str, begin: str) -> No
     assert said.startswith(f"alpha/start.pgx:{line_of(broken, begin)}: expected ")
 
 
-def test_a_loop_without_its_end_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("before", "got"), [("  movej(jRow[9]", "waitEndMove()"), ("\nend]]", "for n=1 to 2")], ids=["between", "last"]
+)
+def test_a_loop_without_its_end_is_refused(before: str, got: str) -> None:
     job, files = written("marks")
     local = '<Locals><Local name="n" type="num" xsi:type="array" size="1"/></Locals>\n    <Code>'
-    text = (
-        files["alpha/start.pgx"].replace("<Code>", local).replace("  movej(jRow[9]", "  for n=1 to 2\n  movej(jRow[9]")
-    )
+    text = files["alpha/start.pgx"].replace("<Code>", local).replace(before, f"\n  for n=1 to 2\n{before}")
 
     said = message(job, {**files, "alpha/start.pgx": text})
 
-    assert re.fullmatch(r"alpha/start.pgx:\d+: expected endFor, got 'waitEndMove\(\)'", said)
-
-
-def test_a_loop_before_the_end_of_a_program_is_refused() -> None:
-    job, files = written("marks")
-    local = '<Locals><Local name="n" type="num" xsi:type="array" size="1"/></Locals>\n    <Code>'
-    text = files["alpha/start.pgx"].replace("<Code>", local).replace("\nend]]", "\n  for n=1 to 2\nend]]")
-
-    said = message(job, {**files, "alpha/start.pgx": text})
-
-    assert re.fullmatch(r"alpha/start.pgx:\d+: expected endFor, got 'for n=1 to 2'", said)
+    assert re.fullmatch(rf"alpha/start.pgx:\d+: expected endFor, got {re.escape(repr(got))}", said)
 
 
 def test_robots_that_do_not_meet_equally_often_are_refused() -> None:
