@@ -43,7 +43,6 @@ def certify(
             that does not keep its demand, and only ``Bound.is_kept`` of the result is valid.
         with_curves: Whether the bounds of each class are then raised in every block, to be drawn; the verdict and the
             smallest distances are known before.
-        progress: Called with the fraction done.
     """
     if demand is not None:
         pairs = (replace(pair, demand=demand) if pair.rule is Rule.CLEARANCE else pair for pair in scene.pairs)

@@ -25,8 +25,6 @@ class CurveRefiner:
         """Store the stretch.
 
         Args:
-            engine: The bodies.
-            motion: How they move.
             edges: Samples at which the blocks begin and end, from 0 to the last, shape (K + 1,).
         """
         self._engine, self._motion, self._edges = engine, motion, edges

@@ -88,7 +88,6 @@ def certify_regions(
             many for each. Two rows at least.
         with_minimum: Whether the smallest distance of each region is searched for too, to half a millimetre. Otherwise
             the search of a region ends with the first pair that does not keep its demand.
-        progress: Called with the fraction done.
 
     Raises:
         ValueError: A region names one robot twice, or rows that are not there.

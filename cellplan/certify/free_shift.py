@@ -53,10 +53,7 @@ def free_shift(motion: FreeMotion, times: Array, first: str, second: str, *, mos
     """The largest shift that is proved to keep what is demanded of all pairs of bodies of two robots.
 
     Args:
-        motion: Their programs, of the same rows.
         times: Times of these in [s], shape (N,).
-        first: The one robot.
-        second: The other one.
         most: Largest shift in [s] that is searched.
     """
     return _ShiftSearch(motion, times, first, second, most).run()
@@ -209,7 +206,6 @@ def _shift_within(motion: FreeMotion, times: Array, bodies: Indices, most: tuple
     """Largest shift in [s] within which one of two bodies makes no way longer than it may, anywhere.
 
     Args:
-        motion: The programs.
         times: Times of their rows in [s], shape (N,).
         bodies: The two bodies of the engine, shape (2,).
         most: Largest way in [m], and largest shift in [s].

@@ -46,7 +46,6 @@ class Search(ABC):
 
         Args:
             low: Lower bounds by the cheapest means in [m], shape (n - 1,).
-            state: State of the search of the pair.
             begin: Time of the first sample.
             width: Length of a step, in samples of the program.
         """
@@ -165,9 +164,6 @@ class SolidSearch(Search):
         """Start from the bounding spheres.
 
         Args:
-            engine: The bodies.
-            pair: Which two.
-            motion: How they move.
             state: State of the search of the pair; a new one when None.
             begin: Time of the first sample.
             width: Length of a step, in samples of the program.
@@ -309,8 +305,6 @@ class GroundSearch(Search):
 
         Args:
             pair: The solid and the half-space.
-            motion: How the solid moves.
-            state: State of the search of the pair.
             begin: Time of the first sample.
             width: Length of a step, in samples of the program.
         """

@@ -21,7 +21,6 @@ def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
 
     Args:
         scene: The scene of the cell, in which all tools are at work.
-        tasks: Names of the tasks that are worked on.
     """
     idle = idle_robots(scene.cell, tasks)
     pairs = list(scene.pairs)

@@ -30,9 +30,6 @@ class StretchSearch:
 
         Args:
             survey: All pairs; receives what is found.
-            motion: The motion over the stretch.
-            first: The first block.
-            last: The first block after the stretch.
         """
         self._survey, self._motion, self._first, self._last = survey, motion, first, last
         self._scene = survey.scene

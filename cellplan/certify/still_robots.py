@@ -36,12 +36,7 @@ class HomeTrials:
     """
 
     def __init__(self, robot: str, runs: Sequence[RunSamples]) -> None:
-        """Place everything else.
-
-        Args:
-            robot: Name of the robot that is to stand somewhere.
-            runs: Samples of the runs in which it is idle.
-        """
+        """Place everything else."""
         self.refused: Counter[tuple[str, str]] = Counter()
         self._tables = [_Table(robot, run) for run in runs]
 

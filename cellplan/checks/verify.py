@@ -136,11 +136,7 @@ def with_clearance(
     """The report of ``verify_motion``, completed by the clearance of all bodies and the depth of mounted ones.
 
     Args:
-        report: The report on the motion.
-        scene: The scene that it was made with.
-        schedule: Likewise.
         is_reported: See ``with_clocks``.
-        progress: Called with the stage and the fraction done.
     """
     q = stacked_positions(scene.cell, report.q)
     completed_report = completed(report, run_clearance(scene, schedule, q, progress=progress))
@@ -153,12 +149,8 @@ def with_clocks(
     """The report with what only a cell with controllers has: the allowed skew of their clocks, and stops of a robot.
 
     Args:
-        report: The report with its clearance.
-        scene: The scene that it was made with.
-        schedule: Likewise.
         is_reported: Whether figures that no check judges are worked out too: not in a search, of which no report is
             written. Stops count there only if the cell demands something of them.
-        progress: Called with the stage and the fraction done.
     """
     if is_reported and has_clocks(scene.cell):
         report = replace(report, skew=allowed_skew(scene, schedule, report.q, report.depths, progress=progress))
@@ -174,10 +166,8 @@ def run_clearance(
     """Clearance of all bodies of a run, with the checks of it and of the depth of mounted ones.
 
     Args:
-        schedule: The tasks and the clock.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         with_curves: Whether the distances over time are worked out sharply enough to be drawn.
-        progress: Called with the stage and the fraction done.
     """
     clearance, checks = check_clearance(scene, schedule, q, with_curves=with_curves, progress=progress)
     return clearance, (*check_mounting(scene, q, schedule.times), *checks)

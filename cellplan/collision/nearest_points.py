@@ -53,9 +53,7 @@ def point_above(engine: Engine, solid: int, poses: BodyPoses, *, X_WS: Array, sa
     """Lowest point of a solid above a half-space, and the point of its plane right below.
 
     Args:
-        engine: The bodies.
         solid: Index of the solid.
-        poses: Where the bodies are.
         X_WS: Pose of the half-space; everything below its xy plane is solid.
     """
     up = X_WS[:3, 2]

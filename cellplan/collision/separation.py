@@ -19,8 +19,6 @@ def separation(
     """Distance in [m] that a direction proves between two convex solids; negative when it proves nothing.
 
     Args:
-        first: Convex solid.
-        second: Convex solid.
         n: Direction from the first to the second in the world, shape (3,), of any length.
         X_first: Rotation and position of the first in the world.
         X_second: Rotation and position of the second in the world.

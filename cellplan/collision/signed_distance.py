@@ -34,7 +34,6 @@ class SignedDistances:
 
         Args:
             ends: Two of them for each query, shape (M, 2).
-            poses: Where they are.
             samples: The sample of each query, shape (M,).
             within: The distance.
 

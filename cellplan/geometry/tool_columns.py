@@ -122,7 +122,6 @@ def depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     """Depth of the deepest column in [m] for each pose of a tool, shape (N,); 0 where the tool is free.
 
     Args:
-        columns: The tool.
         shape: The part.
         X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
     """

@@ -26,7 +26,6 @@ def draw_errors(cell: Cell, errors: CellErrors, trial: int) -> Draw:
     the grasps), whatever the order of the file, and each trial has a stream of its own.
 
     Args:
-        errors: What is stated.
         trial: Number of the trial, from 0.
     """
     rng = np.random.default_rng([errors.seed, trial, CELL_STREAM])

@@ -136,9 +136,7 @@ def screen_layouts(
     candidates keep what was chosen for the positioner.
 
     Args:
-        cell: The cell: its robots, part, weights and limits.
         schedule: Its tasks on the common clock.
-        candidates: What differs.
         moving: Names of the robots that may move.
         accuracy: Largest tool error that is let pass, in [m] and [rad].
 

@@ -27,7 +27,6 @@ def plan_motion(task: MotionTask, *, progress: Progress = silent) -> Motion:
 
     Args:
         task: The tasks, the robots that move and their start; the cell's solver names the integrator.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         DivergedError: A tool lost its path.

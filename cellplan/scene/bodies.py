@@ -77,7 +77,6 @@ def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q:
     """Poses of all bodies in the world.
 
     Args:
-        chains: The chain of each robot.
         q: Joint positions in [rad] or [m] by robot, shape (N, n) each.
     """
     return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})

@@ -29,7 +29,6 @@ class BodyTable:
         """The arrays of some bodies.
 
         Args:
-            forest: Where links are.
             carriers: The body of the scene that each body is, or is cut from.
         """
         return cls(
@@ -82,7 +81,6 @@ def placed_points(poses: BodyPoses, bodies: Indices, samples: Indices, points: A
     """Points of some bodies in the world.
 
     Args:
-        poses: Where the bodies are.
         bodies: Which bodies, shape (M,).
         samples: At which samples, shape (M,).
         points: In their own frames in [m], shape (M, 3).

@@ -45,7 +45,6 @@ class CollisionPairs:
         Args:
             bodies: All solids, half-spaces last.
             engine: The bodies that are no half-spaces.
-            chains: Kinematic chain of each robot.
 
         Raises:
             InputError: An exclusion names something that is no body; the mounting of a body cannot be meant.

@@ -42,9 +42,6 @@ def left_out(
     Bodies that never move and keep the demanded clearance are not listed: nothing was excused there.
 
     Args:
-        bodies: All solids.
-        pairs: Pairs that are watched.
-        excluded: Pairs that are not.
         engine: The solids first, in the order of the bodies.
     """
     standing = _Standing(cell, bodies, engine)

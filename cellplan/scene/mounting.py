@@ -128,10 +128,6 @@ def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) 
 def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]) -> None:
     """Refuse a cell in which what the user mounted touches links of its own robot in every configuration.
 
-    Args:
-        bodies: All solids.
-        faults: Each such body and the links that it touches.
-
     Raises:
         InputError: There is such a body.
     """

@@ -60,7 +60,6 @@ class NearTable:
         """All pairs nearer than a distance in [m].
 
         Args:
-            engine: The bodies.
             D: Displacements of the links, shape (links, K, 4, 4).
             within: The distance.
         """
@@ -92,7 +91,6 @@ class NearTable:
         It is the same at both points, as the normal goes through both.
 
         Args:
-            nearby: The pairs.
             screws: Of all axes, shape (axes, K, 6).
         """
         links, forces, count = self.links_of(nearby), wrenches(nearby), screws.shape[1]

@@ -39,11 +39,8 @@ def check_clearance(
     whose tasks are not scheduled are idle and keep away from everything, the part too.
 
     Args:
-        scene: The cell made computable.
-        schedule: The tasks and the clock.
         q: Stacked joint positions in [rad] or [m], shape (N, nq).
         with_curves: Whether the distances over time are worked out sharply enough to be drawn; see ``certify``.
-        progress: Called with the stage and the fraction done.
 
     Returns:
         The distances, never above the truth and within 0.1 mm of it unless they are said not to be exact, and a verdict

@@ -24,7 +24,6 @@ def find_contacts(bound: Bound, times: Array) -> tuple[Contact, ...]:
     """All contacts: forbidden ones first, then those of tools at work.
 
     Args:
-        bound: What is proved of all pairs.
         times: Times of the samples in [s], shape (N,).
     """
     touching: dict[tuple[tuple[str, str], str], list[PairBound]] = {}
@@ -61,7 +60,6 @@ def clearance_check(bound: Bound, times: Array, kind: ClearanceClass, minimum: C
     Where the accuracy of bodies is added to the demand, that is not always the pair that comes nearest.
 
     Args:
-        bound: What is proved of all pairs.
         times: Times of the samples in [s], shape (N,).
         minimum: Its smallest distance; zero where a pair touches.
     """

@@ -17,7 +17,6 @@ def check_idle(cell: Cell, idle: Sequence[str], times: Array, q: Mapping[str, Ar
 
     Args:
         cell: The cell; a robot without a home is held against its first row.
-        idle: Names of the idle robots.
         times: Times of the rows in [s], shape (N,).
         q: Positions in [rad] or [m] by robot, shape (N, n).
     """

@@ -41,11 +41,8 @@ def allowed_skew(
     """How far the clocks of a run may be apart.
 
     Args:
-        scene: The scene of the run.
-        schedule: The tasks that are worked on, and the clock.
         q: Positions of each robot in [rad] or [m], shape (N, n).
         depths: Largest depth of each tool on one clock, see ``tool_depths``.
-        progress: Called with the stage and the fraction done.
     """
     cell, times = scene.cell, schedule.times
     tools = tuple(_tools(scene, schedule, q, depths))

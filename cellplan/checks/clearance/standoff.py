@@ -32,8 +32,6 @@ def standoffs(
     """Distances of the tip of every task on the part, from where errors are judged on its path to the end of it.
 
     Args:
-        schedule: The tasks that are worked on, and the clock.
-        chains: Kinematics of each robot.
         q: Positions of each robot in [rad] or [m], shape (N, n).
     """
     standoffs = []

@@ -56,9 +56,7 @@ def stop_report(
     The others are followed to the end of the rows.
 
     Args:
-        schedule: The tasks that are worked on, and the clock.
         q: Positions of each robot in [rad] or [m], shape (N, n).
-        progress: Called with the stage and the fraction done.
     """
     going = running_on(scene.cell)
     if not going or len(schedule.times) < 2:

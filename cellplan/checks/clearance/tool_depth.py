@@ -39,8 +39,6 @@ def tool_depths(
     round the deepest of these; a program that is too long for that is cut into even steps of motion.
 
     Args:
-        schedule: The tasks that are worked on, and the clock.
-        chains: Kinematics of each robot.
         q: Positions of each robot, shape (N, n).
     """
     return tuple(

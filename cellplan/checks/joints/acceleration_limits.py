@@ -36,8 +36,6 @@ def motion_accelerations(
     """Accelerations, jerk and process speeds of the written tables.
 
     Args:
-        chains: Kinematics by robot.
-        schedule: The clock, and the tasks that are worked on.
         q: Positions that were read back in [rad] or [m], shape (N, n), by robot.
         X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
     """

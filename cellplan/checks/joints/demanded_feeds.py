@@ -29,8 +29,6 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
     larger. The delays of a retimed program must not be longer by more than that share, and a step.
 
     Args:
-        scene: The cell made computable.
-        schedule: The clock and the tasks.
         q: Positions by robot in [rad] or [m], shape (N, n) each.
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """

@@ -24,7 +24,6 @@ def repeatability(cell: Cell, schedule: Schedule, q: Mapping[str, Array]) -> Rep
     tool still settles are left out. Between two samples a joint moves linearly.
 
     Args:
-        schedule: The tasks that were worked on.
         q: Positions read back in [rad] or [m], shape (N, n), by robot.
 
     Returns:

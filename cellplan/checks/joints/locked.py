@@ -37,10 +37,7 @@ def with_locked_joints(
     """Failed checks on the accuracy of one task, with the joints that had failed when its tool left the path.
 
     Args:
-        checks: The checks of the task.
-        tolerance: What it allows.
         times: Times in [s], shape (N,).
-        locked: Joints that fail.
     """
     outside = np.linalg.norm(errors.position_error, axis=1) > tolerance.position_mm.si
     outside |= np.linalg.norm(errors.orientation_error, axis=1) > tolerance.orientation_deg.si

@@ -51,7 +51,6 @@ def load_uses(
     tool's inertia about its own centre is not known and not counted.
 
     Args:
-        chains: The chain of each robot.
         times: Times of the rows in [s], shape (N,).
         q: Joint positions by robot in [rad] or [m], shape (N, n) each.
     """
@@ -137,9 +136,7 @@ def _axis_use(joint: Joint, D: Array, carried: Sequence[_CarriedLoad], times: Ar
     r"""What the load does to one axis: moments ``s . ((p - s0) x f)`` with ``f = m (a - g)``, and its inertia.
 
     Args:
-        joint: The axis.
         D: Displacements of the link that carries it, shape (N, 4, 4).
-        carried: The masses.
         times: Times in [s], shape (N,).
     """
     s = D[:, :3, :3] @ joint.axis_B

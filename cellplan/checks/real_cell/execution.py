@@ -29,7 +29,6 @@ class RealCell:
         """Tool tips of some robots on the part, or in the world where a robot's task is given there.
 
         Args:
-            robots: Their names.
             q: Stacked joint positions in [rad] or [m], shape (N, nq).
 
         Returns:

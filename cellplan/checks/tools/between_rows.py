@@ -70,8 +70,6 @@ class ErrorsBetweenRows:
         """Store the program.
 
         Args:
-            scene: The cell made computable.
-            schedule: The desired poses at the rows and between them.
             q: Positions by robot in [rad] or [m], shape (N, n) each.
         """
         self._scene, self._schedule, self._q = scene, schedule, q
@@ -89,8 +87,6 @@ class ErrorsBetweenRows:
         """Largest errors between the rows of every task and of every closure.
 
         Args:
-            accuracy: Errors of the tasks at the rows.
-            closures: Errors of the closures at the rows.
             off: By how much each tool may be off besides at the rows, in [m] and [rad], shape (N, 2) each. As it is no
                 more between two rows than the value between both, it keeps the bound as it is: a chord of errors and
                 an even length are no longer together than at an end.
@@ -263,7 +259,6 @@ class ErrorsBetweenRows:
         Errors grow with the square of the step; near a corner they are taken to grow with the step itself.
 
         Args:
-            measured: The tool.
             kind: 0 for its position, 1 for its orientation.
             errors: Errors between the rows, shape (M,).
             rows: Larger error of both rows of the step of each, shape (M,).

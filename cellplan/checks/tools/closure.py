@@ -25,7 +25,6 @@ def closure_accuracy(
     still are checked as well.
 
     Args:
-        chains: Kinematics of each robot.
         q: Positions of each robot, shape (N, n).
         X_WP: The part as the first holder carries it, shape (N, 4, 4) or (1, 4, 4).
     """

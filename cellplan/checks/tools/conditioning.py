@@ -36,8 +36,6 @@ def conditioning(
     Joints that stand still are left out. The units are mixed: metres and radians, without weights.
 
     Args:
-        schedule: The tasks that were worked on.
-        chains: Kinematics of each robot.
         q: Positions of each robot, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
         moving: Names of the robots that may move.

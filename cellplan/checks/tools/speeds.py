@@ -19,7 +19,6 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
     """Largest speeds of one robot's tool tip and joint axes; between two samples a point moves along the chord.
 
     Args:
-        chain: Its kinematics.
         times: Times in [s], shape (N,).
         q: Positions, shape (N, n).
     """
@@ -64,7 +63,6 @@ def process_speeds(schedule: Schedule, X_WT: Mapping[str, Array], X_WP: Array) -
     """Speed of every tool that moves along its path, by task.
 
     Args:
-        schedule: The clock and the tasks.
         X_WT: Tool poses in the world, shape (N, 4, 4), by robot.
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """

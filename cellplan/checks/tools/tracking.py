@@ -26,8 +26,6 @@ def task_accuracy(scheduled: TaskSchedule, chain: ScrewChain, *, q: Array, X_WP:
     """Errors of one task in P, or in W for a task in the world; components that the task leaves open are zero.
 
     Args:
-        scheduled: Reference tool poses.
-        chain: The operator.
         q: The operator's positions, shape (N, n).
         X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
     """
@@ -106,11 +104,9 @@ def worst_error(name: str, times: Array, error: Array, *, subject: str, limit: f
     """The worst instant of one error against its limit.
 
     Args:
-        name: What is checked.
         times: Times in [s] at which it is judged, shape (N,).
         error: Lengths of the error in the unit of the limit, shape (N,).
         subject: Task or robot that is judged.
-        limit: What is allowed.
         words: Unit, and whose error it is.
     """
     worst = int(np.argmax(error))

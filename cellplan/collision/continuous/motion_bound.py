@@ -111,7 +111,6 @@ class PairMotion:
 
         Args:
             reading: What is known at ``sample``.
-            sample: Where it was read.
             first: First sample of the steps, at most ``sample``.
             last: Last sample of the steps, at least ``sample``.
             low: Bounds of all steps in [m], shape (n - 1,).

@@ -91,9 +91,7 @@ def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goa
     are less work.
 
     Args:
-        engine: The bodies.
         pair: The piece and the other body, or the other way round.
-        poses: Where they are.
         goal: Distance in [m] that is to be proved.
     """
     reading = quick_reading(engine, pair, poses, sample=sample)

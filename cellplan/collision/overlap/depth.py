@@ -62,8 +62,6 @@ def ground_depth(body: CollisionBody, poses: BodyPoses, index: int, *, X_WS: Arr
     """How deep a solid reaches below the surface of a half-space at each sample in [m], shape (N,); exact.
 
     Args:
-        body: The solid.
-        poses: Where the bodies are.
         index: Which of them the solid is.
         X_WS: Pose of the half-space.
     """

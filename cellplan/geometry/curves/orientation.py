@@ -25,7 +25,6 @@ class Orientation(Protocol):
 
         Args:
             u: Parameters, shape (N,).
-            interval: Stretch of the parameter, see `cellplan.geometry.curves.curve.Curve`.
             p: Tool tip at these parameters in [m], shape (N, 3).
             dp: Its derivative by the parameter, shape (N, 3).
 

@@ -65,7 +65,6 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     unit of a COLLADA file is honoured, its up axis is not, as in the programs that URDFs are made for.
 
     Args:
-        path: The file; its suffix gives the format.
         scale: Metres per unit of the file, for COLLADA a factor after its own unit; one number or one for each axis;
             negative ones mirror.
 
@@ -82,7 +81,6 @@ def read_drawing(path: Path, *, unit: str | None) -> Mesh:
     """Read a mesh file that stands alone, with z up: as `read_mesh`, but a COLLADA file's up axis is turned to z.
 
     Args:
-        path: The file; its suffix gives the format.
         unit: A key of `MESH_UNITS`. A COLLADA file states its unit, so that it may be None, and must not differ.
 
     Raises:

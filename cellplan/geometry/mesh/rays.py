@@ -155,7 +155,6 @@ def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
     """All crossings of endless lines with a mesh, in the order of the lines and along each of them.
 
     Args:
-        mesh: The surface.
         points: A point of each line in [m], shape (N, 3), in the frame of the mesh.
         directions: Unit directions, shape (N, 3).
     """

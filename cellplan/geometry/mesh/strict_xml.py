@@ -8,10 +8,6 @@ from cellplan.errors import InputError
 def parse_strictly(parser: expat.XMLParserType, data: bytes, file: str) -> None:
     """Run a parser, whose handlers for elements and text are set, over the bytes of a file.
 
-    Args:
-        data: The bytes.
-        file: Name of the file in messages.
-
     Raises:
         InputError: The bytes are not well-formed, of an unknown encoding, or declare a document type or an entity.
     """

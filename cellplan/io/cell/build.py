@@ -205,7 +205,6 @@ def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict
     """The file as plain values in its own units, with every default that follows from other entries filled in.
 
     Args:
-        document: The file.
         timed: Names of the tasks whose path brings its own clock.
     """
     values = document.model_dump(exclude_none=True) | _written_program(document)

@@ -16,8 +16,6 @@ def changed_text(text: str, values: Mapping[str, Any], *, head: str) -> str:
     Where the text cannot be edited in place, all values are written anew, without its comments.
 
     Args:
-        text: The file as it was read.
-        values: All its values after the change.
         head: Lines of comment above it, without ``#``.
     """
     top = "".join(f"# {line}\n" for line in head.splitlines())

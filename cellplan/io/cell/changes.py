@@ -55,7 +55,6 @@ def changed(document: YamlDocument, values: Mapping[str, object]) -> YamlDocumen
     """The document with other values; see ``Cell.with_values``.
 
     Args:
-        document: The file.
         values: Values by address; None leaves a key out.
 
     Raises:

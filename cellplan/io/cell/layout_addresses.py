@@ -57,7 +57,6 @@ def read_address(text: str, valid: ValidEntries, models: Mapping[str, RobotModel
 
     Args:
         text: The address as written, with or without ``robots.``.
-        valid: The entries of the file.
 
     Raises:
         AddressError: It names nothing that a layout may change.

@@ -48,10 +48,7 @@ def read_ranges(address: Address, value: Any, path: KeyPath, context: Context) -
     """Ranges that a value under ``layout.vary`` gives, and what is wrong with it.
 
     Args:
-        address: What it is about.
         value: True, a range, a list of ranges by joint, or a mapping of ranges.
-        path: Where it stands.
-        context: The cell.
     """
     finding = context.document.finding
     if address.index is not None or address.what in {"spin_deg", "weights"}:

@@ -18,10 +18,7 @@ class Ties:
         """Keep what is read, and against what.
 
         Args:
-            entry: The layout as written.
             ranges: Its ranges by address; those of numbers that stay are taken out.
-            context: The cell.
-            findings: What is wrong so far.
         """
         self._entry, self._ranges, self._context, self._findings = entry, ranges, context, findings
         self._tied = set[str]()

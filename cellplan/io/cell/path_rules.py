@@ -32,9 +32,7 @@ def path_findings(valid: ValidEntries, models: Mapping[str, RobotModel], documen
     """Everything about given joint paths that contradicts robots, part, motion and solver.
 
     Args:
-        valid: Valid entries of the file.
         models: Robots whose model is known, by name.
-        document: The file.
     """
     for name, robot in valid.robots.items():
         if robot.path is None:

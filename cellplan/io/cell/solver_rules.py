@@ -50,9 +50,7 @@ def solver_findings(valid: ValidEntries, models: Mapping[str, RobotModel], docum
     """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks.
 
     Args:
-        valid: Valid entries of the file.
         models: Robots whose model is known, by name.
-        document: The file.
     """
     solver, motion = valid.solver, valid.motion
     for index, lock in enumerate(motion.locked_joints if motion else ()):

@@ -72,7 +72,6 @@ def read_toolpath_csv(
     path a trajectory.
 
     Args:
-        path: The file.
         is_smooth: Whether a smooth curve joins the points instead of straight sides; a trajectory is smooth.
         is_closed: Whether the last point is joined to the first; a closed trajectory repeats its start at its end.
         source: Name of the file for messages; by default its last part.

@@ -14,11 +14,6 @@ CHUNK: Final = 1 << 20  # [bytes] read at a time when only the digest is desired
 def read_regular_file(path: Path, *, file: str, limit: int) -> bytes:
     """Content of a regular file; a pipe, a device or a folder is refused without waiting for it.
 
-    Args:
-        path: Where the file is.
-        file: Its name in messages.
-        limit: Largest size in bytes.
-
     Raises:
         InputError: When it is missing, unreadable, not a regular file or too large.
     """

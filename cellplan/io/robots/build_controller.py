@@ -27,7 +27,6 @@ def with_zero_of_file(model: RobotModel, path: Path, *, file: str) -> tuple[Robo
     Args:
         model: A robot whose own file does not state it.
         path: The file: the keys of ``controller`` in a joint-axis table.
-        file: Its name in messages.
 
     Raises:
         InputError: All findings about the file at once.
@@ -74,9 +73,7 @@ def controller_findings(
     """Joints that exist, in their own unit, and couplings to earlier joints of the same kind.
 
     Args:
-        path: Where the entry stands.
         turns: Whether a joint is revolute, by name, from the base to the flange.
-        document: The file.
     """
     if entry is None:
         return
@@ -107,10 +104,7 @@ def sense_findings(
     would count twice instead of not at all.
 
     Args:
-        path: Where the entry stands.
-        entry: The entry.
         axes: Directions of the joint axes at the reference configuration, shape (3,) each, by name, from the base on.
-        document: The file.
     """
     for other, joint in pairwise(axes if entry is not None else ()):
         factor = None if entry is None else entry.coupling.get(joint, {}).get(other)

@@ -13,9 +13,7 @@ def payload_findings(
     """Limits of axes belong to the last turning joints before the flange.
 
     Args:
-        path: Where the entry stands.
         turning: Names of the turning joints, from the base to the flange.
-        document: The file.
     """
     last = turning[-3:]
     for joint in entry.axes if entry is not None else ():

@@ -51,8 +51,6 @@ def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> Robot
     """Read a joint-axis table and its meshes.
 
     Args:
-        path: The table.
-        file: Its name in messages.
         folders: Where its meshes may lie.
 
     Raises:

@@ -45,7 +45,6 @@ def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: boo
     """Limits of a cell that are wider than those of the model or leave no range, by key of the cell file.
 
     Args:
-        limits: Limits of the model.
         is_revolute: Whether the joint turns; decides the unit of keys and texts.
     """
     unit = joint_unit(is_revolute=is_revolute)

@@ -42,8 +42,6 @@ def render_clock(table: ClockTable, *, cell: str, program: str) -> str:
     """The clock of a program as text.
 
     Args:
-        table: What happens at each row.
-        cell: Name of the cell.
         program: SHA-256 of the rows of the joint tables that it belongs to.
     """
     columns = [plain_decimals(table.times), plain_decimals(table.sigma), list(table.phases)]

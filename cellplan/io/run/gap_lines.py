@@ -14,7 +14,6 @@ def with_gap_lines(rows: Iterator[str], gaps: Mapping[int, str]) -> Iterator[str
     """Rows of a table with a line at each gap.
 
     Args:
-        rows: The rows as text.
         gaps: Name of what is not part of the program, by the first row after it, counted from 0.
     """
     for index, row in enumerate(rows):
@@ -27,7 +26,6 @@ def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> 
     """Rows of a table, and its gaps by the first row after each.
 
     Args:
-        lines: The lines below the column names.
         source: File name for messages.
         first_line: Line of the first of them in the file, from 1.
 
@@ -54,7 +52,6 @@ def line_of_row(row: int, gaps: Mapping[int, str], *, first_line: int) -> int:
 
     Args:
         row: The row, counted from 0.
-        gaps: The gaps of the table.
         first_line: Line of the first row in the file, from 1.
     """
     return first_line + row + sum(after <= row for after in gaps)

@@ -62,10 +62,8 @@ def render_table(
     """Write the joint table of one robot.
 
     Args:
-        robot: Whose table it is.
         times: Times of the rows in [s], shape (N,).
         q: Its joint positions in [rad] or [m], shape (N, n).
-        header: What stands above the rows.
         gaps: Name of what is not part of the program, by the first row after it.
 
     Raises:

@@ -61,7 +61,6 @@ def own_inputs(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
     """Files that a cell names, but for those that come with the program.
 
     Args:
-        inputs: Names of all files that were read.
         cell_file: Name of the cell file among them, without folders.
     """
     return tuple(name for name in inputs if name != cell_file and not name.startswith((BUNDLED, NEAR)))
@@ -73,9 +72,7 @@ def render_manifest(
     """The manifest as JSON text, the same for the same run.
 
     Args:
-        cell: The cell that was solved.
         passed: Whether every check of every run passed.
-        versions: Version by package.
         files: Size in bytes and SHA-256 of every file of the run, by its path in the run folder.
     """
     record = {

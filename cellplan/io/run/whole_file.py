@@ -29,9 +29,7 @@ def refuse_unless_own(target: Path, *, is_own: Callable[[Path], bool], kind: str
     """Refuse a place that a file must not be written to; call it early, before any long work.
 
     Args:
-        target: The file.
         is_own: Whether a file is of the kind and written by cellplan.
-        kind: What it is called in messages.
 
     Raises:
         InputError: The place holds something else, or no file can be there.
@@ -62,7 +60,6 @@ def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool],
     Args:
         target: The file; missing folders above it are made.
         is_own: Whether a file is of that kind and written by cellplan.
-        kind: What it is called in messages.
 
     Raises:
         InputError: The place holds something else, or cannot be written.

@@ -64,7 +64,6 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     walk *from the part*: their direction is opposite to the one in its joint-axis table.
 
     Args:
-        cell: The cell.
         q: Stacked joint vector in [rad] or [m], shape (nq,).
 
     Returns:

@@ -62,7 +62,6 @@ class DemandedProgram:
         Args:
             written: The clock of a run, for the number of rows of transfer moves, and the nominal times of a retimed
                 program.
-            file: File of that clock.
 
         Raises:
             InputError: With file and line, when it has other phases, or the nominal times do not rise through them.

@@ -21,7 +21,6 @@ def with_placed_starts(
 
     Args:
         cell: The cell as it is while its tasks are worked on.
-        toolpaths: Toolpath of every task, by task name.
         chains: Kinematic chain of each robot, by name.
         near: The run of which the branches are kept, where starts are missing.
 
@@ -47,7 +46,6 @@ def with_chosen_start(
     Args:
         cell: The cell; a start that it gives may fit only the configuration of the positioner that was searched for.
         start: The stacked start that was chosen in [rad] or [m], shape (nq,).
-        toolpaths: Toolpath of every task, by task name.
     """
     started = with_start(cell, start)
     pairs = list(zip(cell.robots, started.robots, strict=True))

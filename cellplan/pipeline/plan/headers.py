@@ -21,10 +21,7 @@ def table_headers(
     """Header of every table of a program whose checks passed, by robot.
 
     Args:
-        phases: The phases of the program, on its clock.
-        reports: The report of each of them.
         digests: SHA-256 by what it is the digest of.
-        remark: What else has to be known of the rows.
     """
     header = TableHeader(
         cell=cell.name,

@@ -47,8 +47,6 @@ def find_homes(
 
     Args:
         scene: The scene of the cell, every start posture filled in.
-        known: Homes that are tried first, by robot.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         HomeNotFoundError: A robot has no such place.
@@ -79,7 +77,6 @@ def with_homes(cell: Cell, homes: Mapping[str, Array], *, given: Cell) -> Cell:
 
     Args:
         cell: The cell, every start posture filled in.
-        homes: Homes that were searched for, by robot.
         given: The cell as it was written. A robot without any work whose start was left open starts at its home.
     """
     never_at_work = idle_robots(cell, [task.name for task in cell.tasks])

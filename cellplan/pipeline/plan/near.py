@@ -22,10 +22,6 @@ from cellplan.planning.sequence.part_moves import PartMove
 def read_branches(folder: Path, cell: Cell) -> Branches:
     """The branches of a run.
 
-    Args:
-        folder: The run folder.
-        cell: The cell whose robots are to keep them.
-
     Raises:
         InputError: It is no run, was changed, or has other robots, other joints or none of the tasks.
     """

@@ -20,8 +20,6 @@ def with_nominal_times(clock: ProgramClock, written: ClockText, cell: Cell, *, f
 
     Args:
         clock: The program as the time laws of the cell have it; it stays where the cell demands it as written.
-        written: The clock of the run.
-        file: File of that clock.
 
     Raises:
         InputError: With file and line, when the nominal times do not rise from the beginning of each phase to its end,

@@ -14,11 +14,7 @@ POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's a
 
 
 def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check]:
-    """Checks of those tools that would stand too deep in the part, or off it, on the desired path.
-
-    Args:
-        toolpaths: The path of each task by its name.
-    """
+    """Checks of those tools that would stand too deep in the part, or off it, on the desired path."""
     depths = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
     checks = check_depths(cell, [depth for depth in depths if depth is not None])
     tips = [

@@ -45,9 +45,7 @@ class ProgramClock:
         """Put the phases of a program one after the other.
 
         Args:
-            cell: The cell; its motion gives the step.
             plan: The plan, on no clock yet.
-            schedules: Desired tool poses of each phase of the program.
         """
         steps = [len(schedule.times) - 1 for schedule in schedules]
         first = np.cumsum([0, *(count + gap for count, gap in zip(steps, _gap_steps(plan), strict=True))]).tolist()
@@ -156,7 +154,6 @@ def moved_while_holding(phase: Phase, robot: str, q: Array) -> tuple[int, int] |
     """The first row and joint at which a robot moves that holds still in a phase; None where it does hold still.
 
     Args:
-        robot: Name of the robot.
         q: Its joint positions in the rows of the phase in [rad] or [m], shape (n, joints).
     """
     if not isinstance(phase.roles[robot], Hold):

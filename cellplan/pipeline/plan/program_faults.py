@@ -149,11 +149,6 @@ def located(stage: Stage, cell: Cell, given: Cell) -> Iterator[None]:
     Those of a straight move that grips or puts down the part stand at the place where the cell says that it lies. To
     those of later tasks it is added that the start posture of the holder was found for earlier ones.
 
-    Args:
-        stage: What is planned.
-        cell: The cell with the starts that earlier stages found.
-        given: The cell as it was written.
-
     Raises:
         NoSolutionError: Of the same kind.
     """
@@ -174,10 +169,6 @@ def located(stage: Stage, cell: Cell, given: Cell) -> Iterator[None]:
 @contextmanager
 def named_transfer(stages: Sequence[Stage], number: int) -> Iterator[None]:
     """Errors of transfer moves with their name, and the tasks between which they are.
-
-    Args:
-        stages: The stages of a program.
-        number: Place of the transfer moves among them.
 
     Raises:
         BlockedTransferError: With the name.

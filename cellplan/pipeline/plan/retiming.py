@@ -37,10 +37,7 @@ def retimed(
     """A program and the motions of its phases on the clock that the cell's timing asks for.
 
     Args:
-        scenes: The scene of each phase of the program.
-        clock: The program as its time laws have it.
-        motions: Motion of each of its phases, likewise.
-        progress: Called with the stage and the fraction done.
+        motions: Motion of each of its phases as their time laws have them.
 
     Returns:
         The same objects where the program runs as it is written.

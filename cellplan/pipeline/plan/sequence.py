@@ -72,11 +72,6 @@ class PlannedProgram:
 def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
     """Plan all stages of one cycle.
 
-    Args:
-        cell: The cell; it has a program.
-        near: The run of which the branches are kept.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: The tasks cannot be worked with, or in no order.
         NoSolutionError: No start or home was found, a tool lost its path, or a robot finds no way.

@@ -27,8 +27,6 @@ class StepErrors:
         """Take the bend of the joint path once.
 
         Args:
-            scene: The scene of the cell.
-            paths: Paths of the tasks that are worked on.
             path: The joints over the nominal time.
         """
         self._scene, self._paths, self._path = scene, tuple(paths), path

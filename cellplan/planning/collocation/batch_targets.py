@@ -23,7 +23,6 @@ def desired_motion(
 
     Args:
         paths: The paths of the tasks on the common clock.
-        grasps: Grasps of the further holders that move.
         offset: How far the tools stand beside their paths at the start; None when they stand on them.
     """
 

@@ -66,9 +66,6 @@ class BatchTasks:
         """The tasks at stacked joint vectors, shape (nq, batch), to first order.
 
         Args:
-            q: The configurations.
-            desired: Desired poses and twists of the tools.
-            placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
             weights: Joint weights, shape (nq, 1 or batch); those of the cell when None.
             damping: Square of a damping factor.

@@ -35,7 +35,6 @@ class Redundancy:
         """Make ready what each goal and each weight needs.
 
         Args:
-            motion: The tasks, the robots that move and their start.
             tasks: The same tasks for many configurations.
         """
         cell, relations = motion.cell, motion.relations
@@ -57,8 +56,6 @@ class Redundancy:
         Args:
             times: Times in [s], shape (batch,).
             q: Stacked joint vectors, shape (nq, batch).
-            desired: Desired poses and twists of the tools.
-            placement: Where the robots stand.
             mobile: 1 for joints that are not locked, shape (nq,).
             drift: Joint velocities that are added in the null space besides, shape (nq, batch); None for none.
         """

@@ -55,10 +55,6 @@ class AccurateRun:
     def __init__(self, motion: MotionTask, *, progress: Progress = silent) -> None:
         """Gather the tasks, and measure how far the tools stand beside their paths at the start.
 
-        Args:
-            motion: The tasks, the robots that move and their start.
-            progress: Called with the stage and the fraction done.
-
         Raises:
             TypeError: The desired motion is known at the samples only.
         """
@@ -94,7 +90,6 @@ class AccurateRun:
         """Motion from a configuration at ``begin``, shape (nq,), up to ``end``, or as far as collocation converges.
 
         Args:
-            q: The configuration.
             begin: First time in [s].
             end: Last time in [s].
             drift: Mean joint velocities that are added in the null space of the tasks, shape (nq,); they begin and end

@@ -32,8 +32,6 @@ def settled(
     """Start postures with the tools brought to their paths, by Newton's method.
 
     Args:
-        desired: Desired poses and twists at the start.
-        placement: Where the robots of the cells stand.
         start: Start postures near them in [rad] or [m], shape (nq, cells).
         mobile: See ``settling_joints``.
         accuracy: Tool error in [m] and [rad] up to which a tool counts as on its path.

@@ -96,10 +96,7 @@ class Collocation:
         """Take tasks, robots and joints.
 
         Args:
-            tasks: The tasks of the run.
-            desired_at: Desired motion of the tools.
             placement: Where the robots of the cells stand; one for all, or one per cell.
-            precision: How exact the motion has to be.
             mobile: 1 for joints that are not locked, 0 for those that are, shape (nq,); None for all free.
             null_space: What decides about the redundancy besides constant weights; None for nothing.
         """

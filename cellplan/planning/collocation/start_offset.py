@@ -58,7 +58,6 @@ def start_offset(
 
     Args:
         desired: Desired poses and twists of the tools at first, a batch of one.
-        placement: Where the robots stand.
         start: Stacked start posture, shape (nq,).
         until: Times in [s] from which on they have to be there, shape (tasks,).
         accuracy: Largest tool error that is let pass, in [m] and [rad].

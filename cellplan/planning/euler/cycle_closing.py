@@ -75,7 +75,6 @@ def closing_drift(
     ``N^T (q(T; N u) - q(0)) = 0`` beginning with ``T I`` for the derivative.
 
     Args:
-        problem: The tasks.
         start: Stacked configuration at the beginning of the cycle, shape (nq,).
         moved: How far the joints are from where they began after one cycle, by the mean of the drift, shape (nq,).
         duration: Time ``T`` of the cycle in [s].

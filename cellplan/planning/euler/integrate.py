@@ -24,10 +24,6 @@ def integrate_schedule(motion: MotionTask, *, progress: Progress = silent) -> Mo
 
     A cyclic motion gets a drift in the null space of the tasks that brings all joints back.
 
-    Args:
-        motion: The tasks, the robots that move and their start.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         DivergedError: A tool lost its path.
         NoSolutionError: The method found no step, or no cycle closes.

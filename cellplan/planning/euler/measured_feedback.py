@@ -37,7 +37,6 @@ def corrected_references(desired: Schedule, references: Schedule, measured: Sequ
     pass. In general the error shrinks as long as ``E`` changes less than its argument, which is so for small errors.
 
     Args:
-        desired: The desired motion of the tasks.
         references: What the model was given in the last pass.
         measured: Measured tool poses of that pass, shape (N, 4, 4) for each task.
     """
@@ -105,7 +104,6 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
 
     Args:
         motion: The tasks in the written cell: what the method knows.
-        measure: The measuring system.
 
     Raises:
         NoSolutionError: A tool lost its path, or the method found no step.

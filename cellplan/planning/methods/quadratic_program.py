@@ -58,9 +58,7 @@ def bounded_speeds(
     say in how well the program is conditioned.
 
     Args:
-        tasks: Rows, weights and secondary speeds.
         xdot: Reference twist components with error feedback, shape (m,).
-        bounds: Bounds on the joint speeds.
         mobile: Whether a joint may move, shape (nq,); the others have speed 0.
         slack_weight: ``rho``.
 

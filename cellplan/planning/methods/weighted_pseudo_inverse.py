@@ -38,7 +38,6 @@ def damped_speeds(inverse: WeightedInverse, xdot: Array, damping: float | None) 
     singularities.
 
     Args:
-        inverse: Inverse of the task rows.
         xdot: Reference twist components with error feedback, shape (m,).
         damping: Largest damping factor; None for the program's choice, 0 for none.
 

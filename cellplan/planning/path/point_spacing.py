@@ -27,7 +27,6 @@ def refuse_near_points(
     Args:
         points: Points as listed, shape (N, 3); all differ.
         path: Where they come from, for messages; None for a list in the cell file.
-        where: Place of the path in its file.
         is_closed: Whether the last point is joined to the first.
         is_smooth: Whether a smooth curve joins them.
 

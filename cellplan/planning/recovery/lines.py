@@ -50,7 +50,6 @@ class Lines:
         """Unit directions in the world that the tool of a robot may leave in, the best first, each in words.
 
         Args:
-            robot: Its name.
             others: Robots that work on what this robot holds, and stand still: it may leave along their tools.
         """
         R = self._X_WT[self._cell.index(robot)][:3, :3]
@@ -71,9 +70,7 @@ class Lines:
         """The line of a robot as far as it comes within its joint limits; None where it comes nowhere.
 
         Args:
-            robot: Its name.
             direction: Unit vector in the world, shape (3,).
-            words: The direction in words.
             longest: Length in [m] at which it ends at the latest.
         """
         for count in COUNTS:

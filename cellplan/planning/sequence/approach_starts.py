@@ -26,7 +26,6 @@ def with_approach_starts(cell: Cell, chains: Mapping[str, ScrewChain], toolpaths
     Args:
         cell: The cell as it is while the tasks are worked on; each of its robots has at most one.
         chains: Kinematic chain of each robot, by name.
-        toolpaths: Toolpath of every task, by task name.
     """
     holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
     X_WP = part_pose(cell, holder)

@@ -24,7 +24,6 @@ def near_start(scene: Scene, paths: Mapping[str, ClockedPath], last: Mapping[str
 
     Args:
         scene: The scene with the cell of a block; starts that are to be found are None.
-        paths: Paths of its tasks, by task name.
         last: Configuration in which each robot was before, in [rad] or [m], shape (n,), by robot.
 
     Returns:

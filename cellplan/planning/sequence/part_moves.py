@@ -47,9 +47,6 @@ def with_move(cell: Cell, move: PartMove, place: PartPlaceEntry, holder: str) ->
 
     Args:
         cell: The cell as it is meanwhile: with the part lying in it, or held.
-        move: What is done.
-        place: Where the part lies.
-        holder: Name of the robot.
     """
     grasp = next(grasp for grasp in cell.part.held_by if grasp.robot == holder)
     at = place.X_WP @ grasp.X_PT

@@ -42,9 +42,7 @@ def contacts_of(
     """Contacts of one robot with itself and with what does not depend on the other robots' choices, most often first.
 
     Args:
-        trials: The bodies.
         cell: The cell in the order of names.
-        tried: Its configurations, each with that of the positioner.
     """
     among = _own_pairs(trials, cell, robot)
     counts: Counter[tuple[str, str]] = Counter()

@@ -47,7 +47,6 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
 
     Args:
         cell: The cell; starts and homes that are to be found are passed over.
-        toolpaths: Toolpath of every task, by task name.
 
     Raises:
         StartOutsideLimitsError: A joint starts outside its limits.
@@ -81,9 +80,7 @@ def tool_distance(
     """How far a configuration, shape (n,), puts a tool from where it is desired, in [m] and [rad].
 
     Args:
-        chain: The robot.
         relation: The task or grasp, which says which components of the pose count.
-        q: The configuration.
         X_PT_desired: Reference tool tip, shape (4, 4), in the frame that the relation refers to.
         X_WR: That frame in the world, shape (4, 4).
     """

@@ -32,9 +32,7 @@ def home_candidates(model: RobotModel, chain: ScrewChain, start: Array, rng: np.
     configurations drawn from boxes round the start; of equal displacements this order counts.
 
     Args:
-        chain: Its kinematics.
         start: Its start in [rad] or [m], shape (n,).
-        rng: Where the drawn ones come from.
     """
     endless = np.isinf(model.lower) | np.isinf(model.upper)
     lower, upper = np.where(endless, start + np.array([[-np.pi], [np.pi]]), finite_limits(model))

@@ -66,9 +66,7 @@ def choose_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Pr
     its name: the order in which the file lists robots and tasks changes nothing.
 
     Args:
-        scene: The cell made computable.
         paths: Path of every task on the common clock, by task name.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         StartNotFoundError: No configuration reaches all tasks within limits and without collision.

@@ -33,7 +33,6 @@ def led_to(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR
     """The configuration on the same branch that puts a tool where it is desired, shape (n,); None where there is none.
 
     Args:
-        chain: The robot.
         relation: The task or grasp, which says which components of the pose count.
         q: The seed in [rad] or [m], shape (n,).
         X_PT: Desired tool tip, shape (4, 4), in the frame that the relation refers to.
@@ -76,9 +75,6 @@ def with_seeds(
 
     Args:
         cell: The cell; each of its robots has at most one task or grasp that it begins at.
-        toolpaths: Toolpath of every task, by task name.
-        run: Name of the earlier run.
-        of_run: Robots of which the start is from it.
 
     Raises:
         NoSolutionError: A branch of the earlier run does not lead to a task.

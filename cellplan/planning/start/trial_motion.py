@@ -135,7 +135,6 @@ class StartTrials:
         """What follows from a start configuration of the whole cell in the order of names, shape (nq,).
 
         Args:
-            start: The configuration.
             may_turn: Whether joints are turned by whole turns to where they have most room.
         """
         try:

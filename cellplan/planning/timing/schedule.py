@@ -49,7 +49,6 @@ def retimed_schedule(schedule: Schedule, clock: Clock) -> Schedule:
     """The same tasks on another clock: its nominal times are the times of the paths.
 
     Args:
-        schedule: The tasks and their paths.
         clock: Times of the new samples and their nominal times, which increase.
     """
     if clock.is_as_written:
@@ -82,7 +81,6 @@ def clock_times(cell: Cell, paths: Sequence[ClockedPath]) -> Array:
 
     Args:
         cell: The cell; its motion gives the step and the length of the clock.
-        paths: The paths to work on.
 
     Raises:
         InputError: A task does not fit the clock, or the clock would have more than two million samples.

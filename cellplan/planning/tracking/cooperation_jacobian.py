@@ -20,7 +20,6 @@ def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array, *, X_WR: A
     the positioner hides in the orientation of its screws.
 
     Args:
-        state: Kinematics of the cell.
         p_WT: Tool tips in the world, shape (tasks, 3), in [m].
         signs: Sign of each joint in each task, see `TaskConstraints.column_signs`, shape (tasks, nq).
         X_WR: Reference frame of each task, see `TaskConstraints.reference_frames`, shape (tasks, 4, 4); P when None.

@@ -44,7 +44,6 @@ class JointWeights:
         weights, and the load of gravity. A joint that turns round changes its weight gradually.
 
         Args:
-            state: Kinematics at the configuration.
             q: Stacked joint vector, shape (nq,).
             J: Task rows, shape (m, nq).
             xdot: Reference twist components with error feedback, shape (m,).
@@ -67,7 +66,6 @@ class JointWeights:
         """Weights at one configuration or at several, which are the first axis then; see ``at``.
 
         Args:
-            state: Kinematics there.
             q: Stacked joint vector, shape (nq,).
             heading: Joint velocities with the constant weights, shape (nq,).
         """

@@ -18,7 +18,6 @@ class ManipulabilityGradient:
         """Note who carries what.
 
         Args:
-            model: The combined model of the cell's robots.
             operators: Index of each task's robot.
             holder: Index of the robot that carries the part; None when it is fixed.
             on_part: 1 where a task's rows stand in the frame of the part, 0 where in the world, shape (tasks,); all 1

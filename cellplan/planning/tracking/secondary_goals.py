@@ -70,8 +70,6 @@ class SecondaryGoals:
         """Make ready what each goal needs.
 
         Args:
-            model: The combined model of its robots.
-            tasks: The tasks and closures, one block row each.
             start: Stacked configuration at the first time, shape (nq,).
             rests: Times in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
@@ -99,7 +97,6 @@ class SecondaryGoals:
 
         Args:
             t: Time in [s] of each configuration, shape ().
-            stance: The cell there.
             step: Length ``h`` in [s]; 0 where no step is taken.
         """
         total = np.zeros_like(stance.q)

@@ -14,8 +14,6 @@ def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSi
     metres and radians.
 
     Args:
-        problem: The tasks.
-        k: Time of the clock.
         q: Stacked configuration, shape (nq,), in [rad] or [m].
 
     Returns:

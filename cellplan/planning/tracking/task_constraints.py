@@ -57,7 +57,6 @@ class TaskConstraints:
         """The constraints of some tasks and grasps of a cell.
 
         Args:
-            tasks: The tasks and grasps, one block row each.
             moving: Names of the robots that may move: the part at rest, an operator that stands still and the single
                 pair are not special cases.
         """

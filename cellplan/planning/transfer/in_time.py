@@ -41,9 +41,7 @@ class InTime:
 
         Args:
             query: Who moves from where to where.
-            tried: Receives what is tried in vain.
             reserve: Distance in [m] beyond the demanded one while planning.
-            progress: Called with the stage and the fraction done.
         """
         self.tried, self._query, self._reserve, self._progress = tried, query, reserve, progress
 

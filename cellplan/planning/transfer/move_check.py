@@ -58,9 +58,6 @@ class MoveCheck:
         """Collect the pairs that the robot changes.
 
         Args:
-            scene: The scene of the phase.
-            robot: Name of the robot that moves.
-            others: Where everything else is.
             reserve: Distance in [m] beyond the demanded one.
         """
         self.robot, self.refused = robot, Counter[tuple[str, str]]()
@@ -137,8 +134,6 @@ class MoveCheck:
 
         Args:
             q: Configurations in [rad] or [m], shape (K, n).
-            moments: The moment of each.
-            places: Pairs that are tested.
             travel: How far their bodies have come, shape (pairs, K).
             is_clear: Where nothing need be tested, likewise.
 
@@ -159,8 +154,6 @@ class MoveCheck:
         """Whether one pair keeps what it needs at all samples; those nearest by their spheres are read first.
 
         Args:
-            place: The pair.
-            samples: Where its bodies are.
             travel: How far they have come, shape (K,).
             left: What its spheres are farther apart than needed, shape (K,); is overwritten.
             spare: Receives what is read, and zero where it is only known that enough is left, shape (K,).

@@ -61,7 +61,6 @@ def plan_transfer(
         goal: Likewise.
         retimer: The limits of all joints and the step of the rows.
         seed: Seed of what is drawn; the same one gives the same rows.
-        progress: Called with the stage and the fraction done.
 
     Raises:
         TransferNotFoundError: The start or the goal comes too close to something, or no way was found.

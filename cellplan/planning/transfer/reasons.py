@@ -63,9 +63,7 @@ def not_found(
     """The error of a query for which no way was found.
 
     Args:
-        query: What was asked for.
         tries: What was tried; the straight move of all robots first.
-        in_turn: What was tried of one robot after the other.
         in_time: What was tried of all robots at once; None where a single one moves.
     """
     words = [f"straight, {nearest_words(query.scene, tries[0].q)[0]}"]

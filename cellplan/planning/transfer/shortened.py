@@ -20,7 +20,6 @@ def shortened(check: MoveCheck, way: Array, velocity: Array, rng: np.random.Gene
         check: Which moves are free.
         way: Via points in [rad] or [m], shape (K, n).
         velocity: Top speeds, shape (n,); lengths are times at these.
-        rng: Where the places of the shortcuts come from.
     """
     way = _without_detours(check, way)
     for _ in range(SHORTCUTS):
@@ -43,7 +42,6 @@ def rounded_line(check: MoveCheck, way: Array, columns: slice, velocity: Array) 
     Args:
         check: Which moves are free.
         way: Via points in [rad] or [m], shape (K, n), K at least 2.
-        columns: Columns of the robot in the stacked joint vector.
         velocity: Top speeds, shape (n,): between via points the fastest joint goes at its own.
     """
     times = np.append(0.0, np.cumsum((np.abs(np.diff(way, axis=0)) / velocity).max(axis=1)))

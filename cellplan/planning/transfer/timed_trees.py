@@ -86,10 +86,7 @@ def connected_in_time(
     Args:
         check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each, with their ticks.
-        box: What configurations are drawn from.
         drawn: How many of them at most.
-        rng: Where they come from.
-        tick: Called with the fraction done.
 
     Returns:
         The way; or the numbers of configurations reached from the start and from the goal where none was found.
@@ -120,7 +117,6 @@ def shortened_in_time(check: MoveCheck, way: TimedWay, rng: np.random.Generator)
 
     Args:
         check: Which moves are free.
-        rng: Where the places of the shortcuts come from.
     """
     for _ in range(SHORTCUTS):
         if len(way.ticks) == 2:

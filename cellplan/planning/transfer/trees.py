@@ -80,10 +80,7 @@ def connected(
     Args:
         check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each.
-        box: What configurations are drawn from.
         drawn: How many of them at most.
-        rng: Where they come from.
-        tick: Called with the fraction done.
     """
     scale, (start, goal) = box.velocity, ends
     trees = [Tree.at(start / scale, capacity=256), Tree.at(goal / scale, capacity=256)]

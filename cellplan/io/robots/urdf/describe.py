@@ -38,9 +38,7 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
     """What a URDF says for one flange: the named one, the usual one, or the one behind the most joints.
 
     Args:
-        path: The file.
         written: Its name as the lines for a cell have it.
-        options: Flange, package folders and arguments of a xacro file.
 
     Raises:
         InputError: With file and line, for anything but missing limits and locks.

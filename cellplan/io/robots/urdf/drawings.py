@@ -22,7 +22,6 @@ def drawn_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -
     """Shapes that a link draws, with their poses in its frame, shape (4, 4); none where one cannot be read.
 
     Args:
-        shelf: Reads its meshes.
         largest: Bytes of the largest mesh file that is read.
     """
     drawn: list[tuple[Solid, Array]] = []
@@ -60,10 +59,6 @@ def small_bodies(
     """Remarks on links whose collision bodies are far smaller than what is drawn of them.
 
     Args:
-        tree: The links and joints.
-        configuration: Poses of all links.
-        bodies: Bodies of the links.
-        flange: Name of the flange link.
         shelf: Where meshes lie; what is read here is no input of the robot.
     """
     apart = MeshShelf(folder=shelf.folder, package_dirs=shelf.package_dirs, within=shelf.within)

@@ -28,7 +28,6 @@ def evaluated(text: str, symbols: dict[str, Any], local: Mapping[str, Any] | Non
     """Value of an expression.
 
     Args:
-        text: The expression.
         symbols: Values by name; the access to attributes is added.
         local: Values by name that come first; None for none.
 

@@ -44,10 +44,7 @@ def gripper_locks(tree: UrdfTree, flange: str, state: GripperState | None, locke
     """Positions in [rad] or [m] at which a gripper's joints are held, by joint name.
 
     Args:
-        tree: Links and joints.
-        flange: Name of the flange link.
         state: How far the gripper is open; None without a gripper.
-        locked: Names of joints that the cell holds by themselves.
 
     Raises:
         InputError: The joints are no gripper's, have another unit, or do not reach so far.
@@ -81,11 +78,8 @@ def require_opposed(
     """Refuse two fingers that do not move against each other, or that close as their joints leave the closed ends.
 
     Args:
-        tree: Links and joints.
         state: How far the gripper is open; None without a gripper.
         locks: Positions of its joints, by name.
-        configuration: Poses of all links.
-        bodies: Bodies of the robot.
 
     Raises:
         InputError: An opening says nothing about the distance between such fingers.

@@ -104,7 +104,6 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     movable joint must be locked. A link without collision elements is represented by its visual ones.
 
     Args:
-        path: The file.
         options: What the cell adds; None adds nothing.
 
     Raises:
@@ -160,12 +159,6 @@ def urdf_model(
     structure: UrdfStructure, bodies: tuple[Body, ...], *, limits: Mapping[str, StatedLimits], source: str
 ) -> RobotModel:
     """The robot model.
-
-    Args:
-        structure: What each joint does.
-        bodies: Bodies of its links.
-        limits: Limits of the cell by joint name.
-        source: Name of the file.
 
     Raises:
         InputError: Limits are missing or unsound.

@@ -34,7 +34,6 @@ def lock_positions(joints: Sequence[UrdfJoint], locked: Mapping[str, float]) -> 
     Those of joints at rest read back to positions within their limits.
 
     Args:
-        joints: Joints to be written.
         locked: Position in [rad] or [m] of those of them that do not rest where `rest_position` says.
     """
     return {f"{joint.name}_{unit_of(joint).name}": _number(joint, locked.get(joint.name)) for joint in joints}
@@ -46,8 +45,6 @@ def unlocked_error(
     """What to write in the cell when joints are neither locked nor lead to the flange, in one line for all of them.
 
     Args:
-        tree: The links and joints.
-        flange: Name of the flange link.
         unlocked: These joints, at least one.
         locked: Position in [rad] or [m] of the joints that are locked by name; the line repeats them.
     """
@@ -67,7 +64,6 @@ def require_sound_locks(document: UrdfDocument, locked: Mapping[str, float], uni
     """Only movable joints that lead can be locked, in their own unit, and only where they can go.
 
     Args:
-        document: Links and joints.
         locked: Position in [rad] or [m] by joint name.
         units: Unit that it was written in, ``deg`` or ``mm``, by joint name; none where it was not written.
 

@@ -134,7 +134,6 @@ def configuration_of(srdf: Srdf, name: str, model: RobotModel, *, added: Collect
     Where several groups have a state of the name, those that lack joints of the chain to the flange are passed over.
 
     Args:
-        srdf: The file.
         name: ``STATE`` or ``GROUP/STATE``.
         added: Joints that are not the file's, such as a rail below the robot: at zero, or at the nearest limit.
 

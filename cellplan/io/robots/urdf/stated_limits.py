@@ -50,8 +50,6 @@ def read_limit(joint: Element, owner: str, *, kind: str, remarks: Remarks) -> Ur
     """Limits of a joint; what leaves no room, is not positive or is beyond all machines counts as not given.
 
     Args:
-        owner: The joint in messages.
-        kind: Its type.
         remarks: Takes what is stated and not used.
     """
     limit = joint.one("limit", owner)
@@ -79,7 +77,6 @@ def within_range(
     """A narrower range as far as it makes sense, and what was not used of it; empty for nothing.
 
     Args:
-        limit: What the joint can reach.
         lower: Lowest position; None where none is stated.
         upper: Highest position; None where none is stated.
         slides: Whether the joint slides rather than turns.
@@ -97,12 +94,7 @@ def within_range(
 
 
 def without_slips_of_unit(turning: Sequence[tuple[str, Element, UrdfLimit]], remarks: Remarks) -> Iterator[UrdfLimit]:
-    """The limits of turning joints; ranges of several turns count only where they are not the degrees of a whole file.
-
-    Args:
-        turning: Name, element and limits of all revolute joints.
-        remarks: Takes the ranges of several turns.
-    """
+    """The limits of turning joints; ranges of several turns count only where they are not a whole file's degrees."""
     widths = [max(map(abs, limit.ends)) for _, _, limit in turning if limit.lower is not None]
     wide = sum(width > TWO_TURNS for width in widths)
     is_slip = 1 < len(widths) < 2 * wide or any("degrees" in limit.position_fault for _, _, limit in turning)

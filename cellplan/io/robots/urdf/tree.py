@@ -106,8 +106,6 @@ def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Ro
     """Say for every joint whether it is driven, follows a driven one or stands still.
 
     Args:
-        tree: The links and joints.
-        flange: Name of the flange link, in messages.
         locked: Position in [rad] or [m] of every joint that is held still, those off the chain included.
 
     Raises:

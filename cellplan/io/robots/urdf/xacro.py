@@ -58,7 +58,6 @@ def read_elements(
     Args:
         path: The file; one whose name ends in ``.xacro`` is expanded.
         settings: What a xacro file needs to be expanded.
-        remarks: Takes the warnings of xacro.
     """
     if path.suffix.lower() == XACRO_SUFFIX:
         return expand_xacro(path, settings or XacroSettings(), remarks)
@@ -75,11 +74,6 @@ def argument_names(path: Path) -> frozenset[str]:
 
 def expand_xacro(path: Path, settings: XacroSettings, remarks: Remarks) -> tuple[Element, tuple[Path, ...]]:
     """Expand a xacro file.
-
-    Args:
-        path: The file.
-        settings: Arguments, packages and allowed folders.
-        remarks: Takes the warnings of xacro.
 
     Returns:
         The root element, and the files that were read beside the first one, each once.

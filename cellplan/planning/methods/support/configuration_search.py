@@ -67,10 +67,7 @@ class ConfigurationSearch:
         """Search for the configuration at the sample after k.
 
         Args:
-            k: The sample.
             start: Configuration there, shape (nq,); it sets which joints may move and how free tool axes lean.
-            bounds: Joint position bounds.
-            improve: The method's pass over the joints, on this cost.
             momentum: What the joints moved in the step before, shape (nq,): the search begins as far along it as
                 brings the tools nearest, at most as far as it went, if that costs less than the start.
 
