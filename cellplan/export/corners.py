@@ -6,6 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.export.joints import Axes
+from cellplan.export.timed_rows import are_near
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 
@@ -21,15 +22,15 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
     on or off, and rows at which a robot rests or its tool has to stop. Robots that move in step round the same rows:
     those that none of the moving ones must not round.
     """
-    switches = _switch_times(program)
+    switch_times = _switch_times(program)
     flags = {}
     for name, rows in program.robots.items():
         free = np.ones(len(rows), dtype=bool)
         free[[0, -1, *rows.marks, *rows.stops]] = False
         if rows.times is None:
-            free &= ~_switches(rows)
+            free &= ~switches(rows)
         else:
-            free &= ~_is_near(rows.times, switches)
+            free &= ~are_near(rows.times, switch_times, SAME_TIME)
         flags[name] = free
     if promise is Promise.SYNCHRONISED:
         moving = {name: moves(rows) for name, rows in program.robots.items()}
@@ -80,23 +81,15 @@ def _runs(rows: RobotRows, moving: Flags) -> Flags:
     return runs if rows.qd is None else runs & np.any(rows.qd != 0.0, axis=1)
 
 
-def _switches(rows: RobotRows) -> Flags:
+def switches(rows: RobotRows) -> Flags:
     """Rows at which the process of a robot goes on or off, shape (N,)."""
-    switches = np.zeros(len(rows), dtype=bool)
+    flags = np.zeros(len(rows), dtype=bool)
     if rows.process is not None:
-        switches[1:] = rows.process[1:] != rows.process[:-1]
-    return switches
+        flags[1:] = rows.process[1:] != rows.process[:-1]
+    return flags
 
 
 def _switch_times(program: ProgramRows) -> Array:
     """Times in [s] at which the process of any robot goes on or off, increasing."""
-    times = [rows.times[_switches(rows)] for rows in program.robots.values() if rows.times is not None]
+    times = [rows.times[switches(rows)] for rows in program.robots.values() if rows.times is not None]
     return np.unique(np.concatenate([np.zeros(0), *times]))
-
-
-def _is_near(times: Array, others: Array) -> Flags:
-    """Which times are the same as one of some others, which increase, shape (N,)."""
-    ordered = np.concatenate([[-np.inf], others, [np.inf]])
-    after = np.searchsorted(ordered, times)
-    near: Flags = np.minimum(ordered[after] - times, times - ordered[after - 1]) <= SAME_TIME
-    return near

@@ -62,7 +62,7 @@ def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DE
     if not np.all(np.abs(numbers) < LARGEST):
         raise InputError(f"robot '{robot.name}': expected positions below {LARGEST:g}, got one that is too large")
     quanta = np.rint(numbers * quantum)
-    lower, upper = (np.array([getattr(joint, end) for joint in joints]) for end in ("lower", "upper"))
+    lower, upper = robot.model.lower, robot.model.upper
     sign = np.sign(_zero(robot).sign)
     for _ in range(NUDGES):
         read = from_numbers(robot, quanta / quantum + 0.0, angle=angle)
@@ -85,13 +85,6 @@ def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) 
         else:
             positions[:, place] = np.deg2rad(numbers[:, place]) if joint.is_revolute else numbers[:, place] / MM
     return _zero(robot).to_model(positions)
-
-
-def rates_to_numbers(robot: Robot, qd: Array, *, angle: Angle = Angle.DEGREES) -> Array:
-    """Speeds of the controller's axes per second in the unit of a file for speeds of the model, shape (N, n)."""
-    zero = _zero(robot)
-    still = ControllerZero(zero=np.zeros_like(zero.zero), sign=zero.sign, coupling=zero.coupling, source=zero.source)
-    return still.from_model(qd) * np.array([_scale(joint, angle) for joint in robot.model.joints])
 
 
 def _scale(joint: Joint, angle: Angle) -> float:

@@ -1,6 +1,6 @@
 """Rows with times as formats of joint tables share them: one clock, paths of files, decimals of a robot."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import Final
 
@@ -8,9 +8,11 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.export.rounding import LARGEST
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ProgramRows, RobotRows
+from cellplan.model.plan import Interval
+from cellplan.model.task import TIME_TOLERANCE
 
 NANO: Final = 1_000_000_000  # [ns/s]
 
@@ -72,6 +74,22 @@ def shared_clock(program: ProgramRows, robots: Collection[str]) -> Array:
         if not np.array_equal(times_of(program.robots[name]), clock):
             raise InputError(f"robot '{name}': expected rows at the same times as those of '{first}'")
     return clock
+
+
+def are_near(times: Array, others: Sequence[float] | Array, tolerance: float) -> Flags:
+    """Which times, shape (N,), are the same as one of some others."""
+    ordered = np.sort(np.array([-np.inf, *others, np.inf]))
+    after = np.searchsorted(ordered, times)
+    near: Flags = np.minimum(ordered[after] - times, times - ordered[after - 1]) <= tolerance
+    return near
+
+
+def are_within(sigma: Array, stretches: Iterable[Interval]) -> Flags:
+    """Whether nominal times in [s], shape (N,), lie in one of some stretches, ends included."""
+    inside = np.zeros(len(sigma), dtype=bool)
+    for begin, end in stretches:
+        inside |= (sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)
+    return inside
 
 
 def require_paths(files: Mapping[str, str], expected: Collection[str]) -> None:

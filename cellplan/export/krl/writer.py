@@ -18,6 +18,7 @@ from cellplan.export.krl.names import AXES, EXTERNAL, POINT, WHOLE, module_paths
 from cellplan.export.krl.reader import read_krl
 from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
+from cellplan.export.timed_rows import decimals_of
 from cellplan.geometry.transforms import Array
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 
@@ -70,8 +71,7 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
 def _program(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _KrlProgram:
     """All that the files of one robot in one program are made of."""
     placed = job.frame.robot(rows.robot)
-    control_decimals = None if placed.control is None else placed.control.decimals
-    decimals = DECIMALS if control_decimals is None else control_decimals
+    decimals = decimals_of(placed, DECIMALS)
     axes = require_six_axes(placed, external=EXTERNAL, what="KRL")
     written = to_numbers(placed, rows.q, decimals=decimals)
     numbers = np.zeros((len(rows), len(AXES)))

@@ -44,6 +44,11 @@ class _Task(NamedTuple):
     syncs: list[_Sync]
     marks: tuple[int, ...]
 
+    @property
+    def rows(self) -> RobotRows:
+        """The rows of its robot."""
+        return rows_of(self.unit, self.moves, self.marks)
+
 
 def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
     """The rows of each program that exported files hold.
@@ -59,15 +64,10 @@ def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRow
         if frame.promise is Promise.SYNCHRONISED:
             for task in tasks:
                 _require_same_moves(tasks[0], task)
-        programs.append(ProgramRows(name=name, robots={task.unit.robot.name: _rows(task) for task in tasks}))
+        programs.append(ProgramRows(name=name, robots={task.unit.robot.name: task.rows for task in tasks}))
     if left:
         raise InputError(f"{min(left)}: expected files of the programs only, got another one")
     return tuple(programs)
-
-
-def _rows(task: _Task) -> RobotRows:
-    """The rows of one robot."""
-    return rows_of(task.unit, task.moves, task.marks)
 
 
 def _read_task(
@@ -102,7 +102,7 @@ def _read_task(
             place += len(handshake)
     if lowered and not marks:
         statements[0].refuse("a handshake at a row, as its output is lowered", "none")
-    _require_whole(frame, unit, moves, syncs, end=_end(modules), between=between)
+    _require_whole(frame, unit, moves, syncs, end=modules[0][1].ends["main"], between=between)
     return _Task(unit, data, moves, syncs, tuple(marks))
 
 
@@ -157,11 +157,6 @@ def _flat(modules: list[tuple[str, RapidModule]]) -> list[RapidStatement]:
             if name not in called:
                 head.refuse("each page called by main", f"{name}, which is not called")
     return flat
-
-
-def _end(modules: list[tuple[str, RapidModule]]) -> RapidStatement:
-    """Where the main routine ends."""
-    return modules[0][1].ends["main"]
 
 
 def _sync(

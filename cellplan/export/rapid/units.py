@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.export.joints import Axes
 from cellplan.export.text import safe_names
+from cellplan.export.timed_rows import decimals_of
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, Promise, Targets
@@ -22,14 +23,7 @@ LONGEST_NAME: Final = 32
 LONGEST_MODULE: Final = 24  # room for `t_` before it and for the number of a page behind it
 EXTERNAL_AXES: Final = 6
 ABSENT: Final = "9E9"  # an axis that a mechanical unit does not have
-TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS = (
-    "cell_tasks",
-    "sync_on",
-    "sync_off",
-    "part",
-    "v_start",
-    "v_rows",
-)
+TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS = "cell_tasks", "sync_on", "sync_off", "part", "v_start", "v_rows"
 ZONES: Final = tuple(round(10.0 ** (1.0 + place / 10.0)) for place in range(44))  # [um] or [mdeg], 0.01 to 200
 _WORDS: Final = (
     "alias and backward bool case connect const default div do dnum else elseif endfor endfunc endif endmodule endproc "
@@ -181,14 +175,13 @@ def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> Ra
         raise InputError(
             f"robots.{name}: expected at most {EXTERNAL_AXES} axes beside an arm, got {len(axes.external)}"
         )
-    decimals = None if robot.control is None else robot.control.decimals
     return RapidUnit(
         robot=robot,
         task=task,
         module=module,
         tool=f"t_{module}",
         axes=axes,
-        decimals=DECIMALS if decimals is None else decimals,
+        decimals=decimals_of(robot, DECIMALS),
     )
 
 

@@ -16,6 +16,7 @@ from cellplan.export.head import head_notes
 from cellplan.export.joints import from_numbers, to_numbers
 from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
+from cellplan.export.timed_rows import decimals_of
 from cellplan.export.val3.names import (
     BASE,
     FLANGE,
@@ -118,8 +119,7 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
 def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Project:
     """All that the project of one robot in one program is made of."""
     placed = job.frame.robot(rows.robot)
-    control_decimals = None if placed.control is None else placed.control.decimals
-    decimals = DECIMALS if control_decimals is None else control_decimals
+    decimals = decimals_of(placed, DECIMALS)
     numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, VAL3)
     shares = row_shares(job, program)[rows.robot] * is_rounded(job, program, rows.robot, numbers, pages)
     zones = _zones(placed, from_numbers(placed, numbers), shares)

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.errors import InputError
+from cellplan.export.timed_rows import are_within
 from cellplan.geometry.transforms import Array, inverse, roll_pitch_yaw
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.plan import Interval
 from cellplan.model.report import ClearanceClass, Report
-from cellplan.model.task import TIME_TOLERANCE, Frame
+from cellplan.model.task import Frame
 from cellplan.model.units import DEG, MM
 
 TIME: Final = "time_s"
@@ -188,7 +189,7 @@ def _task_columns(program: WideRows, task: str) -> Columns:
 
     pose = program.spread(poses, width=len(POSE))
     error = program.spread(lambda phase: phase.errors(task), width=2)
-    columns: Columns = {f"{task}.process": _is_within(program.sigma, program.process.get(task, ()))}
+    columns: Columns = {f"{task}.process": are_within(program.sigma, program.process.get(task, ())).astype(np.int8)}
     columns[f"{task}.s_mm"] = program.spread(travelled)
     columns |= {f"{task}.{name}": values for name, values in zip(POSE, pose.T, strict=True)}
     columns |= {f"{task}.position_error_mm": error[:, 0], f"{task}.orientation_error_deg": error[:, 1]}
@@ -208,11 +209,3 @@ def _speed_columns(program: WideRows, robot: Robot) -> Columns:
 def _speeds(points: Array, times: Array) -> Array:
     """Speeds of a point, shape (n, 3), in the steps between its rows in [m/s], shape (n - 1,)."""
     return np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(times)
-
-
-def _is_within(sigma: Array, stretches: Sequence[Interval]) -> NDArray[np.int8]:
-    """1 where nominal times, shape (N,), lie in one of some stretches, ends included, else 0."""
-    inside = np.zeros(len(sigma), dtype=np.int8)
-    for begin, end in stretches:
-        inside[(sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)] = 1
-    return inside

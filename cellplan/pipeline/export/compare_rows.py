@@ -9,6 +9,7 @@ from cellplan.errors import InputError
 from cellplan.export.corners import moves, row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.export.joints import Angle, from_numbers, to_numbers
+from cellplan.export.timed_rows import decimals_of
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportJob, ProgramRows, RobotRows, Targets
@@ -103,8 +104,7 @@ def _off(robot: Robot, dialect: Dialect, written: Array, read: Array, *, is_solv
     """Positions that are farther from those that were written than rounding takes them, shape (N, n)."""
     if is_solved:
         return np.abs(read - written) > SOLVED_ROOM
-    control_decimals = None if robot.control is None or not dialect.kinds else robot.control.decimals
-    decimals = dialect.decimals if control_decimals is None else control_decimals
+    decimals = decimals_of(robot, dialect.decimals) if dialect.kinds else dialect.decimals
     units = np.array([joint.display_unit.scale for joint in robot.model.joints])
     off = np.ones(written.shape, dtype=bool)
     for angle, quantum in ((Angle.DEGREES, QUANTA * 10.0**-decimals / units), (Angle.RADIANS, 0.0)):

@@ -5,9 +5,8 @@ Between two rows, :math:`h` apart, with :math:`u` from 0 to 1,
 .. math:: q(u) = q_0 + u (q_1 - q_0) + h\, u (1 - u) \bigl[ (1 - u)(v_0 - s) - u (v_1 - s) \bigr],
           \quad s = (q_1 - q_0) / h .
 
-The second term is the deviation from the chord. As :math:`u (1 - u)^2 \le 4/27`, it is nowhere larger than
-:math:`\tfrac{4}{27} h (|v_0 - s| + |v_1 - s|)`. The second derivative is linear between two rows, so the largest one
-is at a row.
+The second term is the deviation from the chord. The second derivative is linear between two rows, so the largest one is
+at a row.
 """
 
 from dataclasses import dataclass
@@ -17,7 +16,6 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 
-BEND: Final = 4.0 / 27.0  # [-] largest value of u (1 - u)^2
 MONOTONE: Final = 3.0  # [-] a cubic between two rows whose speeds are at most this times that of the chord is monotone
 ROUNDS: Final = 50  # [-] passes over rows whose curve leaves a limit; each speed is lowered in few of them
 
@@ -46,12 +44,6 @@ class HermiteRows:
         velocities: Array = s + (1.0 - u) * (1.0 - 3.0 * u) * first - u * (2.0 - 3.0 * u) * last
         velocities[(times < self.times[0]) | (times > self.times[-1])] = 0.0
         return velocities
-
-    def chord_deviation(self) -> Array:
-        """No position between two rows is farther from their chord, in [rad] or [m], shape (N - 1, n)."""
-        s = np.diff(self.q, axis=0) / self._steps
-        bound: Array = BEND * self._steps * (np.abs(self.qd[:-1] - s) + np.abs(self.qd[1:] - s))
-        return bound
 
     def largest_accelerations(self) -> Array:
         """Largest second derivative between two rows in [rad/s^2] or [m/s^2], without its sign, shape (N - 1, n)."""

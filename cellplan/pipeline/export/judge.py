@@ -1,6 +1,6 @@
 """Judgement of a written program: every demand of the cell once more, on what a reader found in the files."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,7 @@ from cellplan.model.exported import ExportJob, ProgramRows, Promise
 from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.model.verified_run import VerifiedRun
 from cellplan.pipeline.export.compare_rows import other_rows
-from cellplan.pipeline.export.judge_path import PathRows, path_findings, path_rows
+from cellplan.pipeline.export.judge_path import path_findings, path_rows
 from cellplan.pipeline.export.judge_speeds import joint_findings, motion_findings, position_findings
 from cellplan.pipeline.export.part_errors import ToolsOnPart
 from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
@@ -23,9 +23,7 @@ from cellplan.pipeline.export.shared import Shared, played_digest
 from cellplan.scene.scene import Scene
 
 SAME: Final = 1e-12  # [rad] or [m] cycles that are played alike are judged once
-HELD_TOL: Final = (
-    1e-3  # [rad] or [m] a robot that holds may be off by rounding, and by a cycle that begins beside a phase
-)
+HELD_TOL: Final = 1e-3  # [rad] or [m] that holding robots may be off by rounding, and where a cycle begins in a phase
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,9 +91,9 @@ def judge(
             corners += own_corners
     return Judgement(
         findings=tuple(dict.fromkeys(findings)),
-        deviations=tuple(_largest(deviations)),
+        deviations=_largest(deviations),
         not_judged=tuple(_not_judged(dialect, job, read)),
-        corners=tuple(_largest(corners)),
+        corners=_largest(corners),
         rounded=_rounded(programs),
     )
 
@@ -143,7 +141,9 @@ def _program_findings(
                 yield from motion_findings(played, stretch, scene)
     for stretch, _ in _judged(played, scenes):
         yield from _held_findings(played, stretch)
-    yield from _path_findings(played, scenes)
+    for stretch, scene in _judged(played, scenes):
+        where = f"{stretch.motion.name}: " if stretch.motion.name else ""
+        yield from (where + finding for finding in path_findings(path_rows(played, stretch, scene)))
 
 
 def _is_played(dialect: Dialect, promise: Promise) -> bool:
@@ -164,18 +164,6 @@ def _held_findings(played: ExecutedProgram, stretch: ExecutedStretch) -> Iterato
                 f"robot '{name}' holds from {stretch.begin:.3f} to {stretch.end:.3f} s: joint {joint.name} is "
                 f"{scale * float(off.max()):.4g} {unit} from where it stands in the run"
             )
-
-
-def _path_findings(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[str]:
-    """What the cell demands of the path in all phases, and the rows do not keep."""
-    for where, rows in _path_rows(played, scenes):
-        yield from (where + finding for finding in path_findings(rows))
-
-
-def _path_rows(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[str, PathRows]]:
-    """The path in every phase, with what its findings begin with."""
-    for stretch, scene in _judged(played, scenes):
-        yield f"{stretch.motion.name}: " if stretch.motion.name else "", path_rows(played, stretch, scene)
 
 
 def _judged(played: ExecutedProgram, scenes: Sequence[Scene]) -> Iterator[tuple[ExecutedStretch, Scene]]:
@@ -258,14 +246,19 @@ def _rounded(programs: Sequence[ExecutedProgram]) -> tuple[int, int]:
     return sum(int(np.count_nonzero(share)) for share in shares), sum(map(len, shares))
 
 
-def _largest(deviations: Sequence[Deviation]) -> list[Deviation]:
-    """The largest of each subject and unit, in the order in which they were found."""
-    largest: dict[tuple[str, str], Deviation] = {}
+def largest_of(deviations: Iterable[Deviation], kind: Callable[[Deviation], object]) -> list[Deviation]:
+    """The largest of each kind, in the order in which they were found."""
+    largest: dict[object, Deviation] = {}
     for deviation in deviations:
-        key = deviation.subject, deviation.unit
+        key = kind(deviation)
         if key not in largest or deviation.largest > largest[key].largest:
             largest[key] = deviation
     return list(largest.values())
+
+
+def _largest(deviations: Iterable[Deviation]) -> tuple[Deviation, ...]:
+    """The largest of each subject and unit."""
+    return tuple(largest_of(deviations, lambda deviation: (deviation.subject, deviation.unit)))
 
 
 def _not_judged(dialect: Dialect, job: ExportJob, read: Sequence[ProgramRows]) -> Iterator[str]:

@@ -117,7 +117,7 @@ def tool_margins(arms: LeverArms, scene: Scene, relation: Relation, off: Array) 
     Args:
         off: How far all joints may be off, each by itself, in [rad] or [m], shape (M, nq).
     """
-    chain = arms.tool(relation.robot, seen_by=_holder(scene, relation))
+    chain = arms.tool(relation.robot, seen_by=holder_of(scene, relation))
     axes = axes_off(arms, off)
     return np.stack([chain.reach(axes), axes[:, chain.axes] @ chain.turns], axis=1)
 
@@ -149,7 +149,7 @@ def tool_corners(arms: LeverArms, scene: Scene, relation: Relation, q: Array, co
 
 def _twists(scene: Scene, relation: Relation, q: Array, corners: Array) -> list[Array]:
     """Motion of a tool on the part by what each robot that takes part may be off, tip then turn, shape (M, 6) each."""
-    cell, holder = scene.cell, _holder(scene, relation)
+    cell, holder = scene.cell, holder_of(scene, relation)
     p = scene.chains[relation.robot].tool_poses(q[:, cell.columns(relation.robot)])[:, :3, 3]
     twists = []
     for sign, robot in ((1.0, relation.robot), (-1.0, holder)):
@@ -162,7 +162,7 @@ def _twists(scene: Scene, relation: Relation, q: Array, corners: Array) -> list[
 
 def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corners: Array) -> Array:
     """What the change of the Jacobian within the steps at each time adds, in [m] and [rad], shape (M, 2)."""
-    chain, off = arms.tool(relation.robot, seen_by=_holder(scene, relation)), axes_off(arms, in_steps(corners))
+    chain, off = arms.tool(relation.robot, seen_by=holder_of(scene, relation)), axes_off(arms, in_steps(corners))
     way = arms.steps(q) + off
     mixed = [0.5 * (bend(way + off) - bend(way) - bend(off)) for bend in (chain.bend, chain.turn_bend)]
     steps = np.pad(np.stack(mixed, axis=1), ((1, 1), (0, 0)))
@@ -170,7 +170,7 @@ def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corner
     return changes
 
 
-def _holder(scene: Scene, relation: Relation) -> str | None:
+def holder_of(scene: Scene, relation: Relation) -> str | None:
     """The robot that carries what a tool is seen from; None for the world, or a part that is fixed in it."""
     in_world = isinstance(relation, Task) and relation.relative_to is Frame.WORLD
     holders = scene.cell.part.held_by

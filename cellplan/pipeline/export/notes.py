@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.judge import Deviation, Judgement
+from cellplan.pipeline.export.judge import Deviation, Judgement, largest_of
 from cellplan.pipeline.export.prepare import PreparedExport
 from cellplan.pipeline.export.skew import skew_text
 
@@ -45,12 +45,8 @@ def skew_lines(prepared: PreparedExport) -> Iterator[str]:
 
 def deviation_line(judgement: Judgement) -> str:
     """The largest deviations of what is written from the run: of any joint in each unit, and of any tool."""
-    largest: dict[tuple[bool, str], Deviation] = {}
-    for deviation in judgement.deviations:
-        kind = ("/" in deviation.subject, deviation.unit)
-        if kind not in largest or deviation.largest > largest[kind].largest:
-            largest[kind] = deviation
-    return "largest deviation from the run: " + (", ".join(map(_deviation, largest.values())) or "none")
+    largest = largest_of(judgement.deviations, lambda deviation: ("/" in deviation.subject, deviation.unit))
+    return "largest deviation from the run: " + (", ".join(map(_deviation, largest)) or "none")
 
 
 def rounding_line(blend: float, judgement: Judgement) -> str:

@@ -76,8 +76,7 @@ def joints_of_part_poses(
     )
     for program in programs:
         for rows in program.robots.values():
-            if rows.X_PT is not None:
-                _require_straight(frame, program, rows)
+            _require_straight(frame, program, rows)
     return programs
 
 

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.export.timed_rows import are_near
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.exported import Interpolation, ProgramRows, RobotRows
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
@@ -73,11 +74,10 @@ class ExecutedProgram:
             else:
                 one = full.robots[name]
                 rows[name] = RobotRows(robot=name, q=one.q, times=times_of(one) + lead)
-        place = next(k for k, name in enumerate(run.programs) if name == full.name)
         stated = {name: one.rounding for name, one in read.robots.items() if one.rounding is not None}
         return cls(
             run=run,
-            place=place,
+            place=list(run.programs).index(full.name),
             rows=rows,
             interpolation=interpolation,
             exported=tuple(read.robots),
@@ -105,11 +105,10 @@ class ExecutedProgram:
 
     def curve(self, robot: str) -> HermiteRows:
         """The cubic through the rows of a robot with the speeds that were read, or else with those of the rows."""
-        rows, joints = self.rows[robot], self.run.cell.robot(robot).model.joints
+        rows, model = self.rows[robot], self.run.cell.robot(robot).model
         qd = rows.qd
         if qd is None:
-            lower, upper = (np.array([getattr(joint, side) for joint in joints]) for side in ("lower", "upper"))
-            qd = row_speeds(times_of(rows), rows.q, rests=resting(rows.q), lower=lower, upper=upper)
+            qd = row_speeds(times_of(rows), rows.q, rests=resting(rows.q), lower=model.lower, upper=model.upper)
         return HermiteRows(times=times_of(rows), q=rows.q, qd=qd)
 
     def parts(self, robot: str) -> int:
@@ -172,20 +171,13 @@ class ExecutedProgram:
 
     def is_row(self, times: Array) -> Flags:
         """Which times are rows of the run, shape (M,)."""
-        return _is_near(times, self.run_times)
+        return are_near(times, self.run_times, SAME_TIME)
 
     def is_break(self, times: Array) -> Flags:
         """Which times of a grid are needed, as a robot may change its direction there: its ends, and rows as played."""
-        is_break = _is_near(times, self.grid(float(times[0]), float(times[-1]), with_run=False))
+        is_break = are_near(times, self.grid(float(times[0]), float(times[-1]), with_run=False), SAME_TIME)
         is_break[[0, -1]] = True
         return is_break
-
-
-def _is_near(times: Array, others: Array) -> Flags:
-    """Which times are the same as one of some others, which increase, shape (M,)."""
-    after = np.clip(np.searchsorted(others, times), 1, len(others) - 1)
-    near: Flags = np.minimum(np.abs(others[after] - times), np.abs(others[after - 1] - times)) <= SAME_TIME
-    return near
 
 
 def _ends_of_corners(times: Array, shares: Array) -> Array:

@@ -39,7 +39,7 @@ def export_record(run: VerifiedRun, prepared: PreparedExport, written: Written) 
         "deviations": deviation_records(written.judgement),
         "not_judged": list(written.judgement.not_judged),
         "marks": [_marks(order, place, written) for place, order in enumerate(prepared.orders)],
-        "thinning": None if prepared.thinning is None else _thinning(prepared.thinning),
+        "thinning": None if prepared.thinning is None else dict(zip(("mm", "deg"), prepared.thinning, strict=True)),
         "blend": written.job.blend,
         "rounded": _rounded(written),
     }
@@ -98,11 +98,6 @@ def _skew(prepared: PreparedExport) -> Record | None:
         for pair in prepared.skew.pairs
     ]
     return {"line": next(skew_lines(prepared)), "pairs": pairs}
-
-
-def _thinning(thinning: tuple[float, float]) -> Record:
-    """How far what was left out may be off."""
-    return {"mm": thinning[0], "deg": thinning[1]}
 
 
 def _marks(orders: Orders, place: int, written: Written) -> Record:

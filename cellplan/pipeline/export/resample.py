@@ -82,7 +82,7 @@ def _on_cycle(robot: Robot, rows: RobotRows, cycle: float, *, lead: float, end: 
         raise ValueError(f"rows of '{robot.name}': expected speeds")
     times = np.round(np.arange(round(end / cycle) + 1) * cycle, TIME_DECIMALS)
     curve = HermiteRows(times=times_of(rows), q=rows.q, qd=rows.qd)
-    lower, upper = (np.array([getattr(joint, side) for joint in robot.model.joints]) for side in ("lower", "upper"))
+    lower, upper = robot.model.lower, robot.model.upper
     resampled_rows = np.clip(
         curve.at(times - lead), np.minimum(lower, rows.q.min(axis=0)), np.maximum(upper, rows.q.max(axis=0))
     )

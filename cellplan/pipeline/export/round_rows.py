@@ -22,10 +22,10 @@ from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Relation, stacked_positions
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
-from cellplan.model.task import Frame, Task
+from cellplan.model.task import Task
 from cellplan.pipeline.export.judge import played_programs
 from cellplan.pipeline.export.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows
-from cellplan.pipeline.export.margins import body_reach, corner_vectors, robot_corners
+from cellplan.pipeline.export.margins import body_reach, corner_vectors, holder_of, robot_corners
 from cellplan.pipeline.export.orders import Orders, blocked_orders
 from cellplan.pipeline.export.played import ExecutedProgram, ExecutedStretch
 from cellplan.pipeline.export.rows import times_of
@@ -253,9 +253,7 @@ def straight_depths(rows: PathRows) -> Iterator[tuple[Task, float, float]]:
 
 def movers_of(scene: Scene, relation: Relation) -> frozenset[str]:
     """Robots that move a tool, or the part under it."""
-    holders = scene.cell.part.held_by
-    in_world = isinstance(relation, Task) and relation.relative_to is Frame.WORLD
-    return frozenset({relation.robot, *([] if in_world or not holders else [holders[0].robot])})
+    return frozenset(filter(None, (relation.robot, holder_of(scene, relation))))
 
 
 def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, float]]]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cellplan.export.timed_rows import are_near, are_within
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Cell
 from cellplan.model.exported import ProgramRows, RobotRows
@@ -108,22 +109,16 @@ def _work(run: VerifiedRun, nominal: NominalRows, place: int) -> Iterator[WorkRo
 
 def _robot_rows(cell: Cell, plan: Plan, nominal: NominalRows, *, robot: str) -> RobotRows:
     """Rows of one robot."""
-    table, joints = nominal.tables[robot], cell.robot(robot).model.joints
+    table, model = nominal.tables[robot], cell.robot(robot).model
     tasks = [task.name for task in cell.tasks if task.robot == robot]
-    rests = resting(table.q) | _is_at(nominal.sigma, _all_stop(plan, nominal))
+    rests = resting(table.q) | are_near(nominal.sigma, _all_stop(plan, nominal), TIME_TOLERANCE)
     return RobotRows(
         robot=robot,
         q=table.q,
         times=table.times,
-        qd=row_speeds(
-            table.times,
-            table.q,
-            rests=rests,
-            lower=np.array([joint.lower for joint in joints]),
-            upper=np.array([joint.upper for joint in joints]),
-        ),
+        qd=row_speeds(table.times, table.q, rests=rests, lower=model.lower, upper=model.upper),
         process=_in_process(nominal.sigma, [stretch for task in tasks for stretch in plan.process.get(task, ())]),
-        stops=tuple(np.flatnonzero(_is_at(nominal.sigma, _own_stops(plan, tasks))).tolist()),
+        stops=tuple(np.flatnonzero(are_near(nominal.sigma, _own_stops(plan, tasks), TIME_TOLERANCE)).tolist()),
     )
 
 
@@ -139,32 +134,16 @@ def _all_stop(plan: Plan, nominal: NominalRows) -> tuple[float, ...]:
     """Nominal times at which no tool moves along its path: phases meet, or all tasks that are on have a stop there."""
     stops_of_all = list(nominal.begins)
     for time in {stop for stops in plan.stops.values() for stop in stops}:
-        on = [task for task, stretches in plan.process.items() if np.any(_is_within(np.array([time]), stretches))]
+        on = [task for task, stretches in plan.process.items() if np.any(are_within(np.array([time]), stretches))]
         if all(np.any(np.abs(np.array(plan.stops.get(task, ())) - time) <= TIME_TOLERANCE) for task in on):
             stops_of_all.append(time)
     return tuple(stops_of_all)
-
-
-def _is_at(sigma: Array, times: Sequence[float]) -> Flags:
-    """Rows whose nominal time is one of some times, shape (N,)."""
-    ordered = np.sort(np.array([-np.inf, *times, np.inf]))
-    after = np.searchsorted(ordered, sigma)
-    near: Flags = np.minimum(ordered[after] - sigma, sigma - ordered[after - 1]) <= TIME_TOLERANCE
-    return near
-
-
-def _is_within(sigma: Array, stretches: Sequence[Interval]) -> Flags:
-    """Whether nominal times, shape (N,), lie in one of some stretches, ends included."""
-    inside = np.zeros(len(sigma), dtype=bool)
-    for begin, end in stretches:
-        inside |= (sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)
-    return inside
 
 
 def _in_process(sigma: Array, stretches: Sequence[Interval]) -> Flags:
     """Whether a tool is in process from each row to the next: from the first row in a stretch to the last one."""
     process = np.zeros(len(sigma), dtype=bool)
     for stretch in stretches:
-        inside = _is_within(sigma, (stretch,))
+        inside = are_within(sigma, (stretch,))
         process[:-1] |= inside[:-1] & inside[1:]
     return process

@@ -4,19 +4,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.certify.run_pairs import scene_of_run
-from cellplan.geometry.transforms import Array
+from cellplan.export.timed_rows import are_within
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell import Cell
 from cellplan.model.plan import rows_of
-from cellplan.model.task import TIME_TOLERANCE, Frame
+from cellplan.model.task import Frame
 from cellplan.model.verified_run import ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.plan.demanded import DemandedProgram
 from cellplan.pipeline.plan.program import STILL_TOL
 from cellplan.scene.scene import Scene
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +57,7 @@ def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
     """The programs of a run: one from home to home, or one for each of its phases."""
     motion, plan = run.motion, run.motion.plan
     motions: Sequence[ReadMotion | VerifiedMotion] = run.motions
-    process = {task: _within(motion.sigma, stretches) for task, stretches in plan.process.items()}
+    process = {task: are_within(motion.sigma, stretches) for task, stretches in plan.process.items()}
     rows = [rows_of(phase, motion.sigma) for phase in plan.program]
     if run.cell.program is not None:
         phases = tuple(
@@ -131,11 +129,3 @@ def _where(program: RunProgram, steps: Flags) -> str:
     step = int(np.flatnonzero(steps)[0])
     name = "" if program.name is None or program.name == program.phase_at(step + 1).name else f"{program.name}, "
     return f"{name}phase '{program.phase_at(step + 1).name}', {program.times[step]:g} s"
-
-
-def _within(sigma: Array, stretches: tuple[tuple[float, float], ...]) -> Flags:
-    """Whether nominal times in [s], shape (N,), lie in one of some stretches, ends included, shape (N,)."""
-    inside = np.zeros(len(sigma), dtype=bool)
-    for begin, end in stretches:
-        inside |= (sigma >= begin - TIME_TOLERANCE) & (sigma <= end + TIME_TOLERANCE)
-    return inside

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
+from cellplan.export.corners import switches
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.exported import ProgramRows, RobotRows
 from cellplan.model.units import MM
@@ -96,7 +97,7 @@ class _RowGroup:
         self._is_chosen |= _ends_of_standstill(self._q)
         for end_rows in rows:
             self._is_chosen[[*end_rows.marks, *end_rows.stops]] = True
-            self._is_chosen |= _switches(end_rows)
+            self._is_chosen |= switches(end_rows)
 
     @property
     def chosen(self) -> Indices:
@@ -202,17 +203,11 @@ def _split_by_tools(
 
 def _chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:
     """Some rows of a robot, with the speeds and marks that belong to them."""
-    joints = scene.cell.robot(rows.robot).model.joints
-    times, q = times_of(rows)[chosen], rows.q[chosen]
-    qd = None
+    model = scene.cell.robot(rows.robot).model
+    times, q, qd = times_of(rows)[chosen], rows.q[chosen], None
     if rows.qd is not None:
-        qd = row_speeds(
-            times,
-            q,
-            rests=np.all(rows.qd[chosen] == 0.0, axis=1),
-            lower=np.array([joint.lower for joint in joints]),
-            upper=np.array([joint.upper for joint in joints]),
-        )
+        rests = np.all(rows.qd[chosen] == 0.0, axis=1)
+        qd = row_speeds(times, q, rests=rests, lower=model.lower, upper=model.upper)
     return replace(
         rows,
         q=q,
@@ -229,11 +224,3 @@ def _ends_of_standstill(q: Array) -> Flags:
     still = np.concatenate([[False], np.all(np.diff(q, axis=0) == 0.0, axis=1), [False]])
     ends: Flags = still[1:] != still[:-1]
     return ends
-
-
-def _switches(rows: RobotRows) -> Flags:
-    """Rows at which the process goes on or off, shape (N,)."""
-    switches = np.zeros(len(rows), dtype=bool)
-    if rows.process is not None:
-        switches[1:] = rows.process[1:] != rows.process[:-1]
-    return switches

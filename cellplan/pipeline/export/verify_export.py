@@ -1,8 +1,9 @@
 """Verification of exported programs: as they lie on disk, against the run that they were made from."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, Final
 
 from cellplan.cache import nothing_kept
@@ -148,16 +149,10 @@ def _other_texts(stored: StoredExport, files: Mapping[str, str]) -> Iterator[Inp
 
 
 def _first_other_line(expected: str, got: str) -> tuple[int, str, str]:
-    """Number of the first line that differs, from 1, and both."""
-    lines, others = expected.split("\n"), got.split("\n")
-    most = min(len(lines), len(others))
-    place = next((k for k in range(most) if lines[k] != others[k]), most)
-    return place + 1, _line(lines, place), _line(others, place)
-
-
-def _line(lines: Sequence[str], place: int) -> str:
-    """A line, or that there is none."""
-    return lines[place] if place < len(lines) else "the end"
+    """Number of the first line that differs, from 1, and both, or that there is none."""
+    lines = enumerate(zip_longest(expected.split("\n"), got.split("\n")), start=1)
+    number, (one, other) = next((number, pair) for number, pair in lines if pair[0] != pair[1])
+    return number, "the end" if one is None else one, "the end" if other is None else other
 
 
 def _other_record(stored: StoredExport, record: Mapping[str, Any]) -> Iterator[InputError]:

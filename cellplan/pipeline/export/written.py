@@ -120,14 +120,7 @@ def same_rows(one: Sequence[ProgramRows], other: Sequence[ProgramRows]) -> bool:
 
 def _same(one: RobotRows, other: RobotRows) -> bool:
     """Whether the rows of a robot are equal."""
-    pairs = [
-        (one.X_PT, other.X_PT),
-        (one.q, other.q),
-        (one.times, other.times),
-        (one.qd, other.qd),
-        (one.process, other.process),
-        (one.rounding, other.rounding),
-    ]
+    pairs = ((getattr(one, name), getattr(other, name)) for name in ("X_PT", "q", "times", "qd", "process", "rounding"))
     return one.marks == other.marks and all(
         (a is None and b is None)
         or (a is not None and b is not None and np.array_equal(a, b, equal_nan=a.dtype.kind == "f"))

@@ -1,7 +1,6 @@
 """The interpolant: against cubics, against differences, against its bounds, and within the limits of joints."""
 
 import numpy as np
-import pytest
 
 from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_speeds
 
@@ -34,23 +33,6 @@ def test_the_curve_holds_outside_of_its_rows() -> None:
 
     np.testing.assert_array_equal(curve.at(np.array([-1.0, 2.0]))[:, 0], [0.0, 1.7])
     np.testing.assert_array_equal(curve.speeds(np.array([-1.0, 2.0]))[:, 0], [0.0, 0.0])
-
-
-def test_no_curve_is_farther_from_its_chords_than_the_bound_and_some_are_as_far() -> None:
-    rng = np.random.default_rng(5)
-    times = np.cumsum(rng.uniform(0.1, 1.0, 400))
-    qd = rng.normal(size=(400, 1))
-    q = rng.normal(size=(400, 1))
-    q[1] = q[0] + (times[1] - times[0]) * qd[1]  # the last speed of the first step is that of its chord
-    curve = HermiteRows(times=times, q=q, qd=qd)
-    share = np.linspace(0.0, 1.0, 301)
-    t = times[:-1, None] + np.diff(times)[:, None] * share
-    off = np.abs(curve.at(t.ravel()).reshape(399, -1) - (q[:-1] + share * np.diff(q, axis=0)))
-
-    bound = curve.chord_deviation()[:, 0]
-
-    assert np.all(off.max(axis=1) <= bound + 1e-12)
-    assert off[0].max() == pytest.approx(bound[0], rel=1e-4)
 
 
 def test_extremes_and_accelerations_are_those_of_a_dense_curve() -> None:
