@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.export.dialect import Dialect
 from cellplan.export.rounding import from_file_unit, rounded_inside, rounded_quanta
+from cellplan.export.timed_rows import file_path
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
@@ -28,7 +29,7 @@ def render_csv(job: ExportJob) -> dict[str, str]:
         InputError: A joint or a time cannot be written with the decimals of the format.
     """
     return {
-        file_name(program.name, name): _render(job.frame.robot(name), program.robots[name])
+        file_path(program.name, f"{name}.csv"): _render(job.frame.robot(name), program.robots[name])
         for program in job.programs
         for name in job.frame.robots
     }
@@ -40,20 +41,14 @@ def read_csv(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows,
     Raises:
         InputError: With file and line, when a text is not such a file; a file is missing, or is one too many.
     """
-    paths = {file_name(program, robot): (program, robot) for program in frame.programs for robot in frame.robots}
+    paths = {file_path(name, f"{robot}.csv"): (name, robot) for name in frame.programs for robot in frame.robots}
     refuse_other_files(files, paths)
     tables = {paths[path]: _table_of_program(frame.robot(paths[path][1]), files[path], path) for path in paths}
     for program in frame.programs:
         _refuse_other_clocks(frame, program, {robot: tables[program, robot] for robot in frame.robots})
+    rows = {key: RobotRows(robot=key[1], q=table.q, times=table.times) for key, table in tables.items()}
     return tuple(
-        ProgramRows(
-            name=program,
-            robots={
-                robot: RobotRows(robot=robot, q=table.q, times=table.times)
-                for robot in frame.robots
-                for table in [tables[program, robot]]
-            },
-        )
+        ProgramRows(name=program, robots={robot: rows[program, robot] for robot in frame.robots})
         for program in frame.programs
     )
 
@@ -70,11 +65,6 @@ def refuse_other_files(files: Mapping[str, str], expected: Mapping[str, object])
     for name in expected:
         if name not in files:
             raise InputError(f"{name}: expected this file among the programs, got none")
-
-
-def file_name(program: str | None, robot: str) -> str:
-    """Path of the file of one robot in the folder of the export."""
-    return f"{robot}.csv" if program is None else f"{program}/{robot}.csv"
 
 
 def time_fields(times: Array) -> list[str]:
@@ -164,7 +154,7 @@ def _refuse_other_clocks(frame: ExportFrame, program: str | None, tables: Mappin
     """Refuse robots of one program whose rows have other times than those of its first one."""
     first = tables[frame.robots[0]]
     for robot, table in tables.items():
-        file, most = file_name(program, robot), min(len(table.times), len(first.times))
+        file, most = file_path(program, f"{robot}.csv"), min(len(table.times), len(first.times))
         other = np.flatnonzero(table.times[:most] != first.times[:most])
         row = int(other[0]) if len(other) else most
         if len(other) or len(table.times) != len(first.times):

@@ -117,16 +117,12 @@ def _joint_head(robot: Robot, place: int) -> dict[str, Written]:
     if zero is None:
         return {**head, "controller": None}
     coupling = {
-        other.name: Raw(_short(factor))
+        other.name: Raw(fixed(factor, DECIMALS))
         for other, factor in zip(robot.model.joints, zero.coupling[place].tolist(), strict=True)
         if factor
     }
-    offset = Raw(_short(float(zero.zero[place]) * joint.display_unit.scale))
+    offset = Raw(fixed(float(zero.zero[place]) * joint.display_unit.scale, DECIMALS))
     return {**head, "controller": {"sign": Raw(int(zero.sign[place])), "zero": offset, "coupling": coupling}}
-
-
-def _short(number: float) -> str:
-    return fixed(number, DECIMALS)
 
 
 def _program(frame: ExportFrame, name: str | None, text: str, file: str) -> ProgramRows:

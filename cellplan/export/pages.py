@@ -128,17 +128,29 @@ def pages_of(count: int, frame: ExportFrame, dialect: Dialect) -> list[range]:
     return pages
 
 
-def program_rows(job: ExportJob, robots: Iterable[str], program: ProgramRows) -> dict[str, RobotRows]:
-    """Rows of the robots in a program, which meet at equally many marks; each may keep other rows.
+def render_programs(
+    job: ExportJob,
+    paths: Mapping[tuple[str | None, str], str],
+    files_of: Callable[[ProgramRows, RobotRows, str], dict[str, str]],
+) -> dict[str, str]:
+    """Text of every file by its path, from the files of each robot in a program; each may keep other rows.
+
+    Args:
+        paths: Path of each program, by its name and robot.
 
     Raises:
-        InputError: They do not, or one of them has no row.
+        InputError: The robots do not meet at equally many marks, or one of them has no row.
     """
-    robot_rows = {name: program.robots[name] for name in robots}
-    if len({len(rows.marks) for rows in robot_rows.values()}) > 1 or not all(map(len, robot_rows.values())):
-        got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in robot_rows.items())
-        raise InputError(f"program '{program.name or job.frame.cell.name}': expected rows, and equal marks, got {got}")
-    return robot_rows
+    robots, files = list(dict.fromkeys(robot for _, robot in paths)), dict[str, str]()
+    for program in job.programs:
+        rows_of = {name: program.robots[name] for name in robots}
+        if len({len(rows.marks) for rows in rows_of.values()}) > 1 or not all(map(len, rows_of.values())):
+            got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in rows_of.items())
+            name = program.name or job.frame.cell.name
+            raise InputError(f"program '{name}': expected rows, and equal marks, got {got}")
+        for robot, rows in rows_of.items():
+            files |= files_of(program, rows, paths[program.name, robot])
+    return files
 
 
 def read_programs(

@@ -4,9 +4,11 @@ A share of a segment is known from the joints. Languages that state a zone by it
 the distance of its tip from the row when the share is left to go.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cellplan.export.corners import LARGEST_SHARE
 from cellplan.export.urscript.rows import tool_tips
@@ -31,6 +33,13 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
         inner, share = q[1:-1], shares[1:-1, None]
         zones[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
     return zones
+
+
+def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:
+    """The largest of a scale that is no larger than each size, 0 where none is, shape (N,)."""
+    whole = np.array([0, *scale])
+    taken: NDArray[np.int_] = whole[np.searchsorted(whole, sizes, side="right") - 1]
+    return taken
 
 
 def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:

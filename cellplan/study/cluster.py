@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future, InvalidStateError
 from contextlib import suppress
 from functools import partial
 from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
@@ -58,10 +58,6 @@ class Cluster(Executor):
         self._is_over = threading.Event()
         self._watch = threading.Thread(target=self._watched, name="cellplan-cluster", daemon=True)
         self._watch.start()
-
-    def __enter__(self) -> Self:
-        """Begin to take trials."""
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None

@@ -7,8 +7,6 @@ from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import StrEnum
-from types import TracebackType
-from typing import Self
 
 from cellplan.study.record import Recorder
 from cellplan.study.run import Flight
@@ -41,8 +39,11 @@ class Stop:
     seconds: float | None = None
 
 
-class Crew:
-    """What works out the trials of a study, for a ``with`` statement; processes start with the first trial."""
+class Crew(ExitStack):
+    """What works out the trials of a study, for a ``with`` statement.
+
+    Processes start with the first trial; at the end they are ended, and what has not begun is cancelled.
+    """
 
     def __init__(self, evaluate: Evaluate, workers: int | Executor, limits: Limits, size: int) -> None:
         """Prepare.
@@ -50,19 +51,9 @@ class Crew:
         Args:
             workers: Number of processes, or an executor, which stays open.
         """
+        super().__init__()
         self._evaluate, self._workers, self._limits, self._size = evaluate, workers, limits, size
-        self._opened = ExitStack()
         self._flights: dict[str, Flight] = {}
-
-    def __enter__(self) -> Self:
-        """Begin without a process."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        """Cancel what has not begun and end the processes."""
-        self._opened.__exit__(kind, error, traceback)
 
     @property
     def flight(self) -> Flight:
@@ -89,9 +80,9 @@ class Crew:
 
     def _begin(self, name: str, executor: Executor) -> None:
         if executor is not self._workers:
-            self._opened.enter_context(executor)
+            self.enter_context(executor)
         self._flights[name] = Flight(self._evaluate, executor, self._limits)
-        self._opened.callback(self._flights[name].cancel)
+        self.callback(self._flights[name].cancel)
 
 
 def run_rounds(propose: Propose, size: int, stop: Stop, record: Recorder, crew: Crew) -> StoppedBy:

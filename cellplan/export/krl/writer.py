@@ -16,7 +16,7 @@ from cellplan.export.head import head_notes
 from cellplan.export.joints import to_numbers
 from cellplan.export.krl.names import AXES, EXTERNAL, POINT, WHOLE, module_paths, require_numbers
 from cellplan.export.krl.reader import read_krl
-from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
+from cellplan.export.pages import is_rounded, pages_of, percentages, render_programs, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.export.timed_rows import decimals_of
 from cellplan.geometry.transforms import Array
@@ -52,13 +52,8 @@ def render_krl(job: ExportJob) -> dict[str, str]:
             before it, lacks a signal, or a position cannot be written with the decimals.
     """
     paths = module_paths(job.frame, KRL)
-    robots = list(dict.fromkeys(robot for _, robot in paths))
     raise_findings(refusals(*_demands(job.frame, 0)))
-    files: dict[str, str] = {}
-    for program in job.programs:
-        for robot, rows in program_rows(job, robots, program).items():
-            files |= _files(job, _program(job, program, rows, paths[program.name, robot]))
-    return files
+    return render_programs(job, paths, lambda program, rows, path: _files(job, _program(job, program, rows, path)))
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:

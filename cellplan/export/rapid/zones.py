@@ -16,7 +16,7 @@ from cellplan.export.corners import chosen_shares, moves, row_shares
 from cellplan.export.joints import from_numbers, to_numbers
 from cellplan.export.rapid.units import ZONES, RapidUnit, zone_name
 from cellplan.export.text import fixed
-from cellplan.export.zones import axis_zones, tool_zones
+from cellplan.export.zones import axis_zones, on_scale, tool_zones
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.units import MM
@@ -69,12 +69,9 @@ def zone_data(unit: RapidUnit, sizes: Sequence[int]) -> Iterator[str]:
 def _sizes(unit: RapidUnit, rows: RobotRows, shares: Array, *, chosen: Array) -> np.ndarray:
     """Sizes of the zones of a robot by itself, on the scale, shape (N,)."""
     q = from_numbers(unit.robot, to_numbers(unit.robot, rows.q, decimals=unit.decimals))  # as it is read
-    scale = np.array([0, *ZONES])
     if not unit.has_tool:
-        exact = np.maximum(1000.0 * axis_zones(unit.robot, q, chosen), ZONES[0]) * (shares > 0.0)
-        return scale[np.searchsorted(scale, exact, side="right") - 1]
-    exact = 1000.0 * MM * _tool_zones(unit, replace(rows, q=q), shares)
-    sizes: np.ndarray = scale[np.searchsorted(scale, exact, side="right") - 1]
+        return on_scale(np.maximum(1000.0 * axis_zones(unit.robot, q, chosen), ZONES[0]) * (shares > 0.0), ZONES)
+    sizes = on_scale(1000.0 * MM * _tool_zones(unit, replace(rows, q=q), shares), ZONES)
     return np.where(sizes >= SMALLEST_TOOL, sizes, 0)
 
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -22,22 +23,14 @@ _NAME_GAP: Final = re.compile(r'(?<=")\s*,\s*(?=")')
 _TIME: Final = r"time_from_start:\s+\{\s*sec:\s+(0|[1-9][0-9]{0,6})\s*,\s*nanosec:\s+(0|[1-9][0-9]*)\s*\}"
 
 
+@dataclass(slots=True)
 class _Part:
-    """One file as it is read.
+    """One file as it is read."""
 
-    Attributes:
-        file: Its name in messages.
-        table: Positions and speeds as they are written, shape (N, 2 n).
-        times: Times in [ns] since its start, shape (N,).
-        lines: Line of each point, from 1.
-    """
-
-    def __init__(self, file: str) -> None:
-        """Begin with no point."""
-        self.file = file
-        self.table: list[list[float]] = []
-        self.times: list[int] = []
-        self.lines: list[int] = []
+    file: str  # its name in messages
+    table: list[list[float]] = field(default_factory=list)  # positions and speeds as they are written, shape (N, 2 n)
+    times: list[int] = field(default_factory=list)  # times in [ns] since its start
+    lines: list[int] = field(default_factory=list)  # line of each point, from 1
 
 
 def read_ros2(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:

@@ -82,22 +82,22 @@ def _taken(left: dict[str, str], file: str) -> str:
 def _listed(project: Val3Element, path: str) -> tuple[list[str], str]:
     """Names of the programs that a project lists, and path of its data."""
     project.require()
-    project.only("Parameters", "Programs", "Database", "Libraries", "Types", space=PROJECT_SPACE)
-    parameters = project.one("Parameters", space=PROJECT_SPACE)
+    project.only("Parameters", "Programs", "Database", "Libraries", "Types")
+    parameters = project.one("Parameters")
     parameters.require(needed=("version", "stackSize", "millimeterUnit"))
     if parameters.attributes["millimeterUnit"] != "true":
         raise parameters.error("millimetres", parameters.attributes["millimeterUnit"])
     for empty in project.children:
-        if empty.name.endswith((" Libraries", " Types")):
+        if empty.name in {"Libraries", "Types"}:
             empty.require()
-            empty.only(space=PROJECT_SPACE)
-    listed = project.one("Programs", space=PROJECT_SPACE)
-    names = [_file_name(entry, ".pgx") for entry in listed.only("Program", space=PROJECT_SPACE)]
+            empty.only()
+    listed = project.one("Programs")
+    names = [_file_name(entry, ".pgx") for entry in listed.only("Program")]
     for name in (START, STOP, *names):
         if names.count(name) != 1:
             raise listed.error(f"{name}.pgx once", f"{names.count(name)} of them")
-    database = project.one("Database", space=PROJECT_SPACE)
-    entries = database.only("Data", space=PROJECT_SPACE)
+    database = project.one("Database")
+    entries = database.only("Data")
     file_name = path.rpartition("/")[2]
     if [_file_name(entry, ".dtx") for entry in entries] != [file_name]:
         raise database.error(f"{file_name}.dtx alone", f"{len(entries)} of them")
@@ -117,21 +117,21 @@ def _program(left: dict[str, str], file: str, name: str, data: Mapping[str, Data
     """Read a program."""
     root = parse(_taken(left, file), file, "Programs", PROGRAM_SPACE)
     root.require()
-    root.only("Program", space=PROGRAM_SPACE)
-    program = root.one("Program", space=PROGRAM_SPACE)
+    root.only("Program")
+    program = root.one("Program")
     program.require(needed=("name",), allowed=("access",))
     if program.attributes["name"] != name or program.attributes.get("access") not in {None, "public", "private"}:
         raise program.error(f"the program {name}, public or private", " ".join(program.attributes.values()))
     counters = {name for name, datum in data.items() if datum.kind == "num"}
     for child in program.children:
-        if child.name == f"{PARAMETER_SPACE} Parameters":
+        if (child.space, child.name) == (PARAMETER_SPACE, "Parameters"):
             child.require()
-            child.only(space=PARAMETER_SPACE)
-        elif child.name == f"{PROGRAM_SPACE} Locals":
-            counters |= {_local(local) for local in child.only("Local", space=PROGRAM_SPACE)}
-        elif child.name != f"{PROGRAM_SPACE} Code":
-            raise child.error("Parameters, Locals or Code", child.name.rpartition(" ")[2])
-    code = program.one("Code", space=PROGRAM_SPACE)
+            child.only()
+        elif (child.space, child.name) == (PROGRAM_SPACE, "Locals"):
+            counters |= {_local(local) for local in child.only("Local")}
+        elif (child.space, child.name) != (PROGRAM_SPACE, "Code"):
+            raise child.error("Parameters, Locals or Code", child.name)
+    code = program.one("Code")
     code.require()
     if code.children or program.text.strip():
         raise code.error("text alone", "an element")

@@ -14,7 +14,7 @@ from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
 from cellplan.export.head import head_notes
 from cellplan.export.joints import from_numbers, to_numbers
-from cellplan.export.pages import is_rounded, pages_of, percentages, program_rows, require_six_axes, robots_of
+from cellplan.export.pages import is_rounded, pages_of, percentages, render_programs, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.export.timed_rows import decimals_of
 from cellplan.export.val3.names import (
@@ -34,9 +34,8 @@ from cellplan.export.val3.names import (
 )
 from cellplan.export.val3.reader import read_val3
 from cellplan.export.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE_SPACE
-from cellplan.export.zones import tool_zones
+from cellplan.export.zones import on_scale, tool_zones
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.units import DEG, MM
 
@@ -100,13 +99,8 @@ def render_val3(job: ExportJob) -> dict[str, str]:
             signal, or a position cannot be written with the decimals.
     """
     paths = project_paths(job.frame, VAL3)
-    robots = list(dict.fromkeys(robot for _, robot in paths))
     raise_findings(refusals(*_demands(job.frame, 0)))
-    files: dict[str, str] = {}
-    for program in job.programs:
-        for robot, rows in program_rows(job, robots, program).items():
-            files |= _files(_project(job, program, rows, paths[program.name, robot]))
-    return files
+    return render_programs(job, paths, lambda program, rows, path: _files(_project(job, program, rows, path)))
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
@@ -122,7 +116,7 @@ def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -
     decimals = decimals_of(placed, DECIMALS)
     numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, VAL3)
     shares = row_shares(job, program)[rows.robot] * is_rounded(job, program, rows.robot, numbers, pages)
-    zones = _zones(placed, from_numbers(placed, numbers), shares)
+    zones = on_scale(1000.0 * MM * tool_zones(placed, from_numbers(placed, numbers), shares), ZONES).tolist()
     steps = handshake_steps(job.frame, rows.robot) if rows.marks else ()
     return _Project(
         path=path,
@@ -136,14 +130,6 @@ def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -
         pages=pages,
         tool=placed.tool.X_FT,
     )
-
-
-def _zones(robot: Robot, q: Array, shares: Array) -> list[int]:
-    """Distance of the tool in [um] within which each row is rounded, on the scale, 0 for a stop, shape (N,)."""
-    scale = np.array([0, *ZONES])
-    exact = 1000.0 * MM * tool_zones(robot, q, shares)
-    zones: list[int] = scale[np.searchsorted(scale, exact, side="right") - 1].tolist()
-    return zones
 
 
 def _files(project: _Project) -> dict[str, str]:

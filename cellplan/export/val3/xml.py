@@ -23,7 +23,8 @@ class Val3Element:
 
     file: str
     line: int  # line of its tag
-    name: str  # name with its namespace before it
+    space: str  # its namespace
+    name: str
     attributes: dict[str, str]  # its attributes; those of a namespace have it before the name
     children: list["Val3Element"] = field(default_factory=list)
     text: str = ""
@@ -46,26 +47,26 @@ class Val3Element:
             if name not in needed and name not in allowed:
                 raise self.error("no other attributes", name.rpartition(" ")[2])
 
-    def only(self, *names: str, space: str) -> list["Val3Element"]:
-        """Its elements, which all have one of some names and of a namespace; it has no text.
+    def only(self, *names: str) -> list["Val3Element"]:
+        """Its elements, which all have one of some names and its own namespace; it has no text.
 
         Raises:
             InputError: With file and line.
         """
         for child in self.children:
-            if child.name not in {f"{space} {name}" for name in names}:
-                raise child.error(" or ".join(names) or "no element", child.name.rpartition(" ")[2])
+            if child.space != self.space or child.name not in names:
+                raise child.error(" or ".join(names) or "no element", child.name)
         if self.text.strip():
             raise self.error("no text", self.text.strip())
         return self.children
 
-    def one(self, name: str, *, space: str) -> "Val3Element":
-        """The only element of a name.
+    def one(self, name: str) -> "Val3Element":
+        """The only element of a name in its own namespace.
 
         Raises:
             InputError: With file and line: there is none, or another one.
         """
-        matching = [child for child in self.children if child.name == f"{space} {name}"]
+        matching = [child for child in self.children if (child.space, child.name) == (self.space, name)]
         if len(matching) != 1:
             raise self.error(f"{name} once", f"{len(matching)} of them")
         return matching[0]
@@ -84,11 +85,13 @@ def parse(text: str, file: str, root: str, space: str) -> Val3Element:
     """
     split_lines(text, file)  # refuses two kinds of line ends
     parser = expat.ParserCreate(namespace_separator=" ")
-    top = Val3Element(file=file, line=1, name="", attributes={})
+    top = Val3Element(file=file, line=1, space="", name="", attributes={})
     open_elements = [top]
 
-    def begin(name: str, attributes: dict[str, str]) -> None:
-        element = Val3Element(file=file, line=parser.CurrentLineNumber, name=name, attributes=attributes)
+    def begin(full_name: str, attributes: dict[str, str]) -> None:
+        space, _, name = full_name.rpartition(" ")
+        line = parser.CurrentLineNumber
+        element = Val3Element(file=file, line=line, space=space, name=name, attributes=attributes)
         open_elements[-1].children.append(element)
         open_elements.append(element)
 
@@ -104,6 +107,6 @@ def parse(text: str, file: str, root: str, space: str) -> Val3Element:
     parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = begin, finish, say
     parse_strictly(parser, text.removeprefix("\ufeff").encode(errors="surrogatepass"), file)
     element = top.children[0]
-    if element.name != f"{space} {root}":
-        raise element.error(f"{root} of the namespace {space}", element.name)
+    if (element.space, element.name) != (space, root):
+        raise element.error(f"{root} of the namespace {space}", f"{element.space} {element.name}".strip())
     return element

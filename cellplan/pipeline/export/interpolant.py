@@ -36,15 +36,6 @@ class HermiteRows:
         positions: Array = self.q[k] + u * chord + u * (1.0 - u) * ((1.0 - u) * first - u * last)
         return positions
 
-    def speeds(self, times: Array) -> Array:
-        """Speeds at times in [s], shape (M,), shape (M, n); zero outside of the rows."""
-        k, u = self._places(times)
-        s = (np.diff(self.q, axis=0) / self._steps)[k]
-        first, last = self.qd[k] - s, self.qd[k + 1] - s
-        velocities: Array = s + (1.0 - u) * (1.0 - 3.0 * u) * first - u * (2.0 - 3.0 * u) * last
-        velocities[(times < self.times[0]) | (times > self.times[-1])] = 0.0
-        return velocities
-
     def largest_accelerations(self) -> Array:
         """Largest second derivative between two rows in [rad/s^2] or [m/s^2], without its sign, shape (N - 1, n)."""
         s = np.diff(self.q, axis=0) / self._steps

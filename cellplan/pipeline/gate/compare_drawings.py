@@ -3,22 +3,19 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
-from xml.etree import ElementTree as ET
 
 from cellplan.io.input.findings import shown
 from cellplan.io.run.stored import StoredRun
 from cellplan.model.cell import Cell
 from cellplan.model.verified_run import VerifiedMotion
 from cellplan.pipeline.cell_drawings import DrawnPhase, phase_drawings, program_drawings
+from cellplan.pipeline.gate.picture_text import PIECE, unbalanced
 
 CellDrawings = Mapping[str, Mapping[str, str]]
 
-PIECE: Final = re.compile(r"<[^<>]*>|[^<>]+|[<>]")
 COURSE: Final = re.compile(r'(?<= d=")[MLHVlhvz\d. -]*(?=")')  # of a line
 FIGURE: Final = re.compile(r"(?<![\w#-])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
-ROUNDING: Final = (
-    3.0  # units of a sheet, which are at most a tenth of a millimetre: what rounding to a whole one can do
-)
+ROUNDING: Final = 3.0  # units of a sheet, each at most a tenth of a millimetre: what rounding to a whole one can do
 
 
 def drawings_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> CellDrawings:
@@ -37,31 +34,34 @@ def stored_drawings(stored: StoredRun, place: str, names: Iterable[str]) -> dict
     return {name: stored.content(place, name).decode("utf-8", "replace") for name in names}
 
 
-def foreign_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
-    """Drawings that hold something that cellplan does not draw there: an element, an attribute, a word."""
+def _pairs(stored: StoredRun, drawn: CellDrawings) -> Iterator[tuple[str, str, str, str]]:
+    """Place and name of each drawing with the one on disk and the one drawn anew."""
     for place, drawings in drawn.items():
         on_disk = stored_drawings(stored, place, drawings)
-        for name, text in drawings.items():
-            foreign = foreign_piece(on_disk[name], text)
-            if foreign is not None:
-                file = stored.file(place, name)
-                yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
+        yield from ((place, name, on_disk[name], text) for name, text in drawings.items())
+
+
+def foreign_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
+    """Drawings that hold something that cellplan does not draw there: an element, an attribute, a word."""
+    for place, name, got, text in _pairs(stored, drawn):
+        foreign = foreign_piece(got, text)
+        if foreign is not None:
+            file = stored.file(place, name)
+            yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"
 
 
 def other_drawings(stored: StoredRun, drawn: CellDrawings) -> Iterator[str]:
     """Drawings of the run that are not those drawn anew, apart from rounding."""
-    for place, drawings in drawn.items():
-        on_disk = stored_drawings(stored, place, drawings)
-        for name, text in drawings.items():
-            if not is_same_drawing(on_disk[name], text):
-                yield f"{place}/{name}" if place else name
+    for place, name, got, text in _pairs(stored, drawn):
+        if not is_same_drawing(got, text):
+            yield f"{place}/{name}" if place else name
 
 
 def foreign_piece(got: str, drawn: str) -> str | None:
     """The first piece of a drawing that the one drawn anew has nowhere, whatever its figures; None without any."""
     known = {_without_figures(piece) for piece in PIECE.findall(drawn)}
     foreign = next((piece for piece in PIECE.findall(got) if _without_figures(piece) not in known), None)
-    return next(_unbalanced(got), None) if foreign is None else shown(" ".join(foreign.split()))
+    return next(unbalanced(got, "drawing"), None) if foreign is None else shown(" ".join(foreign.split()))
 
 
 def is_same_drawing(got: str, drawn: str) -> bool:
@@ -89,11 +89,3 @@ def _apart(course: re.Match[str]) -> str:
 def _without_figures(piece: str) -> str:
     """A piece without the figures of a tag; words as they are."""
     return FIGURE.sub("0", COURSE.sub("", piece)) if piece.startswith("<") else piece.strip()
-
-
-def _unbalanced(got: str) -> Iterator[str]:
-    """What keeps a drawing from being one whole element."""
-    try:
-        ET.fromstring(got)  # noqa: S314 - it holds no piece, and so no entity, that is not drawn here
-    except ET.ParseError as error:
-        yield f"a drawing that cannot be read ({error})"

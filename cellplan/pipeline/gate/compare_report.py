@@ -19,13 +19,7 @@ NOISE_BY_ENDING: Final[Mapping[str, float]] = {  # in printed units: differences
     "jerk_m_s3": 1e-2,
 }
 COMPARED_ELSEWHERE: Final = frozenset({"inputs", "versions", "digests"})
-PLANNER_KEYS: Final = (
-    "iterations",
-    "slack",
-    "resolution",
-    "transfers",
-    "moved_starts",
-)  # of ``solver``: cannot be derived from the tables
+PLANNER_KEYS: Final = ("iterations", "slack", "resolution", "transfers", "moved_starts")  # of ``solver``: not in tables
 PLANNER_SERIES: Final = ("iterations", "slack")  # of the series, likewise
 KNOWN_TO_THE_PLANNER: Final = frozenset(
     {*(("solver", key) for key in PLANNER_KEYS), *((key,) for key in PLANNER_SERIES)}

@@ -33,7 +33,7 @@ def foreign_piece(got: str, drawn: str) -> str | None:
     for piece in PIECE.findall(SVG_START + body):
         if piece not in known and piece.strip() not in words and _is_foreign(piece, attributes):
             return shown(" ".join(piece.split()))
-    return next(_unbalanced(got), None)
+    return next(unbalanced(got, "picture"), None)
 
 
 def _is_foreign(piece: str, known: Collection[tuple[str, str]]) -> bool:
@@ -54,9 +54,9 @@ def _is_foreign(piece: str, known: Collection[tuple[str, str]]) -> bool:
     )
 
 
-def _unbalanced(got: str) -> Iterator[str]:
-    """What keeps a picture from being one whole element."""
+def unbalanced(got: str, what: str) -> Iterator[str]:
+    """What keeps a picture, of which every piece is drawn here, from being one whole element."""
     try:
         ET.fromstring(got)  # noqa: S314 - its head, where entities would be declared, is the one that is drawn here
     except ET.ParseError as error:
-        yield f"a picture that cannot be read ({error})"
+        yield f"a {what} that cannot be read ({error})"

@@ -16,10 +16,7 @@ from cellplan.model.cell import Cell
 from cellplan.model.units import DEG, MM
 from cellplan.planning.start.seeds import SEED_SLIDE, SEED_TURN
 
-SEARCHED_KEYS: Final = frozenset(
-    {"start", "start_deg", "home", "home_deg"}
-)  # written ``auto`` where they were to be found
-
+SEARCHED_KEYS: Final = frozenset({"start", "start_deg", "home", "home_deg"})  # ``auto`` where they were to be found
 ROUNDED: Final = 1e-9  # [deg] or [mm] that writing a start changes it by at most
 
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.cache import nothing_kept
-from cellplan.certify.bound import Bound
+from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
 from cellplan.certify.growth import ComingApart, certify_growth
 from cellplan.checks.clearance.contacts import time_of
@@ -228,8 +228,12 @@ def _nearest(bound: Bound, times: Array) -> Nearest | None:
     pairs = [pair for pair in bound.pairs if pair.keeps_clearance and np.isfinite(pair.proved)]
     if not pairs:
         return None
-    worst = min(pairs, key=lambda pair: pair.proved)
-    return Nearest(distance=worst.proved, demand=worst.demand, pair=bound.names(worst), at_s=time_of(times, worst.at))
+    return _nearest_of(min(pairs, key=lambda pair: pair.proved), bound, times)
+
+
+def _nearest_of(pair: PairBound, bound: Bound, times: Array) -> Nearest:
+    """The smallest distance of a pair."""
+    return Nearest(distance=pair.proved, demand=pair.demand, pair=bound.names(pair), at_s=time_of(times, pair.at))
 
 
 def _clearance(bound: Bound, times: Array, phase: str) -> Check:
@@ -237,11 +241,7 @@ def _clearance(bound: Bound, times: Array, phase: str) -> Check:
     failed = [pair for pair in bound.pairs if not pair.is_kept]
     nearest = _nearest(bound, times)
     if failed:
-        worst = min(failed, key=lambda pair: pair.proved - pair.demand)
-        first, second = bound.names(worst)
-        nearest = Nearest(
-            distance=worst.proved, demand=worst.demand, pair=(first, second), at_s=time_of(times, worst.at)
-        )
+        nearest = _nearest_of(min(failed, key=lambda pair: pair.proved - pair.demand), bound, times)
     if nearest is None:
         nearest = Nearest(distance=0.0, demand=0.0, pair=("", ""), at_s=float(times[0]))
     shown = np.floor(10.0 * MM * nearest.distance) / 10.0

@@ -1,6 +1,7 @@
 """Planner of recoveries: straight off the part and home; else back along the program, then off and home."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from cellplan.model.progress import Progress
 from cellplan.pipeline.plan.retiming import transfer_retimer
 from cellplan.pipeline.recover.phases import SAME, RecoveryKind, RecoveryPhase, joints_of, moving
 from cellplan.pipeline.recover.state import RunPlaces, StoppedState
-from cellplan.pipeline.recover.ways_back import HoldersBack, WaysBack
+from cellplan.pipeline.recover.ways_back import WaysBack, holders_back
 from cellplan.planning.recovery.retract import find_retract
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows
 from cellplan.planning.transfer.plan import plan_transfer
@@ -151,15 +152,15 @@ class RecoveryPlanner:
             TransferNotFoundError: Neither is free.
         """
         columns, faults = joints_of(self._cell, self._group), []
-        holders = HoldersBack(self._places, self._state, self._scene)
+        holders = partial(holders_back, self._places, self._state, self._scene)
         for holders_first in (True, False):
             middle = q.copy()
             chosen = columns if holders_first else ~columns
             middle[chosen] = goal[chosen]
             try:
                 if holders_first:
-                    return [holders.phase(q), *self._transfers(middle, goal)]
-                return [*self._transfers(q, middle), holders.phase(middle)]
+                    return [holders(q), *self._transfers(middle, goal)]
+                return [*self._transfers(q, middle), holders(middle)]
             except TransferNotFoundError as error:
                 faults.append(str(error))
         raise TransferNotFoundError("; ".join(faults))

@@ -1,6 +1,5 @@
 """A recovery as record, text and files: what is shown, and in which order."""
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from cellplan.certify.growth import ComingApart
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.io.input.files import digest
 from cellplan.io.run.content import RECOVER, RECOVERY
 from cellplan.io.run.folder import RunFolder, refuse_unless_replaceable
 from cellplan.io.run.joint_tables import program_digest, table_body
@@ -53,7 +53,7 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
         {"name": check.name, "subject": check.subject, "passed": check.passed, "message": check.message}
         for check in judgement.checks
     ]
-    files = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in _files(recovery).items()}
+    files = {name: digest(text.encode()) for name, text in _files(recovery).items()}
     return record | {"files": files, "caution": CAUTION}
 
 
@@ -112,10 +112,8 @@ def _nearest(nearest: Nearest | None) -> dict[str, Any] | None:
 def _joints(robot: Robot, q: Array) -> dict[str, float]:
     """Joint positions in the units of the tables."""
     return {
-        f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}": float(
-            np.rad2deg(value) if joint.is_revolute else MM * value
-        )
-        for joint, value in zip(robot.model.joints, q, strict=True)
+        f"{joint.name}_{joint.display_unit.name}": joint.display_unit.scale * value
+        for joint, value in zip(robot.model.joints, q.tolist(), strict=True)
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.pipeline.plan.retiming import transfer_retimer
 from cellplan.pipeline.recover.phases import SAME, RecoveryKind, RecoveryPhase, joints_of, moving
 from cellplan.pipeline.recover.state import RunPlaces, StoppedState
@@ -93,39 +93,36 @@ class WaysBack:
         return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), q)
 
 
-class HoldersBack:
-    """Robots that hold the part together, back along the program while all others stand."""
+def holders_back(places: RunPlaces, state: StoppedState, scene: Scene, q: Array) -> RecoveryPhase:
+    """Robots that hold the part together, back along the program as they came while all others stand.
 
-    def __init__(self, places: RunPlaces, state: StoppedState, scene: Scene) -> None:
-        """Prepare; nothing is planned yet."""
-        self._places, self._state, self._scene = places, state, scene
-        self._group = scene.cell.positioners
+    Raises:
+        TransferNotFoundError: Something is in their way.
+    """
+    group = scene.cell.positioners
+    named = ", ".join(group)
+    path = _path_of_group(places, state.times[group[0]], q, joints_of(places.cell, group))
+    if path is None or set(state.standing) & set(group):
+        raise TransferNotFoundError(f"{named} hold the part together and cannot be moved one by one")
+    rows = timed_rows(path, transfer_retimer(scene))
+    if not certify(scene, rows, with_minimum=False).is_kept:
+        raise TransferNotFoundError(f"{named} cannot go back together while the others stand: a body is in the way")
+    words = f"{named} together back along the program"
+    return RecoveryPhase(kind=RecoveryKind.HOLDERS_BACK, robots=group, words=words, q=rows)
 
-    def phase(self, q: Array) -> RecoveryPhase:
-        """The holders of the part as they came while all others stand.
 
-        Raises:
-            TransferNotFoundError: Something is in their way.
-        """
-        named = ", ".join(self._group)
-        place = self._places.at(self._state.times[self._group[0]])
-        first = self._places.motion.q[self._places.rows(place).start]
-        path = self._path_of_group(place, q, first)
-        if path is None or set(self._state.standing) & set(self._group):
-            raise TransferNotFoundError(f"{named} hold the part together and cannot be moved one by one")
-        rows = timed_rows(path, transfer_retimer(self._scene))
-        if not certify(self._scene, rows, with_minimum=False).is_kept:
-            raise TransferNotFoundError(f"{named} cannot go back together while the others stand: a body is in the way")
-        words = f"{named} together back along the program"
-        return RecoveryPhase(kind=RecoveryKind.HOLDERS_BACK, robots=self._group, words=words, q=rows)
+def _path_of_group(places: RunPlaces, last: float, q: Array, columns: Flags) -> RowsPath | None:
+    """The way of the holders back to where their phase begins; None where that is not where the program begins.
 
-    def _path_of_group(self, place: int, q: Array, first: Array) -> RowsPath | None:
-        """The way of the holders back to the beginning of a phase; None where that is not where the program begins."""
-        motion, rows, columns = self._places.motion, self._places.rows(place), joints_of(self._places.cell, self._group)
-        last = self._state.times[self._group[0]]
-        inner = [row for row in range(rows.start, rows.stop) if motion.times[row] < last - SAME]
-        if not inner or np.any(np.abs(first - motion.q[0])[columns] > SAME):
-            return None
-        way = np.tile(q, (len(inner) + 1, 1))
-        way[1:, columns] = motion.q[inner][::-1][:, columns]
-        return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), way)
+    Args:
+        last: Time of the program in [s] at which they stand.
+        q: Where all robots stand in [rad] or [m], shape (nq,).
+        columns: Which joints are those of the holders, shape (nq,).
+    """
+    motion, rows = places.motion, places.rows(places.at(last))
+    inner = [row for row in range(rows.start, rows.stop) if motion.times[row] < last - SAME]
+    if not inner or np.any(np.abs(motion.q[rows.start] - motion.q[0])[columns] > SAME):
+        return None
+    way = np.tile(q, (len(inner) + 1, 1))
+    way[1:, columns] = motion.q[inner][::-1][:, columns]
+    return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), way)

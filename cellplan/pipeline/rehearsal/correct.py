@@ -153,13 +153,8 @@ class _Executions:
         )
         figures = Round(
             number=len(self.all),
-            position={
-                accuracy.task: largest(accuracy.position_error, job.judged_from[accuracy.task]) for accuracy in accuracy
-            },
-            orientation={
-                accuracy.task: largest(accuracy.orientation_error, job.judged_from[accuracy.task])
-                for accuracy in accuracy
-            },
+            position={one.task: largest(one.position_error, job.judged_from[one.task]) for one in accuracy},
+            orientation={one.task: largest(one.orientation_error, job.judged_from[one.task]) for one in accuracy},
             share=worst_share(job.cell, accuracy, job.judged_from),
             measured_share=worst_share(job.cell, measured_accuracy, job.judged_from),
         )

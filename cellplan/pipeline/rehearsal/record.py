@@ -198,11 +198,12 @@ def _draw_record(cell: Cell, draw: Draw) -> Record:
     robots: dict[str, Any] = {}
     for robot in cell.robots:
         drawn = draw.robots[robot.name]
-        scales = [math.degrees(1.0) if joint.is_revolute else 1e3 for joint in robot.model.joints]
-        units = ["deg" if joint.is_revolute else "mm" for joint in robot.model.joints]
-        named = list(zip(robot.model.joint_names, units, scales, drawn.joint_offsets, strict=True))
+        joints = list(zip(robot.model.joints, drawn.joint_offsets, strict=True))
         robots[robot.name] = {
-            "joint_offsets": {f"{name}_{unit}": number(scale * value) for name, unit, scale, value in named},
+            "joint_offsets": {
+                f"{joint.name}_{joint.display_unit.name}": number(joint.display_unit.scale * value)
+                for joint, value in joints
+            },
             "link_lengths_mm": {
                 name: number(1e3 * value)
                 for name, value in zip(robot.model.joint_names, drawn.link_lengths, strict=True)

@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from io import StringIO
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall
+from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanWall, length_text
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -172,7 +173,7 @@ def _draw_dimension(document: "Drawing", dimension: Dimension, *, corner: Array,
             "defpoint3": _point(second),
             "text_midpoint": _point(middle),
             "angle": 0.0 if dimension.axis == 0 else 90.0,
-            "text": _length(dimension),
+            "text": length_text(dimension.length),
             "actual_measurement": _number(dimension.length),
         },
     )
@@ -190,14 +191,9 @@ def _fill_block(
         slant = TICK * height * (along + across)
         block.add_line(_point(end - slant), _point(end + slant), dxfattribs=attributes)
     turn = 0.0 if dimension.axis == 0 else 90.0
-    text = block.add_text(_length(dimension), height=_number(height), rotation=turn, dxfattribs=attributes)
+    text = block.add_text(length_text(dimension.length), height=_number(height), rotation=turn, dxfattribs=attributes)
     text.dxf.halign, text.dxf.valign = 4, 0  # its middle is where it is put
     text.dxf.insert = text.dxf.align_point = _point(middle)
-
-
-def _length(dimension: Dimension) -> str:
-    """Length of a dimension as text."""
-    return f"{dimension.length:.1f}".removesuffix(".0")
 
 
 def _ends(wall: PlanWall, low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -220,12 +216,7 @@ def _text(space: "Modelspace", layer: str, words: str, *, at: Array, height: flo
 
 def _points(line: Array) -> list[tuple[float, float]]:
     """Points of a line, those that are one once."""
-    points: list[tuple[float, float]] = []
-    for point in line:
-        place = _point(point)
-        if not points or points[-1] != place:
-            points.append(place)
-    return points
+    return [place for place, _ in groupby(map(_point, line))]
 
 
 def _point(point: Array) -> tuple[float, float]:

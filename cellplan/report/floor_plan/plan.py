@@ -140,3 +140,8 @@ def distinct(places: list[float]) -> list[float]:
         if not distinct_values or place - distinct_values[-1] > SAME_PLACE:
             distinct_values.append(place)
     return distinct_values
+
+
+def length_text(length: float) -> str:
+    """A length in [mm] as text."""
+    return f"{length:.1f}".removesuffix(".0")

@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import groupby
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanRobot, PlanWall
+from cellplan.report.floor_plan.plan import Dimension, FloorPlan, Layer, PlanRobot, PlanWall, length_text
 from cellplan.report.floor_plan.style import style
 from cellplan.report.record.common import shortened
 
@@ -133,7 +134,7 @@ def _dimension(dimension: Dimension, sheet: Sheet) -> Iterator[str]:
         lines = f"M{a:.1f} {at - 45:.1f}V{at + 12:.1f}M{b:.1f} {at - 45:.1f}V{at + 12:.1f}M{a:.1f} {at:.1f}H{b:.1f}"
         ticks = "".join(f"M{x - 9:.1f} {at + 9:.1f}L{x + 9:.1f} {at - 9:.1f}" for x in (a, b))
         yield f'<path class="dimension" d="{lines}{ticks}"/>'
-        yield _text("length", 0.5 * (a + b), at - 10, _length(dimension.length))
+        yield _text("length", 0.5 * (a + b), at - 10, length_text(dimension.length))
         return
     at = sheet.low[0] - BAND - ROW * dimension.row
     lines = f"M{at + 45:.1f} {d:.1f}H{at - 12:.1f}M{at + 45:.1f} {c:.1f}H{at - 12:.1f}M{at:.1f} {d:.1f}V{c:.1f}"
@@ -142,13 +143,8 @@ def _dimension(dimension: Dimension, sheet: Sheet) -> Iterator[str]:
     x, y = at - 10, 0.5 * (c + d)
     yield (
         f'<text class="length" x="{x:.1f}" y="{y:.1f}" transform="rotate(-90 {x:.1f} {y:.1f})">'
-        f"{_length(dimension.length)}</text>"
+        f"{length_text(dimension.length)}</text>"
     )
-
-
-def _length(length: float) -> str:
-    """A length in [mm] as text."""
-    return f"{length:.1f}".removesuffix(".0")
 
 
 def _reach(robot: PlanRobot, sheet: Sheet, kind: str) -> str:
@@ -183,7 +179,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield _text("key", left + 28, y, shortened(robot.name, NAME_ABOVE))
         y += TEXT * (_lines(robot) - 1)
         cells = (
-            *(_length(float(coordinate)) for coordinate in robot.base),
+            *(length_text(float(coordinate)) for coordinate in robot.base),
             f"{robot.yaw_deg:.1f}°".replace(".0°", "°"),
         )
         reach = "–" if robot.reach is None else f"{robot.reach:.0f}"
@@ -260,12 +256,7 @@ def _closed(lines: Iterable[Array]) -> str:
 
 def _points(line: Array) -> str:
     """Points in units, those that are one once."""
-    points: list[str] = []
-    for x, y in line.tolist():
-        text = f"{x:.1f} {y:.1f}"
-        if not points or points[-1] != text:
-            points.append(text)
-    return "L".join(points)
+    return "L".join(point for point, _ in groupby(f"{x:.1f} {y:.1f}" for x, y in line.tolist()))
 
 
 def _text(kind: str, x: float, y: float, words: str) -> str:

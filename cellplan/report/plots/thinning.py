@@ -7,9 +7,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 
-ROUND_SHARES: Final = tuple(
-    4.0**k / 341.0 for k in range(5)
-)  # [-] of the tolerance in each round: steps of twice the length leave a bent curve four times as far
+# [-] of the tolerance in each round: steps of twice the length leave a bent curve four times as far
+ROUND_SHARES: Final = tuple(4.0**k / 341.0 for k in range(5))
 
 
 def peaks_kept(values: Array, points: int) -> Indices:

@@ -11,9 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.mesh.decimate import decimated
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere, bounding_sphere, support_point
 
-LONGEST: Final = (
-    0.25  # [m] of an edge along a box or a cylinder: facets are painted whole, in the order of their depths
-)
+LONGEST: Final = 0.25  # [m] of an edge along a box or a cylinder: facets are painted whole, in order of depth
 MOST_PARTS: Final = 12  # [-] of one edge
 SILHOUETTE: Final = np.pi / 4.0 * (np.arange(8) + 0.5)  # [rad] directions of the corners of a silhouette
 FEWEST_SIDES, MOST_SIDES = 6, 48  # [-] of a round solid

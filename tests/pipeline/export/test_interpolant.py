@@ -14,25 +14,12 @@ def test_a_cubic_with_its_own_speeds_is_given_back() -> None:
     t = np.linspace(0.0, 1.7, 401)
 
     np.testing.assert_allclose(curve.at(t)[:, 0], cubic(t), atol=1e-14)
-    np.testing.assert_allclose(curve.speeds(t)[:, 0], cubic.deriv()(t), atol=1e-13)
-
-
-def test_speeds_are_the_derivative_of_positions() -> None:
-    rng = np.random.default_rng(4)
-    curve = HermiteRows(times=UNEVEN, q=rng.normal(size=(6, 3)), qd=rng.normal(size=(6, 3)))
-    t, step = rng.uniform(0.01, 1.69, 200), 1e-6
-    t = t[np.abs(t[:, None] - UNEVEN).min(axis=1) > step]
-
-    differences = (curve.at(t + step) - curve.at(t - step)) / (2.0 * step)
-
-    np.testing.assert_allclose(curve.speeds(t), differences, atol=1e-6)
 
 
 def test_the_curve_holds_outside_of_its_rows() -> None:
     curve = HermiteRows(times=UNEVEN, q=UNEVEN[:, None], qd=np.ones((6, 1)))
 
     np.testing.assert_array_equal(curve.at(np.array([-1.0, 2.0]))[:, 0], [0.0, 1.7])
-    np.testing.assert_array_equal(curve.speeds(np.array([-1.0, 2.0]))[:, 0], [0.0, 0.0])
 
 
 def test_extremes_and_accelerations_are_those_of_a_dense_curve() -> None:
