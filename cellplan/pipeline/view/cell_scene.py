@@ -21,14 +21,14 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows, touching_pairs
-from cellplan.pipeline.view.result import FailureRecord, SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.transfer.best_try import STEP as TRY_STEP
 from cellplan.planning.transfer.best_try import BlockedTry
+from cellplan.report.record.common import Record
 from cellplan.scene.scene import Scene
 
 
-def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = silent) -> SceneViewRecord:
+def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = silent) -> Record:
     """The scene of a cell at its start, what ``check`` finds, and the bases for moving them.
 
     Where no start is found the robots stand at the starts and homes that are given, others in the middle of their
@@ -55,7 +55,7 @@ def unsolved_scene(cell: Cell, geometries: Geometries, *, progress: Progress = s
     }
 
 
-def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> Iterator[FailureRecord]:
+def _further(failures: Iterable[tuple[str, str]], record: Record) -> Iterator[Record]:
     """Failures by subject and message, but for pairs that are known to touch."""
     index = {body["name"]: number for number, body in enumerate(record["bodies"])}
     known = [set(failure["bodies"]) for failure in record["failures"]]
@@ -65,7 +65,7 @@ def _further(failures: Iterable[tuple[str, str]], record: SceneViewRecord) -> It
             yield {**_failure(message), "bodies": bodies}
 
 
-def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> SceneViewRecord:
+def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Record:
     """The scene of the best try of a transfer move that was not found, in nominal time.
 
     Args:
@@ -85,7 +85,7 @@ def blocked_scene(blocked: BlockedTry, what: str, geometries: Geometries) -> Sce
     }
 
 
-def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
+def standing_scene(scene: Scene, geometries: Geometries) -> Record:
     """The scene of a cell whose robots stand still at their starts."""
     q = np.concatenate([standing(robot) for robot in scene.cell.robots])
     touching = touching_pairs(scene, q)
@@ -99,7 +99,7 @@ def standing_scene(scene: Scene, geometries: Geometries) -> SceneViewRecord:
     }
 
 
-def _scene(scene: Scene, times: Array, q: Array, geometries: Geometries) -> SceneViewRecord:
+def _scene(scene: Scene, times: Array, q: Array, geometries: Geometries) -> Record:
     """Robots, bodies and paths of a cell at times of shape (K,), in configurations of shape (K, nq)."""
     cell = scene.cell
     tasks, faults = task_records(cell)
@@ -138,6 +138,6 @@ def _pair_text(scene: Scene, pair: tuple[int, int]) -> str:
     return f"'{scene.bodies[pair[0]].name}' touches '{scene.bodies[pair[1]].name}' at the start"
 
 
-def _failure(text: str) -> FailureRecord:
+def _failure(text: str) -> Record:
     """Something that failed without an instant."""
     return {"text": text, "at": None, "bodies": [], "joint": []}

@@ -13,22 +13,10 @@ from cellplan.model.mounting import Hanger, Mount, Pedestal, Wedge
 from cellplan.model.task import Frame, Task
 from cellplan.model.units import DEG, MM
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.result import (
-    AxisRecord,
-    BaseRecord,
-    BodyViewRecord,
-    ExcludedRecord,
-    JointViewRecord,
-    PlaceRecord,
-    RobotViewRecord,
-    TaskViewRecord,
-    VisualRecord,
-    point_numbers,
-    pose_numbers,
-)
+from cellplan.pipeline.view.result import point_numbers, pose_numbers
 from cellplan.planning.path.build import build_toolpath
 from cellplan.report.plots.palette import robot_colours
-from cellplan.report.record.common import number
+from cellplan.report.record.common import Record, number
 from cellplan.scene.bodies import Kind, SceneBody, part_body
 from cellplan.scene.scene import Scene
 
@@ -36,13 +24,13 @@ PATH_POINTS: Final = 240  # [-] drawn along a path
 FILE_DECIMALS: Final = 6  # of [mm] and [deg] in a cell file
 
 
-def robot_records(cell: Cell) -> list[RobotViewRecord]:
+def robot_records(cell: Cell) -> list[Record]:
     """All robots in the order of the cell."""
     colours = robot_colours(cell)
     return [_robot(cell, robot, colours[robot.name]) for robot in cell.robots]
 
 
-def _robot(cell: Cell, robot: Robot, colour: str) -> RobotViewRecord:
+def _robot(cell: Cell, robot: Robot, colour: str) -> Record:
     """One robot."""
     model = robot.model
     return {
@@ -52,14 +40,14 @@ def _robot(cell: Cell, robot: Robot, colour: str) -> RobotViewRecord:
         "base": pose_numbers(robot.X_WB),
         "column": cell.columns(robot.name).start,
         "joints": [
-            JointViewRecord(
-                name=joint.name,
-                unit=joint.display_unit.name,
-                scale=joint.display_unit.scale,
-                lower=number(joint.lower),
-                upper=number(joint.upper),
-                velocity=float(joint.velocity),
-            )
+            {
+                "name": joint.name,
+                "unit": joint.display_unit.name,
+                "scale": joint.display_unit.scale,
+                "lower": number(joint.lower),
+                "upper": number(joint.upper),
+                "velocity": float(joint.velocity),
+            }
             for joint in model.joints
         ],
         "axes": [_axis(robot, link) for link in range(len(model.axes))],
@@ -68,7 +56,7 @@ def _robot(cell: Cell, robot: Robot, colour: str) -> RobotViewRecord:
     }
 
 
-def _axis(robot: Robot, link: int) -> AxisRecord:
+def _axis(robot: Robot, link: int) -> Record:
     """The axis that moves a link."""
     axis, drive = robot.model.axes[link], robot.model.drive(link)
     return {
@@ -82,7 +70,7 @@ def _axis(robot: Robot, link: int) -> AxisRecord:
     }
 
 
-def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[BodyViewRecord]:
+def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[Record]:
     """All bodies of a scene in its order."""
     drawn = {robot.name: {visual.link for visual in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
     replaced = {
@@ -110,9 +98,9 @@ def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries
     ]
 
 
-def visual_records(cell: Cell, geometries: Geometries) -> list[VisualRecord]:
+def visual_records(cell: Cell, geometries: Geometries) -> list[Record]:
     """What the files of the robots draw of their links."""
-    records: list[VisualRecord] = []
+    records: list[Record] = []
     for index, robot in enumerate(cell.robots):
         links = {link.name: link for link in robot.model.links}
         for visual in geometries.visuals_of(cell, robot.name):
@@ -140,7 +128,7 @@ def _outline(mount: Mount | None) -> list[float]:
     return point_numbers(np.stack(mount.outline(), axis=1)) if isinstance(mount, Wedge) else []
 
 
-def place_record(cell: Cell, begin: float) -> PlaceRecord:
+def place_record(cell: Cell, begin: float) -> Record:
     """What carries the part of a cell, from an instant on."""
     body = part_body(cell, cell.part, *cell.part.held_by[:1])
     X_SP = np.linalg.inv(cell.part.X_PS)
@@ -152,9 +140,9 @@ def place_record(cell: Cell, begin: float) -> PlaceRecord:
     }
 
 
-def task_records(cell: Cell) -> tuple[list[TaskViewRecord], list[str]]:
+def task_records(cell: Cell) -> tuple[list[Record], list[str]]:
     """All tasks with points along their paths, and why some have none."""
-    records, faults = list[TaskViewRecord](), list[str]()
+    records, faults = list[Record](), list[str]()
     for task in cell.tasks:
         try:
             points = path_points(cell, task)
@@ -181,7 +169,7 @@ def path_points(cell: Cell, task: Task) -> Array:
     return toolpath.poses(lengths)[:, :3, 3]
 
 
-def excluded_records(scene: Scene) -> list[ExcludedRecord]:
+def excluded_records(scene: Scene) -> list[Record]:
     """Pairs of which less than the clearance is demanded, by reason: not watched ones, then those with another rule."""
     by_reason: dict[str, list[list[int]]] = {}
     for exclusion in scene.excluded:
@@ -192,9 +180,9 @@ def excluded_records(scene: Scene) -> list[ExcludedRecord]:
     return [{"reason": reason, "pairs": pairs} for reason, pairs in by_reason.items()]
 
 
-def base_records(cell: Cell) -> list[BaseRecord]:
+def base_records(cell: Cell) -> list[Record]:
     """The base of each robot in the numbers of the cell file."""
-    records: list[BaseRecord] = []
+    records: list[Record] = []
     for index, robot in enumerate(cell.robots):
         X = robot.X_WB
         records.append(

@@ -12,7 +12,8 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Mesh, Sh
 from cellplan.io.cell.visuals import robot_visuals
 from cellplan.io.robots.urdf.visuals import Visual
 from cellplan.model.cell import Cell
-from cellplan.pipeline.view.result import GeometryRecord, Numbers, packed, point_numbers
+from cellplan.pipeline.view.result import Numbers, packed, point_numbers
+from cellplan.report.record.common import Record
 
 MESH_TRIANGLES: Final = 160_000  # [-] of all meshes of a page: 2 MB, and smooth where a browser draws without hardware
 FEWEST: Final = 400  # [-] triangles that every mesh may keep
@@ -30,7 +31,7 @@ class Geometries:
         weights: Number of triangles that each mesh has in its file, by its key.
     """
 
-    records: list[GeometryRecord] = field(default_factory=list)  # the shapes
+    records: list[Record] = field(default_factory=list)  # the shapes
     visuals: dict[str, tuple[Visual, ...]] = field(default_factory=dict)
     weights: dict[Hashable, int] = field(default_factory=dict)
     _places: dict[Hashable, int] = field(default_factory=dict)
@@ -56,7 +57,7 @@ class Geometries:
             self.records.append(self._record(shape))
         return self._places[key]
 
-    def _record(self, shape: Shape) -> GeometryRecord:
+    def _record(self, shape: Shape) -> Record:
         """One shape."""
         match shape:
             case Box(size):
@@ -81,7 +82,7 @@ def shape_key(shape: Shape) -> Hashable:
     return shape.source, sha256(shape.vertices.tobytes() + np.ascontiguousarray(shape.faces).tobytes()).digest()
 
 
-def mesh_record(mesh: Mesh, limit: int) -> GeometryRecord:
+def mesh_record(mesh: Mesh, limit: int) -> Record:
     """A mesh with about as many triangles as a limit says, its points on a grid of 16 bit along each axis."""
     drawn = decimated(mesh, limit)
     low = drawn.points.min(axis=0)

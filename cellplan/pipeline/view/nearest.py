@@ -10,7 +10,8 @@ from cellplan.collision.bodies import BodyPoses
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.transforms import inverse
 from cellplan.model.units import MM
-from cellplan.pipeline.view.result import NearestRecord, point_numbers
+from cellplan.pipeline.view.result import point_numbers
+from cellplan.report.record.common import Record
 from cellplan.scene.bodies import SceneBody, is_ground
 from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
@@ -49,7 +50,7 @@ def sampled_rows(times: Array, further: Iterable[float | None], steps: int = SAM
     return np.unique(np.concatenate([rows, np.array(named, dtype=np.intp)]))
 
 
-def nearest_record(stretches: Sequence[ViewedStretch], times: Array, q: Array, rows: Indices) -> NearestRecord:
+def nearest_record(stretches: Sequence[ViewedStretch], times: Array, q: Array, rows: Indices) -> Record:
     """The closest pair of bodies that move against each other and are to keep a clearance, at some rows.
 
     Args:
@@ -58,15 +59,15 @@ def nearest_record(stretches: Sequence[ViewedStretch], times: Array, q: Array, r
         rows: The rows, ascending.
     """
     chosen = times[rows]
-    record = NearestRecord(
-        step=round(float(np.diff(chosen).max(initial=0.0)), 6),
-        required=stretches[0].scene.cell.checks.clearance_mm,
-        times=[round(float(time), 9) for time in chosen],
-        pairs=[],
-        distances=[],
-        lower_bound=[],
-        points=[],
-    )
+    record: Record = {
+        "step": round(float(np.diff(chosen).max(initial=0.0)), 6),
+        "required": stretches[0].scene.cell.checks.clearance_mm,
+        "times": [round(float(time), 9) for time in chosen],
+        "pairs": [],
+        "distances": [],
+        "lower_bound": [],
+        "points": [],
+    }
     queries = SURFACES
     for stretch in stretches:
         selected = rows[(rows >= stretch.first) & (rows < stretch.end)]
@@ -116,7 +117,7 @@ class _ClosestSearch:
         return self.poses.R[body, sample].T @ (point - self.poses.p[body, sample])
 
 
-def _search(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
+def _search(scene: Scene, q: Array, record: Record, queries: int) -> int:
     """Add the closest pair at some configurations, shape (K, nq); gives the surface queries that are left."""
     counted = np.array([_counts(scene, pair) for pair in scene.pairs], dtype=bool)
     search = _ClosestSearch(scene, scene.body_poses(q), queries)
@@ -136,7 +137,7 @@ def _search(scene: Scene, q: Array, record: NearestRecord, queries: int) -> int:
     return search.queries
 
 
-def _add(record: NearestRecord, search: _ClosestSearch, sample: int, closest_pair: Closest | None) -> None:
+def _add(record: Record, search: _ClosestSearch, sample: int, closest_pair: Closest | None) -> None:
     """Add what was found at a configuration."""
     pair = None if closest_pair is None else search.scene.pairs[closest_pair.row]
     record["pairs"].append([] if pair is None else [pair.first, pair.second])

@@ -1,13 +1,33 @@
 """A 3-D page: its record of bodies, joints, paths, motion and what the checks found, and the one file that shows it.
 
 Lengths in the record are in [m] and angles in [rad], as the page computes with them; poses are the upper three rows of
-a matrix, row by row. Arrays are little-endian and in base64.
+a matrix, row by row. Arrays are little-endian and in base64. Robots, links, bodies and joints are named by their
+numbers; -1 is no robot, or the base. Keys whose names do not say all:
+
+- page: ``kind`` is run, cell or study; ``source`` is the cell file, for the command that the page shows, with
+  ``settings`` as ``KEY=VALUE``.
+- shape: ``box`` edge lengths, ``cylinder`` radius and length, ``capsule`` radius and length of its line, ``sphere``
+  radius, ``plane`` nothing: everything below z = 0 is solid. Of a mesh ``low`` is the lowest corner and ``size`` the
+  edges of the box that holds it; ``points`` have 16 bit for each coordinate, from 0 at ``low`` to 65535 at its other
+  end, ``triangles`` 16 bit for each corner, or 32 of more than 65536 points; ``deviation``: no point that is drawn is
+  farther than this from the file's.
+- robot: ``base`` is its pose in the world, ``column`` the number of its first joint among those of all robots, ``tip``
+  the pose of its tool tip at the reference configuration; the ``axes`` are those there, in the frame of the base; the
+  ``scale`` of a joint is its printed value per value in SI units.
+- body: ``accuracy`` is how far the real thing may stick out of it; ``replaced`` says that the robot's file draws its
+  link otherwise; ``stands`` is the height of the floor or the ceiling of an upright column, ``outline`` the corners of
+  one that is cut off along the plane of a base, from above.
+- motion: joints move linearly between rows; ``total`` counts those of the program, of which fewer are in the page where
+  it is long; ``times`` have 64 bit, ``q`` 32 bit for each joint.
+- nearest: ``step`` is the largest time between two samples; ``pairs`` are empty where none is near; ``lower_bound``
+  says that the distance is that of convex hulls, never above the true one; ``points`` are in the frames of both bodies.
+- certified: ``distances`` are kept all through the block that holds the time; null where none is near.
 """
 
 import json
 from base64 import b64encode
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, TypedDict
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,220 +35,19 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.units import MM
 from cellplan.report.page.render import template
 from cellplan.report.page.view import MARK
+from cellplan.report.record.common import Record
 
 SCHEMA: Final = "cellplan.view/1"
 POSE_DECIMALS: Final = 9  # [m]: far below what a picture shows
 POINT_DECIMALS: Final = 6  # [m] of paths and nearest points
 
-SCRIPTS: Final = (
-    "algebra",
-    "kinematics",
-    "shapes",
-    "camera",
-    "webgl",
-    "painter",
-    "sight",
-    "stage",
-    "traces",
-    "dom",
-    "player",
-    "controls",
-    "panels",
-    "bases",
-    "main",
-)  # each after those that it needs
+_SCRIPTS: Final = (
+    "algebra kinematics shapes camera webgl painter sight stage traces dom player controls panels bases main"
+)
+SCRIPTS: Final = _SCRIPTS.split()  # each after those that it needs
+
 Numbers = list[float]
-
-
-class GeometryRecord(TypedDict, total=False):
-    """A shape: one of the solids by its dimensions, or a mesh."""
-
-    box: Annotated[Numbers, "edge lengths"]
-    cylinder: Annotated[Numbers, "radius and length"]
-    capsule: Annotated[Numbers, "radius and length of its line"]
-    sphere: Annotated[Numbers, "radius"]
-    plane: Annotated[Numbers, "empty: everything below z = 0 is solid"]
-    low: Annotated[Numbers, "of a mesh: lowest corner"]
-    size: Annotated[Numbers, "of a mesh: edges of the box that holds it"]
-    points: Annotated[str, "of a mesh: 16 bit for each coordinate, from 0 at `low` to 65535 at `low` + `size`"]
-    triangles: Annotated[str, "of a mesh: 16 bit for each corner, or 32 bit of more than 65536 points"]
-    deviation: Annotated[float, "of a mesh: no point that is drawn is farther than this from the file's"]
-
-
-class JointViewRecord(TypedDict):
-    """A driven joint."""
-
-    name: str
-    unit: Annotated[str, "`deg` or `mm`"]
-    scale: Annotated[float, "printed value per value in SI units"]
-    lower: float | None
-    upper: float | None
-    velocity: float
-
-
-class AxisRecord(TypedDict):
-    """An axis that moves a link, at the configuration where all joints read zero, in the frame of the base."""
-
-    parent: Annotated[int, "number of the link that carries it, -1 for the base"]
-    turns: bool
-    axis: Numbers
-    point: Numbers
-    joint: Annotated[int, "number of the joint that drives it"]
-    ratio: float
-    offset: float
-
-
-class RobotViewRecord(TypedDict):
-    """A robot."""
-
-    name: str
-    model: str
-    colour: str
-    base: Annotated[Numbers, "pose of its base in the world"]
-    column: Annotated[int, "number of its first joint among those of all robots"]
-    joints: list[JointViewRecord]
-    axes: list[AxisRecord]
-    tip_link: int
-    tip: Annotated[Numbers, "pose of its tool tip at the reference configuration"]
-
-
-class BodyViewRecord(TypedDict):
-    """A body of the proof."""
-
-    name: str
-    kind: str
-    robot: Annotated[int, "number of the robot that moves it, -1 for none"]
-    link: int
-    geometry: int
-    pose: Numbers
-    accuracy: Annotated[float | None, "how far the real thing may stick out of it"]
-    replaced: Annotated[bool, "whether the robot's file draws its link otherwise"]
-    stands: Annotated[dict[str, float], "of an upright column: height of the `floor` or of the `ceiling`"]
-    outline: Annotated[Numbers, "of a column cut off along the plane of a base: its corners seen from above, x and y"]
-
-
-class VisualRecord(TypedDict):
-    """What a robot's file draws of a link."""
-
-    robot: int
-    link: int
-    geometry: int
-    pose: Numbers
-
-
-class PlaceRecord(TypedDict):
-    """What carries the part from an instant on."""
-
-    begin: float
-    robot: int
-    link: int
-    pose: Annotated[Numbers, "of the part frame"]
-
-
-class TaskViewRecord(TypedDict):
-    """A task and its path."""
-
-    name: str
-    robot: int
-    in_world: bool
-    points: Annotated[Numbers, "x, y, z of points along the path, in the part frame or in the world"]
-
-
-class MotionViewRecord(TypedDict):
-    """Joint positions over time; joints move linearly between the rows."""
-
-    count: int
-    total: Annotated[int, "rows of the program; fewer are in the page where it is long"]
-    times: Annotated[str, "64 bit for each row"]
-    q: Annotated[str, "32 bit for each row and joint"]
-    phases: Annotated[list[dict[str, Any]], "name, begin and end"]
-
-
-class NearestRecord(TypedDict):
-    """The closest pair at some sample times."""
-
-    step: Annotated[float, "largest time between two of them"]
-    required: float
-    times: Numbers
-    pairs: Annotated[list[list[int]], "two bodies; empty where none is near"]
-    distances: Numbers
-    lower_bound: Annotated[list[bool], "whether the distance is that of convex hulls, never above the true one"]
-    points: Annotated[list[Numbers], "the nearest points, each in the frame of its body"]
-
-
-class ClearanceCurveRecord(TypedDict):
-    """What the report of a run certifies over time; empty where nothing is certified."""
-
-    times: Numbers
-    distances: Annotated[list[float | None], "kept all through the block that holds the time; null where none is near"]
-
-
-class ContactViewRecord(TypedDict):
-    """Two bodies that touch for a while."""
-
-    bodies: list[int]
-    first: float
-    last: float
-    allowed: bool
-    text: str
-
-
-class FailureRecord(TypedDict):
-    """Something that failed, and where."""
-
-    text: str
-    at: float | None
-    bodies: list[int]
-    joint: Annotated[list[int], "number of the robot and of its joint; empty for none"]
-
-
-class ExcludedRecord(TypedDict):
-    """Pairs that are not checked, or less than others, for one reason."""
-
-    reason: str
-    pairs: list[list[int]]
-
-
-class BaseRecord(TypedDict):
-    """The base of a robot as its cell file has it."""
-
-    robot: int
-    xyz_mm: Numbers
-    rpy_deg: Numbers
-
-
-class SceneViewRecord(TypedDict):
-    """One layout of a cell and its motion."""
-
-    name: str
-    facts: Annotated[list[list[str]], "pairs of a label and a value"]
-    remarks: list[str]
-    passed: bool | None
-    robots: list[RobotViewRecord]
-    bodies: list[BodyViewRecord]
-    visuals: list[VisualRecord]
-    part: list[PlaceRecord]
-    tasks: list[TaskViewRecord]
-    motion: MotionViewRecord
-    nearest: NearestRecord
-    certified: ClearanceCurveRecord
-    contacts: list[ContactViewRecord]
-    failures: list[FailureRecord]
-    excluded: list[ExcludedRecord]
-    bases: Annotated[list[BaseRecord], "of a cell whose bases may be moved; else empty"]
-
-
-class ViewRecord(TypedDict):
-    """A 3-D page."""
-
-    schema: str
-    kind: Annotated[str, "`run`, `cell` or `study`"]
-    cell: str
-    source: Annotated[str, "the cell file, for the command that the page shows"]
-    settings: Annotated[list[str], "values that were set in it, as `KEY=VALUE`"]
-    geometries: list[GeometryRecord]
-    scenes: list[SceneViewRecord]
-    caution: str
+ViewRecord = Record
 
 
 def pose_numbers(X: Array) -> Numbers:

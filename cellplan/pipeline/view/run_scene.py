@@ -23,15 +23,7 @@ from cellplan.pipeline.view.describe import (
 )
 from cellplan.pipeline.view.geometries import Geometries
 from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows
-from cellplan.pipeline.view.result import (
-    ClearanceCurveRecord,
-    ContactViewRecord,
-    FailureRecord,
-    MotionViewRecord,
-    PlaceRecord,
-    SceneViewRecord,
-    packed,
-)
+from cellplan.pipeline.view.result import packed
 from cellplan.report.record.common import Record
 from cellplan.report.record.common import number as plain
 from cellplan.report.record.numbers import floored, seconds
@@ -58,7 +50,7 @@ class ViewedPhase:
     distances: Array  # what all pairs keep about each of them in [mm], shape (M,); what is not finite is not known
 
 
-def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneViewRecord:
+def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> Record:
     """The scene of a run.
 
     Raises:
@@ -98,7 +90,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> SceneVie
     }
 
 
-def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> MotionViewRecord:
+def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> Record:
     """A motion, every n-th row of a long one and the last.
 
     Args:
@@ -192,9 +184,9 @@ def _phases(record: Record) -> list[dict[str, Any]]:
     return [{"name": phase["name"], "begin": phase["begin_s"], "end": phase["end_s"]} for phase in phases]
 
 
-def _part_places(played: Sequence[ViewedPhase], cells: Sequence[Cell]) -> list[PlaceRecord]:
+def _part_places(played: Sequence[ViewedPhase], cells: Sequence[Cell]) -> list[Record]:
     """What carries the part, phase by phase; a phase in which it stays where it was is left out."""
-    places: list[PlaceRecord] = []
+    places: list[Record] = []
     for one in played:
         place = place_record(cells[one.number], one.begin)
         if not places or any(place[key] != places[-1][key] for key in ("robot", "link", "pose")):
@@ -202,16 +194,11 @@ def _part_places(played: Sequence[ViewedPhase], cells: Sequence[Cell]) -> list[P
     return places
 
 
-def _certified(played: Sequence[ViewedPhase]) -> ClearanceCurveRecord:
+def _certified(played: Sequence[ViewedPhase]) -> Record:
     """The smallest distance of all classes over time, as the runs certify it."""
-    times, distances = (
-        np.concatenate([one.kept_times for one in played]),
-        np.concatenate([one.distances for one in played]),
-    )
-    return {
-        "times": np.round(times, TIME_DECIMALS).tolist(),
-        "distances": [plain(distance) for distance in np.round(distances, DISTANCE_DECIMALS).tolist()],
-    }
+    times = np.round(np.concatenate([one.kept_times for one in played]), TIME_DECIMALS)
+    distances = np.round(np.concatenate([one.distances for one in played]), DISTANCE_DECIMALS)
+    return {"times": times.tolist(), "distances": [plain(distance) for distance in distances.tolist()]}
 
 
 def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
@@ -228,7 +215,7 @@ def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
     return times, distances
 
 
-def _contacts(stored: StoredRun, played: Sequence[ViewedPhase], index: dict[str, int]) -> Iterator[ContactViewRecord]:
+def _contacts(stored: StoredRun, played: Sequence[ViewedPhase], index: dict[str, int]) -> Iterator[Record]:
     """What touches, on the clock of the program."""
     for one in played:
         for contact in stored.records[one.place].get("contacts", []):
@@ -242,11 +229,9 @@ def _contacts(stored: StoredRun, played: Sequence[ViewedPhase], index: dict[str,
             }
 
 
-def _failures(
-    stored: StoredRun, played: Sequence[ViewedPhase], cell: Cell, index: dict[str, int]
-) -> Iterator[FailureRecord]:
+def _failures(stored: StoredRun, played: Sequence[ViewedPhase], cell: Cell, index: dict[str, int]) -> Iterator[Record]:
     """Checks that failed, on the clock of the program, in the order of their times; those without one come last."""
-    failures: list[FailureRecord] = []
+    failures: list[Record] = []
     seen = set[str]()
     for one in played:
         for check in stored.records[one.place]["checks"]:

@@ -21,7 +21,6 @@ from cellplan.pipeline.plan.run import plan_run
 from cellplan.pipeline.view.cell_scene import standing_scene
 from cellplan.pipeline.view.geometries import Geometries, shape_key
 from cellplan.pipeline.view.nearest import ViewedStretch, nearest_record, sampled_rows
-from cellplan.pipeline.view.result import SceneViewRecord
 from cellplan.pipeline.view.run_scene import motion_record
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
@@ -71,9 +70,7 @@ def cell_of_study(folder: Path, given: Path | None, allow_dirs: Sequence[Path]) 
     return load_cell(path, allow_dirs=allow_dirs)
 
 
-def study_scenes(
-    record: Record, cell: Cell, file: str, geometries: Geometries, progress: Progress
-) -> Iterator[SceneViewRecord]:
+def study_scenes(record: Record, cell: Cell, file: str, geometries: Geometries, progress: Progress) -> Iterator[Record]:
     """A scene for each of the best layouts.
 
     Args:
@@ -123,7 +120,7 @@ def placed_scene(first: Scene | None, cell: Cell) -> Scene:
     return replace(first, cell=cell, chains=chains, bodies=bodies, engine=first.engine.with_bodies(made))
 
 
-def _moving(standing: SceneViewRecord, scene: Scene) -> SceneViewRecord:
+def _moving(standing: Record, scene: Scene) -> Record:
     """The scene with the motion that the layout has at the duration of the cell; as it stands where there is none."""
     cell = scene.cell
     phases = plan_phases(cell).program

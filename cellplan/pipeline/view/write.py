@@ -19,12 +19,13 @@ from cellplan.pipeline.layout.result_file import BEST
 from cellplan.pipeline.overrides import with_overrides
 from cellplan.pipeline.view.cell_scene import blocked_scene, unsolved_scene
 from cellplan.pipeline.view.geometries import Geometries
-from cellplan.pipeline.view.result import SCHEMA, SceneViewRecord, ViewRecord, view_page
+from cellplan.pipeline.view.result import SCHEMA, ViewRecord, view_page
 from cellplan.pipeline.view.run_scene import run_scene
 from cellplan.pipeline.view.study_scenes import cell_of_study, read_layout_study, study_scenes
 from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.view import is_view_page
+from cellplan.report.record.common import Record
 from cellplan.study.folder import JOURNAL, RESULT
 
 PAGE: Final = "3-D page"  # in messages
@@ -82,9 +83,8 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
     target = _target(request, Path("outputs") / f"{cell.name}-view.html")
     geometries = Geometries()
     scene = unsolved_scene(cell, geometries, progress=progress)
-    record = _record("cell", cell, geometries, [scene])
-    record["source"], record["settings"] = path.as_posix(), list(request.settings)
-    return record, target
+    about = {"source": path.as_posix(), "settings": list(request.settings)}
+    return {**_record("cell", cell, geometries, [scene]), **about}, target
 
 
 def _target(request: ViewRequest, usual: Path) -> Path:
@@ -164,7 +164,7 @@ def _view_of_study(request: ViewRequest, progress: Progress) -> ViewRecord:
     return _record("study", cell, geometries, scenes)
 
 
-def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[SceneViewRecord]) -> ViewRecord:
+def _record(kind: str, cell: Cell, geometries: Geometries, scenes: list[Record]) -> ViewRecord:
     """A page."""
     return {
         "schema": SCHEMA,
