@@ -1,17 +1,20 @@
 """Programs in the language of a maker: whose robots, which names and pages, how fast, and which rows are rounded."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
-from cellplan.export.joints import Axes
+from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
+from cellplan.export.head import head_notes
+from cellplan.export.joints import Axes, to_numbers
 from cellplan.export.text import ascii_text, safe_names
+from cellplan.export.timed_rows import decimals_of
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
@@ -128,10 +131,38 @@ def pages_of(count: int, frame: ExportFrame, dialect: Dialect) -> list[range]:
     return pages
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PagedProgram:
+    """What is written of one robot in one program."""
+
+    path: str  # path without an ending; its last part is its name
+    notes: Sequence[str]  # notes for the heads of its files
+    placed: Robot
+    rows: RobotRows
+    numbers: Array  # positions of its joints as they are written, shape (N, n)
+    decimals: int  # of these
+    speeds: Sequence[int]  # share of the top speed with which each row is approached in [%]
+    shares: Array  # of its segments within which each row is rounded, 0 for a stop, shape (N,)
+    first: Sequence[HandshakeStep]  # instructions before the first motion
+    steps: Sequence[HandshakeStep]  # instructions at a mark
+    pages: Sequence[range]  # rows of each page
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.path.rpartition("/")[2]
+
+    @property
+    def endings(self) -> list[str]:
+        """What the names of its pages end in; nothing for a single one."""
+        return [f"_{page:03d}" for page in range(1, len(self.pages) + 1)] if len(self.pages) > 1 else [""]
+
+
 def render_programs(
     job: ExportJob,
+    dialect: Dialect,
     paths: Mapping[tuple[str | None, str], str],
-    files_of: Callable[[ProgramRows, RobotRows, str], dict[str, str]],
+    files_of: Callable[[PagedProgram], dict[str, str]],
 ) -> dict[str, str]:
     """Text of every file by its path, from the files of each robot in a program; each may keep other rows.
 
@@ -139,7 +170,8 @@ def render_programs(
         paths: Path of each program, by its name and robot.
 
     Raises:
-        InputError: The robots do not meet at equally many marks, or one of them has no row.
+        InputError: The robots do not meet at equally many marks, one of them has no row, or a position cannot be
+            written with the decimals.
     """
     robots, files = list(dict.fromkeys(robot for _, robot in paths)), dict[str, str]()
     for program in job.programs:
@@ -148,9 +180,46 @@ def render_programs(
             got = ", ".join(f"{len(rows)} and {len(rows.marks)} of '{name}'" for name, rows in rows_of.items())
             name = program.name or job.frame.cell.name
             raise InputError(f"program '{name}': expected rows, and equal marks, got {got}")
-        for robot, rows in rows_of.items():
-            files |= files_of(program, rows, paths[program.name, robot])
+        for robot in robots:
+            files |= files_of(_paged(job, dialect, program, robot, paths[program.name, robot]))
     return files
+
+
+def _paged(job: ExportJob, dialect: Dialect, program: ProgramRows, robot: str, path: str) -> PagedProgram:
+    """All that the files of one robot in one program are made of."""
+    placed, rows = job.frame.robot(robot), program.robots[robot]
+    decimals = decimals_of(placed, dialect.decimals)
+    numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, dialect)
+    steps = handshake_steps(job.frame, robot) if rows.marks else ()
+    return PagedProgram(
+        path=path,
+        notes=head_notes(job, robot),
+        placed=placed,
+        rows=rows,
+        numbers=numbers,
+        decimals=decimals,
+        speeds=_percentages(placed, rows),
+        shares=_shares(row_shares(job, program)[robot], numbers, pages),
+        first=[lowering_step(job.frame, robot)] if steps else [],
+        steps=steps,
+        pages=pages,
+    )
+
+
+def _shares(shares: Array, numbers: Array, pages: Iterable[range]) -> Array:
+    """Shares within which a target rounds rows, shape (N,): as far as they may be, but for ends of pages.
+
+    Rows that stand on a neighbour are no corner that could be rounded.
+
+    Args:
+        numbers: Positions as they are written, shape (N, n).
+    """
+    flags = np.ones(len(shares), dtype=bool)
+    flags[[page[-1] for page in pages]] = False
+    moves = np.any(np.diff(numbers, axis=0) != 0.0, axis=1)
+    flags[1:] &= moves
+    flags[:-1] &= moves
+    return shares * flags
 
 
 def read_programs(
@@ -181,25 +250,7 @@ def read_programs(
     return tuple(ProgramRows(name=program, robots=robots) for program, robots in programs.items())
 
 
-def is_rounded(
-    job: ExportJob, program: ProgramRows, robot: str, numbers: Array, pages: Iterable[range]
-) -> NDArray[np.bool_]:
-    """Rows that a target rounds, shape (N,): those that it may, but for ends of pages.
-
-    Rows that stand on a neighbour are no corner that could be rounded.
-
-    Args:
-        numbers: Its positions as they are written, shape (N, n).
-    """
-    flags: NDArray[np.bool_] = row_shares(job, program)[robot] > 0.0
-    flags[[page[-1] for page in pages]] = False
-    moves = np.any(np.diff(numbers, axis=0) != 0.0, axis=1)
-    flags[1:] &= moves
-    flags[:-1] &= moves
-    return flags
-
-
-def percentages(robot: Robot, rows: RobotRows) -> list[int]:
+def _percentages(robot: Robot, rows: RobotRows) -> list[int]:
     """Speed with which a robot comes to each row, as a whole share of the top speed of its axes in [%], 1 to 100.
 
     It is that of the plan: the largest share that an axis needs from one row to the next in the time between them. A

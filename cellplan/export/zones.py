@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.export.corners import LARGEST_SHARE
-from cellplan.export.urscript.rows import tool_tips
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell import Robot
 
 HALVINGS: Final = 24  # of the search for a share, to 3e-8
@@ -33,6 +32,25 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
         inner, share = q[1:-1], shares[1:-1, None]
         zones[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
     return zones
+
+
+def tool_tips(robot: Robot, q: Array) -> Array:
+    """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
+
+    Args:
+        q: Positions of the model in [rad] or [m], shape (N, n).
+    """
+    model = robot.model
+    p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
+    for link in reversed(model.links_to_flange):
+        axis, drive = model.axes[link], model.drive(link)
+        position = drive.ratio * q[:, drive.joint] + drive.offset
+        if axis.is_revolute:
+            R = rotation_about(axis.axis_B, position)
+            p = axis.point_B + np.einsum("nij,nj->ni", R, p - axis.point_B)
+        else:
+            p = p + position[:, None] * axis.axis_B
+    return p
 
 
 def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:

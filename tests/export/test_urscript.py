@@ -10,8 +10,9 @@ from builders.stream_jobs import is_within_limits, largest_error, round_trip, sm
 
 from cellplan.errors import InputError
 from cellplan.export.urscript.reader import read_urscript
-from cellplan.export.urscript.rows import blend_radii, move_acceleration, move_speeds, tool_tips
+from cellplan.export.urscript.rows import blend_radii, move_acceleration, move_speeds
 from cellplan.export.urscript.writer import render_urscript
+from cellplan.export.zones import tool_tips
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.exported import ExportJob, ProgramRows, Promise

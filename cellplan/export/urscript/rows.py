@@ -5,7 +5,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.export.corners import may_round
-from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.export.zones import tool_zones
+from cellplan.geometry.transforms import Array
 from cellplan.model.acceleration import full_speed_in
 from cellplan.model.cell import Robot
 from cellplan.model.exported import ProgramRows, Promise, RobotRows
@@ -61,41 +62,9 @@ def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
     Args:
         blend: Share of a segment, 0 to 0.5, of all rows or of each, shape (N,).
     """
-    radii, share = np.zeros(len(rows)), np.broadcast_to(blend, len(rows))[1:-1, None]
-    if not np.any(share > 0.0):
-        return radii
-    at = tool_tips(robot, rows.q)
-    radii[1:-1] = np.minimum(
-        _distances(at[1:-1], tool_tips(robot, rows.q[1:-1] + share * (rows.q[:-2] - rows.q[1:-1]))),
-        _distances(at[1:-1], tool_tips(robot, rows.q[1:-1] + share * (rows.q[2:] - rows.q[1:-1]))),
-    )
+    if not np.any(np.asarray(blend) > 0.0):
+        return np.zeros(len(rows))
+    radii = tool_zones(robot, rows.q, np.broadcast_to(blend, len(rows)))
     radii = np.floor(BLEND_ROOM * radii / BLEND_TICK) * BLEND_TICK
-    radii[
-        ~may_round(ProgramRows(name=None, robots={robot.name: rows}), Promise.SEQUENCE_ONLY)[robot.name]
-        | (radii < SMALLEST_BLEND)
-    ] = 0.0
-    return radii
-
-
-def tool_tips(robot: Robot, q: Array) -> Array:
-    """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
-
-    Args:
-        q: Positions of the model in [rad] or [m], shape (N, n).
-    """
-    model = robot.model
-    p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
-    for link in reversed(model.links_to_flange):
-        axis, drive = model.axes[link], model.drive(link)
-        position = drive.ratio * q[:, drive.joint] + drive.offset
-        if axis.is_revolute:
-            R = rotation_about(axis.axis_B, position)
-            p = axis.point_B + np.einsum("nij,nj->ni", R, p - axis.point_B)
-        else:
-            p = p + position[:, None] * axis.axis_B
-    return p
-
-
-def _distances(a: Array, b: Array) -> Array:
-    """Distances between points, shape (N,)."""
-    return np.linalg.norm(a - b, axis=1)
+    free = may_round(ProgramRows(name=None, robots={robot.name: rows}), Promise.SEQUENCE_ONLY)[robot.name]
+    return np.where(free & (radii >= SMALLEST_BLEND), radii, 0.0)

@@ -2,21 +2,17 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from cellplan.errors import raise_findings, refusals
-from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
-from cellplan.export.handshake import HandshakeStep, handshake_steps, lowering_step
-from cellplan.export.head import head_notes
-from cellplan.export.joints import from_numbers, to_numbers
-from cellplan.export.pages import is_rounded, pages_of, percentages, render_programs, require_six_axes, robots_of
+from cellplan.export.handshake import HandshakeStep
+from cellplan.export.joints import from_numbers
+from cellplan.export.pages import PagedProgram, render_programs, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
-from cellplan.export.timed_rows import decimals_of
 from cellplan.export.val3.names import (
     BASE,
     FLANGE,
@@ -36,7 +32,7 @@ from cellplan.export.val3.reader import read_val3
 from cellplan.export.val3.xml import DATA_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE_SPACE
 from cellplan.export.zones import on_scale, tool_zones
 from cellplan.geometry.transforms import Array
-from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.exported import ExportFrame, ExportJob, Promise
 from cellplan.model.units import DEG, MM
 
 DECIMALS: Final = 5
@@ -55,42 +51,6 @@ class _Move(NamedTuple):
     zone: int  # distance of the tool from the row in [um] within which it is rounded, 0 for a stop
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Project:
-    """What is written of one robot in one program."""
-
-    path: str  # folder of the project; its last part is its name
-    notes: Sequence[str]  # notes for the heads of its files
-    rows: RobotRows
-    numbers: Array  # joint positions of the arm, shape (N, 6)
-    decimals: int  # of these
-    moves: Sequence[_Move]  # how each row is approached and passed
-    steps: Sequence[HandshakeStep]  # instructions at a mark
-    first: Sequence[HandshakeStep]  # instructions before the first motion
-    pages: Sequence[range]  # rows of each page
-    tool: Array  # tool in the flange frame, shape (4, 4)
-
-    @property
-    def name(self) -> str:
-        """Name of the project."""
-        return self.path.rpartition("/")[2]
-
-    @property
-    def descriptors(self) -> dict[_Move, int]:
-        """Places of the motion descriptors, in the order of their first use."""
-        return {move: place for place, move in enumerate(dict.fromkeys(self.moves))}
-
-    @property
-    def signals(self) -> dict[tuple[bool, str], str]:
-        """Names of the data of signals, by whether it is an input, and by the signal."""
-        return signal_names(self.steps)
-
-    @property
-    def endings(self) -> list[str]:
-        """What the names of the pages end in; nothing for a single one."""
-        return [f"_{page:03d}" for page in range(1, len(self.pages) + 1)] if len(self.pages) > 1 else [""]
-
-
 def render_val3(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>/<robot>.pjx`` and so on, or ``<robot>/<program>/<program>.pjx``.
 
@@ -100,7 +60,7 @@ def render_val3(job: ExportJob) -> dict[str, str]:
     """
     paths = project_paths(job.frame, VAL3)
     raise_findings(refusals(*_demands(job.frame, 0)))
-    return render_programs(job, paths, lambda program, rows, path: _files(_project(job, program, rows, path)))
+    return render_programs(job, VAL3, paths, _files)
 
 
 def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
@@ -110,47 +70,35 @@ def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
         yield partial(require_six_axes, frame.robot(robot), external=0, what="VAL3")
 
 
-def _project(job: ExportJob, program: ProgramRows, rows: RobotRows, path: str) -> _Project:
-    """All that the project of one robot in one program is made of."""
-    placed = job.frame.robot(rows.robot)
-    decimals = decimals_of(placed, DECIMALS)
-    numbers, pages = to_numbers(placed, rows.q, decimals=decimals), pages_of(len(rows), job.frame, VAL3)
-    shares = row_shares(job, program)[rows.robot] * is_rounded(job, program, rows.robot, numbers, pages)
-    zones = on_scale(1000.0 * MM * tool_zones(placed, from_numbers(placed, numbers), shares), ZONES).tolist()
-    steps = handshake_steps(job.frame, rows.robot) if rows.marks else ()
-    return _Project(
-        path=path,
-        notes=head_notes(job, rows.robot),
-        rows=rows,
-        numbers=numbers,
-        decimals=decimals,
-        moves=[_Move(*entry) for entry in zip(percentages(placed, rows), zones, strict=True)],
-        steps=steps,
-        first=[lowering_step(job.frame, rows.robot)] if steps else [],
-        pages=pages,
-        tool=placed.tool.X_FT,
-    )
-
-
-def _files(project: _Project) -> dict[str, str]:
+def _files(project: PagedProgram) -> dict[str, str]:
     """All files of a project."""
+    q = from_numbers(project.placed, project.numbers)
+    zones = on_scale(1000.0 * MM * tool_zones(project.placed, q, project.shares), ZONES).tolist()
+    motions = [_Move(*entry) for entry in zip(project.speeds, zones, strict=True)]
+    places = {move: place for place, move in enumerate(dict.fromkeys(motions))}  # of the motion descriptors
+    signals = signal_names(project.steps)
     pages = [f"{project.name}{ending}" for ending in project.endings]
     programs = {STOP: _program(STOP, ["resetMotion()"])}
-    moves = [_moves(project, page, ending) for page, ending in zip(project.pages, project.endings, strict=True)]
+    handshake = [_instruction(step, signals) for step in project.steps]
+    moves = [
+        _moves(project, page, ending, descriptors=[places[motions[row]] for row in page], handshake=handshake)
+        for page, ending in zip(project.pages, project.endings, strict=True)
+    ]
     if len(pages) == 1:
         code = moves[0]
     else:
         code = [f"call {page}()" for page in pages]
         programs |= {page: _program(page, page_moves) for page, page_moves in zip(pages, moves, strict=True)}
     heads = [line for note in project.notes for line in comment(note, "//", forbidden="]")]
-    first = [_instruction(step, project.signals) for step in project.first]
+    first = [_instruction(step, signals) for step in project.first]
     programs[START] = _program(START, [*heads, *first, *code, "waitEndMove()"])
     files = {f"{program}.pgx": text for program, text in sorted(programs.items())}
-    files = {f"{project.name}.pjx": _index(project, files), f"{project.name}.dtx": _data(project), **files}
+    data = _data(project, places, signals)
+    files = {f"{project.name}.pjx": _index(project, files), f"{project.name}.dtx": data, **files}
     return {f"{project.path}/{file}": text for file, text in files.items()}
 
 
-def _index(project: _Project, programs: Iterable[str]) -> str:
+def _index(project: PagedProgram, programs: Iterable[str]) -> str:
     """The file that lists programs and data."""
     return joined(
         [
@@ -171,7 +119,7 @@ def _index(project: _Project, programs: Iterable[str]) -> str:
     )
 
 
-def _data(project: _Project) -> str:
+def _data(project: PagedProgram, descriptors: Iterable[_Move], signals: Mapping[tuple[bool, str], str]) -> str:
     """The data: signals, rows, motion descriptors, tool and world frame."""
     lines = [
         XML,
@@ -180,12 +128,12 @@ def _data(project: _Project) -> str:
         "  <Datas>",
     ]
     lines += _array(WORLD, "frame", [{"fatherId": BASE}])
-    for (is_input, signal), name in project.signals.items():
+    for (is_input, signal), name in signals.items():
         lines += _array(name, "dio", [{"link": input_link(signal) if is_input else output_link(signal)}])
     for page, ending in zip(project.pages, project.endings, strict=True):
         lines += _array(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
-    lines += _array(MOVE, "mdesc", [_descriptor(move) for move in project.descriptors])
-    lines += _array(TOOL, "tool", [_tool(project.tool)])
+    lines += _array(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
+    lines += _array(TOOL, "tool", [_tool(project.placed.tool.X_FT)])
     return joined([*lines, "  </Datas>", "</Database>"])
 
 
@@ -199,7 +147,7 @@ def _array(name: str, kind: str, values: Sequence[Mapping[str, str]]) -> list[st
     return [head, *rows, "    </Data>"]
 
 
-def _joints(project: _Project, row: int) -> dict[str, str]:
+def _joints(project: PagedProgram, row: int) -> dict[str, str]:
     """A row as the attributes of a jointRx."""
     values = project.numbers[row].tolist()
     return {f"j{axis}": fixed(value, project.decimals) for axis, value in enumerate(values, start=1)}
@@ -226,12 +174,13 @@ def _tool(X_FT: Array) -> dict[str, str]:
     return {**{item: fixed(float(value), POSE_DECIMALS) for item, value in named}, "fatherId": FLANGE}
 
 
-def _moves(project: _Project, page: range, ending: str) -> list[str]:
-    """The motions of a page, and the handshakes after those to its marks."""
-    lines, marks, descriptors = list[str](), set(project.rows.marks), project.descriptors
-    handshake = [_instruction(step, project.signals) for step in project.steps]
-    for place, row in enumerate(page):
-        lines.append(f"movej({JOINTS}{ending}[{place}],{TOOL}[0],{MOVE}[{descriptors[project.moves[row]]}])")
+def _moves(
+    project: PagedProgram, page: range, ending: str, *, descriptors: Sequence[int], handshake: Sequence[str]
+) -> list[str]:
+    """The motions of a page by their descriptors, and the handshakes after those to its marks."""
+    lines, marks = list[str](), set(project.rows.marks)
+    for place, (row, descriptor) in enumerate(zip(page, descriptors, strict=True)):
+        lines.append(f"movej({JOINTS}{ending}[{place}],{TOOL}[0],{MOVE}[{descriptor}])")
         if row in marks and handshake:
             lines += ["waitEndMove()", *handshake]
     return lines
