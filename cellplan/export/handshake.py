@@ -31,27 +31,17 @@ def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]
     Raises:
         InputError: A signal is not stated in the cell.
     """
-    names = [robot.name for robot in frame.cell.robots]
-    if len(names) == 1:
+    leader, *others = [robot.name for robot in frame.cell.robots]
+    if not others:
         return ()
-    leader, others = names[0], names[1:]
-    signals = _signals(frame, robot)
-    if robot != leader:
-        output, go = str(signals.output), _input(signals, robot, leader)
-        return (
-            HandshakeStep(False, output, True),
-            HandshakeStep(True, go, True),
-            HandshakeStep(False, output, False),
-            HandshakeStep(True, go, False),
-        )
-    inputs = [_input(signals, robot, other) for other in others]
-    up, down = ([HandshakeStep(True, signal, is_on) for signal in inputs] for is_on in (True, False))
-    return (
-        *up,
-        HandshakeStep(False, str(signals.output), True),
-        *down,
-        HandshakeStep(False, str(signals.output), False),
-    )
+    signals, leads = _signals(frame, robot), robot == leader
+    inputs = [_input(signals, robot, other) for other in (others if leads else [leader])]
+    steps: list[HandshakeStep] = []
+    for is_on in (True, False):
+        waits = [HandshakeStep(True, signal, is_on) for signal in inputs]
+        change = HandshakeStep(False, str(signals.output), is_on)
+        steps += [*waits, change] if leads else [change, *waits]
+    return tuple(steps)
 
 
 def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:

@@ -1,9 +1,9 @@
 """Programs in the language of a maker: whose robots, which names and pages, how fast, and which rows are rounded."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -74,44 +74,43 @@ def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:
     return axes
 
 
-def program_paths(
-    frame: ExportFrame, dialect: Dialect, *, longest: int, reserved: Iterable[str], taken: str
-) -> dict[tuple[str | None, str], str]:
+class ProgramNames(NamedTuple):
+    """How programs of a language may be named."""
+
+    longest: int  # most characters
+    reserved: Collection[str]  # words of the language
+    taken: str  # pattern of the names that points and other data have
+
+
+def program_paths(frame: ExportFrame, dialect: Dialect, rules: ProgramNames) -> dict[tuple[str | None, str], str]:
     """Path of each program by its name and robot, without an ending: ``alpha``, or ``alpha/weld`` of several programs.
 
     The last part may become longer by the ending of a page.
-
-    Args:
-        taken: Pattern of the names that points and other data have.
 
     Raises:
         InputError: A robot has no controller, or none that plays the format.
     """
     robots = robots_of(frame, dialect)
     if len(frame.programs) == 1:
-        names = _page_names(robots, longest=longest, reserved=reserved, taken=taken)
+        names = _page_names(robots, rules)
         return {(frame.programs[0], robot): names[robot] for robot in robots}
-    folders = safe_names(robots, longest=longest)
-    named = [name or "" for name in frame.programs]
-    programs = _page_names(named, longest=longest, reserved=reserved, taken=taken)
+    folders = safe_names(robots, longest=rules.longest)
+    programs = _page_names([name or "" for name in frame.programs], rules)
     return {(name, robot): f"{folders[robot]}/{programs[name or '']}" for name in frame.programs for robot in robots}
 
 
-def _page_names(names: Iterable[str], *, longest: int, reserved: Iterable[str], taken: str) -> dict[str, str]:
+def _page_names(names: Iterable[str], rules: ProgramNames) -> dict[str, str]:
     """Names of programs by the names in the cell: with the ending of a page still unique and short enough.
 
     No name ends like one of a page, so that ``weld_001`` is the first page of ``weld`` and nothing else.
-
-    Args:
-        longest: Most characters of the name of a page.
     """
-    used, result = set(reserved), dict[str, str]()
+    used, result = set(rules.reserved), dict[str, str]()
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9]+", "_", ascii_text(name)).strip("_") or "x"
         plain = re.sub(r"_(?=[0-9]{3})", "", plain)
-        if not plain[0].isalpha() or re.fullmatch(taken, plain, re.IGNORECASE):
+        if not plain[0].isalpha() or re.fullmatch(rules.taken, plain, re.IGNORECASE):
             plain = f"p{plain}"
-        result[name] = safe_names([plain], longest=longest - ENDING, reserved=used)[plain]
+        result[name] = safe_names([plain], longest=rules.longest - ENDING, reserved=used)[plain]
         used.add(result[name])
     return result
 

@@ -4,9 +4,8 @@ import re
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import signals_by_key
-from cellplan.export.pages import program_paths
+from cellplan.export.pages import ProgramNames
 from cellplan.model.exported import ExportFrame
 
 NAME: Final = 24  # most characters of a name
@@ -26,16 +25,7 @@ INTERRUPT IS LIN LIN_REL LOAD LOAD_DATA LOOP MAXIMUM MINIMUM NOT OFF ON OR OUT P
 PUBLIC PULSE REAL REPEAT RESUME RETURN SCIRC SEC SEMA SIGNAL SIN SLIN SPL SPLINE SPS SPTP SQRT SREAD STATE STEP
 STRUC SWITCH SWRITE TAN THEN TIME_BLOCK TO TOOL_DATA TRIGGER TRUE UNTIL USER WAIT WHEN WHILE WITH
 """
-WORDS: Final = frozenset(_WORDS.split())
-
-
-def module_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None, str], str]:
-    """Path of the main module without its ending, by program and robot; its last part is the name of the module.
-
-    Raises:
-        InputError: A robot has no controller, or none that plays the format.
-    """
-    return program_paths(frame, dialect, longest=NAME, reserved=WORDS, taken=POINT_NAME)
+MODULES: Final = ProgramNames(NAME, frozenset(_WORDS.split()), POINT_NAME)
 
 
 def require_numbers(frame: ExportFrame, robot: str) -> None:

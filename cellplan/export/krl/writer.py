@@ -10,9 +10,9 @@ from cellplan.errors import raise_findings, refusals
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import HandshakeStep
 from cellplan.export.joints import Axes
-from cellplan.export.krl.names import AXES, EXTERNAL, POINT, WHOLE, module_paths, require_numbers
+from cellplan.export.krl.names import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
 from cellplan.export.krl.reader import read_krl
-from cellplan.export.pages import PagedProgram, render_programs, require_six_axes, robots_of
+from cellplan.export.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.model.exported import ExportFrame, ExportJob, Promise
 
@@ -30,7 +30,7 @@ def render_krl(job: ExportJob) -> dict[str, str]:
         InputError: A robot cannot be written: it has no KUKA controller, is no arm of six axes with at most six others
             before it, lacks a signal, or a position cannot be written with the decimals.
     """
-    paths = module_paths(job.frame, KRL)
+    paths = program_paths(job.frame, KRL, MODULES)
     raise_findings(refusals(*_demands(job.frame, 0)))
     return render_programs(job, KRL, paths, _files)
 
@@ -117,7 +117,7 @@ KRL: Final[Dialect] = Dialect(
     name="krl",
     title="KUKA KRL: a .src and a .dat file for each robot",
     render=render_krl,
-    read=lambda frame, files: read_krl(frame, files, module_paths(frame, KRL)),
+    read=lambda frame, files: read_krl(frame, files, program_paths(frame, KRL, MODULES)),
     decimals=DECIMALS,
     promises=(Promise.SEQUENCE_ONLY,),
     kinds=frozenset({"kuka"}),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.export.joints import Axes, from_numbers, to_numbers
-from cellplan.export.rapid.units import EXTERNAL_AXES, QUATERNION_DECIMALS, RapidUnit, absent, quaternions
+from cellplan.export.rapid.units import ABSENT, EXTERNAL_AXES, QUATERNION_DECIMALS, RapidUnit, quaternions
 from cellplan.export.text import fixed
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.cell import Robot
@@ -33,7 +33,7 @@ def joint_targets(unit: RapidUnit, q: Array) -> list[str]:
         InputError: A position cannot be written with the decimals.
     """
     numbers = to_numbers(unit.robot, q, decimals=unit.decimals)
-    arm = _fields(numbers[:, unit.axes.arm], unit.decimals) if unit.has_tool else [",".join(absent(6))] * len(q)
+    arm = _fields(numbers[:, unit.axes.arm], unit.decimals) if unit.has_tool else [",".join([ABSENT] * 6)] * len(q)
     return [f"[[{axes}],[{rest}]]" for axes, rest in zip(arm, _external(unit, numbers), strict=True)]
 
 
@@ -129,7 +129,7 @@ def _wrist_centre(robot: Robot, arm: list[int]) -> Array:
 def _external(unit: RapidUnit, numbers: Array) -> list[str]:
     """External axes of every row, those that the unit does not have marked as absent."""
     count = len(unit.axes.external)
-    missing = absent(EXTERNAL_AXES - count)
+    missing = [ABSENT] * (EXTERNAL_AXES - count)
     if not count:
         return [",".join(missing)] * len(numbers)
     return [",".join([field, *missing]) for field in _fields(numbers[:, unit.axes.external], unit.decimals)]

@@ -135,11 +135,6 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     return PartFrame(unit=unit, X_FP=placed.tool.X_FT @ frame.cell.part.X_CP)
 
 
-def absent(count: int) -> list[str]:
-    """So many axes that a mechanical unit does not have."""
-    return [ABSENT] * count
-
-
 def quaternions(R: Array) -> Array:
     """Unit quaternions w, x, y, z of rotations, shape (N, 3, 3) to (N, 4), each on the side of the one before it.
 

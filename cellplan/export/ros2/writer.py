@@ -27,6 +27,7 @@ from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise, RobotRows
 
 MOST_POINTS: Final = 100_000  # of a message, which then has some ten megabytes
+WHEN: Final = "start it when all robots have ended the part before"
 REST: Final = 1e-6  # [rad/s] or [m/s] a slower joint rests
 
 
@@ -46,7 +47,8 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
             lines = _points(job.frame.robot(name), program.robots[name], speeds[name])
             for number, (first, last) in enumerate(parts, start=1):
                 path = file_path(program.name, file_name(name, number, 0 if job.frame.split is None else len(parts)))
-                head = [*_head(job, program, name), *_part_note(number, len(parts))]
+                part = f"part {number} of {len(parts)}: it begins and ends at rest; {WHEN}"
+                head = [*_head(job, program, name), *([part] if len(parts) > 1 else [])]
                 files[path] = _trajectory(job.frame.robot(name), head, clock[first : last + 1], lines[first : last + 1])
     return files
 
@@ -122,15 +124,6 @@ def _head(job: ExportJob, program: ProgramRows, name: str) -> list[str]:
         "positions count from the zero of the model; the robot description of the driver has to have the same one",
         f"home in these positions: {home}",
         f"home as the controller shows it: {home_text(job, name)}",
-    ]
-
-
-def _part_note(number: int, parts: int) -> list[str]:
-    """What is to be said of one part among several."""
-    if parts == 1:
-        return []
-    return [
-        f"part {number} of {parts}: it begins and ends at rest; start it when all robots have ended the part before"
     ]
 
 

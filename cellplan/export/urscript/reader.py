@@ -181,15 +181,17 @@ class _Points:
         self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
         self.expected = f"{ARM} positions with {decimals} decimals"
 
-    def add(self, statement: UrscriptStatement, pattern: re.Pattern[str], what: str) -> re.Match[str]:
-        """Take in the row of an instruction.
+    def add(self, statements: _Statements, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+        """Take in the row of the next instruction.
 
         Raises:
             InputError: It is another instruction.
         """
+        statement = statements.peek()
         match = pattern.fullmatch(statement.text)
         if match is None:
             raise line_error(self.file, statement.line, f"{what} with {self.expected}", statement.shown)
+        statements.place += 1
         self.lines.append(statement.line)
         self.numbers.append([float(text) for text in match[1].split(",")])
         return match
@@ -218,8 +220,7 @@ def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRo
     servo = re.compile(rf"servoj\({points.pattern},{re.escape(compact(servo_call(frame, robot)))}\)")
     _approach(points, statements)
     while statements.peek().text.startswith("servoj"):
-        points.add(statements.peek(), servo, f"servoj([…], {servo_call(frame, robot)})")
-        statements.place += 1
+        points.add(statements, servo, f"servoj([…], {servo_call(frame, robot)})")
     if len(points.lines) < 2:
         raise line_error(statements.file, statements.peek().line, "servoj", statements.peek().shown)
     statements.take(stop_call(robot))
@@ -229,8 +230,7 @@ def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRo
 def _approach(points: _Points, statements: _Statements) -> None:
     """The move to the first row."""
     pattern = re.compile(rf"movej\({points.pattern},{re.escape(compact(approach_call()))}\)")
-    points.add(statements.peek(), pattern, f"movej([…], {approach_call()})")
-    statements.place += 1
+    points.add(statements, pattern, f"movej([…], {approach_call()})")
 
 
 def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
@@ -246,11 +246,10 @@ def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> Robo
     is_blended, at = False, statements.all[statements.place - 1]
     while (statement := statements.peek()).text != "end":
         if statement.text.startswith("movej"):
-            match = points.add(statement, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
+            match = points.add(statements, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
             _require_speed(robot, float(match[2]), statement, statements.file)
             is_blended, at = match[3] is not None, statement
             radii.append(float(match[3] or 0.0))
-            statements.place += 1
             continue
         if is_blended or not is_met:
             raise line_error(statements.file, statement.line, "movej, or end", statement.shown)

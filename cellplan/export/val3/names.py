@@ -5,9 +5,8 @@ from collections.abc import Iterable
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import HandshakeStep, signals_by_key
-from cellplan.export.pages import program_paths
+from cellplan.export.pages import ProgramNames
 from cellplan.model.exported import ExportFrame
 
 NAME: Final = 15  # most characters of a name, that of a tool excepted
@@ -30,15 +29,7 @@ string switch taskCreate taskKill taskResume taskStatus taskSuspend tan title to
 userPage void wait waitEndMove watch while workingMode world xor
 """
 WORDS: Final = frozenset(_WORDS.split())
-
-
-def project_paths(frame: ExportFrame, dialect: Dialect) -> dict[tuple[str | None, str], str]:
-    """Folder of each project by program and robot; its last part is the name of the project.
-
-    Raises:
-        InputError: A robot has no controller, or none that plays the format.
-    """
-    return program_paths(frame, dialect, longest=NAME, reserved=WORDS, taken=DATA)
+PROJECTS: Final = ProgramNames(NAME, WORDS, DATA)
 
 
 def signal_names(steps: Iterable[HandshakeStep]) -> dict[tuple[bool, str], str]:
@@ -62,14 +53,9 @@ def signal_names(steps: Iterable[HandshakeStep]) -> dict[tuple[bool, str], str]:
     return names
 
 
-def input_link(signal: str) -> str:
-    """Physical link of an input: as the cell states it, or that of a number on the first board."""
-    return rf"{BOARD}\%I{signal}" if signal.isdecimal() else signal
-
-
-def output_link(signal: str) -> str:
-    """Physical link of an output, likewise."""
-    return rf"{BOARD}\%Q{signal}" if signal.isdecimal() else signal
+def link(signal: str, *, is_input: bool) -> str:
+    """Physical link of a signal: as the cell states it, or that of a number on the first board."""
+    return rf"{BOARD}\%{'I' if is_input else 'Q'}{signal}" if signal.isdecimal() else signal
 
 
 def require_links(frame: ExportFrame, robot: str) -> None:

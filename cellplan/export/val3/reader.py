@@ -14,7 +14,7 @@ from cellplan.export.lines import Statement
 from cellplan.export.pages import read_programs
 from cellplan.export.val3.code import Loop, Node, read_code
 from cellplan.export.val3.data import Data, read_data
-from cellplan.export.val3.names import START, STOP, input_link, output_link
+from cellplan.export.val3.names import START, STOP, link
 from cellplan.export.val3.xml import PARAMETER_SPACE, PROGRAM_SPACE, PROJECT_SPACE, TYPE, Val3Element, parse
 from cellplan.export.zones import tool_shares
 from cellplan.model.exported import ExportFrame, ProgramRows, RobotRows
@@ -279,8 +279,8 @@ class _Val3Player:
             first = lowering_step(self.frame, self.robot).signal
             raise node.error(f"{first}=false before the first motion")
         step = lowering_step(self.frame, self.robot) if is_first else expected[self.step]
-        link = input_link(step.signal) if step.waits else output_link(step.signal)
-        if (node.kind == "WAIT", is_on, data.values[0].get("link")) != (step.waits, step.is_on, link):
+        stated = (step.waits, step.is_on, link(step.signal, is_input=step.waits))
+        if (node.kind == "WAIT", is_on, data.values[0].get("link")) != stated:
             raise node.error(f"the handshake of the cell ({_shown(step)})")
         if is_first:
             self.lowered = node

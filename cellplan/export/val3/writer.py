@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from html import escape
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -11,20 +12,19 @@ from cellplan.errors import raise_findings, refusals
 from cellplan.export.dialect import Dialect
 from cellplan.export.handshake import HandshakeStep
 from cellplan.export.joints import from_numbers
-from cellplan.export.pages import PagedProgram, render_programs, require_six_axes, robots_of
+from cellplan.export.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
 from cellplan.export.text import comment, fixed, joined
 from cellplan.export.val3.names import (
     BASE,
     FLANGE,
     JOINTS,
     MOVE,
+    PROJECTS,
     START,
     STOP,
     TOOL,
     WORLD,
-    input_link,
-    output_link,
-    project_paths,
+    link,
     require_links,
     signal_names,
 )
@@ -58,7 +58,7 @@ def render_val3(job: ExportJob) -> dict[str, str]:
         InputError: A robot cannot be written: it has no Staubli controller, is no arm of six axes alone, lacks a
             signal, or a position cannot be written with the decimals.
     """
-    paths = project_paths(job.frame, VAL3)
+    paths = program_paths(job.frame, VAL3, PROJECTS)
     raise_findings(refusals(*_demands(job.frame, 0)))
     return render_programs(job, VAL3, paths, _files)
 
@@ -129,7 +129,7 @@ def _data(project: PagedProgram, descriptors: Iterable[_Move], signals: Mapping[
     ]
     lines += _array(WORLD, "frame", [{"fatherId": BASE}])
     for (is_input, signal), name in signals.items():
-        lines += _array(name, "dio", [{"link": input_link(signal) if is_input else output_link(signal)}])
+        lines += _array(name, "dio", [{"link": link(signal, is_input=is_input)}])
     for page, ending in zip(project.pages, project.endings, strict=True):
         lines += _array(f"{JOINTS}{ending}", "jointRx", [_joints(project, row) for row in page])
     lines += _array(MOVE, "mdesc", [_descriptor(move) for move in descriptors])
@@ -216,16 +216,14 @@ def _xml_comments(notes: Iterable[str]) -> list[str]:
 
 def _quoted(text: str) -> str:
     """Text as the value of an attribute."""
-    for letter, name in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;")):
-        text = text.replace(letter, name)
-    return f'"{text}"'
+    return '"' + escape(text, quote=False).replace('"', "&quot;") + '"'
 
 
 VAL3: Final[Dialect] = Dialect(
     name="val3",
     title="Staubli VAL3: a project of .pjx, .dtx and .pgx files for each robot",
     render=render_val3,
-    read=lambda frame, files: read_val3(frame, files, project_paths(frame, VAL3)),
+    read=lambda frame, files: read_val3(frame, files, program_paths(frame, VAL3, PROJECTS)),
     decimals=DECIMALS,
     promises=(Promise.SEQUENCE_ONLY,),
     kinds=frozenset({"staubli"}),

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 from cellplan.errors import InputError, InvalidFileError
 from cellplan.io.input.files import digest, read_regular_file
@@ -14,6 +14,8 @@ from cellplan.model.exported import Promise, Targets
 from cellplan.model.verified_run import ReadRun, VerifiedRun
 from cellplan.pipeline.export.choice import Choice
 from cellplan.pipeline.export.record import SCHEMA
+
+Word = TypeVar("Word", Promise, Targets)
 
 SIZE_LIMIT: Final = 50_000_000  # [bytes] of a record: marks of many phases
 FILE_LIMIT: Final = 2_000_000_000  # [bytes] of a program
@@ -45,7 +47,7 @@ class StoredExport:
         Raises:
             InputError: It is no promise.
         """
-        return Promise(self._one_of("promise", [str(promise) for promise in Promise]))
+        return self._one_of("promise", Promise)
 
     @property
     def choice(self) -> Choice:
@@ -59,17 +61,14 @@ class StoredExport:
         if split is not None:
             split = required(self.record, "split", int, file=self.where)
         mm, deg = (None, None) if thinning is None else (self._number("mm"), self._number("deg"))
-        targets = Targets(self._one_of("targets", [str(targets) for targets in Targets]))
-        requested = self.record.get("asked_promise")
+        is_requested = self.record.get("asked_promise") is not None
         return Choice(
             robots=tuple(str(name) for name in robots),
-            targets=targets,
+            targets=self._one_of("targets", Targets),
             split=split,
             thin_mm=mm,
             thin_deg=deg,
-            promise=None
-            if requested is None
-            else Promise(self._one_of("asked_promise", [str(promise) for promise in Promise])),
+            promise=self._one_of("asked_promise", Promise) if is_requested else None,
         )
 
     def changed(self) -> Iterator[InputError]:
@@ -81,15 +80,15 @@ class StoredExport:
                     f"{self.folder / name}: changed since it was exported (SHA-256 {got[:12]}…); export the run again"
                 )
 
-    def _one_of(self, key: str, allowed: list[str]) -> str:
+    def _one_of(self, key: str, kind: type[Word]) -> Word:
         """A word of the record."""
-        value = required(self.record, key, str, file=self.where)
+        value, allowed = required(self.record, key, str, file=self.where), [str(member) for member in kind]
         if value not in allowed:
             raise InputError(
                 f"{self.where}: {key}: expected one of {', '.join(allowed)}, got {shown(value)}"
                 f"{did_you_mean(value, allowed)}"
             )
-        return str(value)
+        return kind(value)
 
     def _number(self, key: str) -> float:
         """A figure of the thinning."""

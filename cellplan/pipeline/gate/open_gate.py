@@ -38,6 +38,7 @@ from cellplan.scene.scene import Scene
 MAX_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
 
 
+@nothing_kept()  # a proof rests on the files themselves
 def open_gate(
     folder: Path | str,
     *,
@@ -62,23 +63,9 @@ def open_gate(
         InputError: The folder is not a whole, unchanged run, or an input has changed.
         NotVerifiedError: The run failed, or a check fails now.
     """
-    with nothing_kept():  # a proof rests on the files themselves
-        file = None if cell is None else Path(cell)
-        return _opened(Path(folder), cell=file, allow_dirs=allow_dirs, refuse=refuse, progress=progress)
-
-
-def _opened(
-    folder: Path,
-    *,
-    cell: Path | None,
-    allow_dirs: Sequence[Path],
-    refuse: Callable[[ReadRun], object] | None,
-    progress: Progress,
-) -> VerifiedRun:
-    """The run, once everything in it was found to be true."""
-    stored = read_stored_run(folder)
+    stored = read_stored_run(Path(folder))
     _refuse_failed(stored)
-    source = load_stored_cell(stored, cell=cell, allow_dirs=allow_dirs)
+    source = load_stored_cell(stored, cell=None if cell is None else Path(cell), allow_dirs=allow_dirs)
     demanded = _demanded(source.cell, stored)
     rows = read_rows(stored, source.cell, demanded)
     if refuse is not None:
@@ -99,7 +86,7 @@ def _opened(
     _refuse_other_report(stored, source.cell, motions)
     of_pages = _refuse_other_pages(stored, source.cell, motions)
     return VerifiedRun(
-        folder=folder,
+        folder=stored.folder,
         digest=stored.digest,
         cell=source.cell,
         motion=rows.motion,

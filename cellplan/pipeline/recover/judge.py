@@ -15,7 +15,7 @@ from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.verify import verify_motion
 from cellplan.geometry.transforms import Array
 from cellplan.io.run.joint_tables import parse_table
-from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.motion import Schedule
 from cellplan.model.report import Check
 from cellplan.model.units import MM
 from cellplan.pipeline.recover.phases import RecoveryKind, RecoveryPhase, scene_of
@@ -74,6 +74,7 @@ class RecoveryJudgement:
         return min(distances, key=lambda distance: distance.distance, default=None)
 
 
+@nothing_kept()  # a proof rests on the tables themselves
 def judged(
     texts: Mapping[str, str], phases: Sequence[RecoveryPhase], *, places: RunPlaces, state: StoppedState
 ) -> RecoveryJudgement:
@@ -87,13 +88,6 @@ def judged(
         InputError: A table is not whole.
     """
     tables = [parse_table(text, f"tables/{name}.csv") for name, text in texts.items()]
-    with nothing_kept():  # a proof rests on the tables themselves
-        return _judged(tables, phases, places, state)
-
-
-def _judged(
-    tables: Sequence[JointTable], phases: Sequence[RecoveryPhase], places: RunPlaces, state: StoppedState
-) -> RecoveryJudgement:
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
     stopped = places.scene_while_stopped(state.lying)
     schedule = Schedule(times=times, tasks=())
@@ -160,19 +154,20 @@ def _runs_of_retracts(phases: Sequence[RecoveryPhase]) -> list[list[RecoveryPhas
     return runs
 
 
+def _stays(name: str, subject: str, off: float, message: str, *, at_s: float | None) -> Check:
+    """Whether something is where it has to be, to the rounding of the tables; by how much it is off in [rad] or [m]."""
+    is_there = off <= STATE_TOL
+    unit = "rad or m"
+    return Check(
+        name=name, subject=subject, passed=is_there, value=off, limit=STATE_TOL, unit=unit, at_s=at_s, message=message
+    )
+
+
 def _begins(q: Array, state: StoppedState) -> Check:
     """Whether the tables begin where the cell has stopped."""
     off = float(np.abs(q[0] - state.q).max())
-    return Check(
-        name="begin",
-        subject="cell",
-        passed=off <= STATE_TOL,
-        value=off,
-        limit=STATE_TOL,
-        unit="rad or m",
-        at_s=0.0,
-        message=f"begin: the first row is {off:.1e} rad or m from the stopped state, allowed {STATE_TOL:g}",
-    )
+    message = f"begin: the first row is {off:.1e} rad or m from the stopped state, allowed {STATE_TOL:g}"
+    return _stays("begin", "cell", off, message, at_s=0.0)
 
 
 def _stand_still(q: Array, phases: Sequence[RecoveryPhase], places: RunPlaces) -> list[Check]:
@@ -187,18 +182,7 @@ def _stand_still(q: Array, phases: Sequence[RecoveryPhase], places: RunPlaces) -
             moved = float(np.abs(positions - positions[0]).max())
             if robot.name not in phase.robots and moved > STATE_TOL:
                 message = f"standing: {robot.name} moves by {moved:.1e} rad or m in '{phase.words}', where it stands"
-                checks.append(
-                    Check(
-                        name="standing",
-                        subject=robot.name,
-                        passed=False,
-                        value=moved,
-                        limit=STATE_TOL,
-                        unit="rad or m",
-                        at_s=None,
-                        message=message,
-                    )
-                )
+                checks.append(_stays("standing", robot.name, moved, message, at_s=None))
     return checks
 
 

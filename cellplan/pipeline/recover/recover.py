@@ -1,7 +1,7 @@
 """Recover: retract-and-home joint tables from where a cell has stopped, planned, then verified from the tables."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,13 +119,6 @@ def _tables(cell: Cell, phases: tuple[RecoveryPhase, ...], state: StoppedState, 
         texts[robot.name] = render_table(robot, times, q[:, cell.columns(robot.name)], header=header)
     digests = {"run": run, "program": program_digest(texts)}
     for robot in cell.robots:
-        table_header = TableHeader(
-            cell=cell.name,
-            mode=str(cell.motion.mode),
-            verdict="passed",
-            digests=digests,
-            remark=remark,
-            zero=zero_text(robot.model),
-        )
+        table_header = replace(header, verdict="passed", digests=digests, zero=zero_text(robot.model))
         texts[robot.name] = replace_header(texts[robot.name], header=table_header)
     return texts
