@@ -27,11 +27,8 @@ def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
     for name, rows in program.robots.items():
         free = np.ones(len(rows), dtype=bool)
         free[[0, -1, *rows.marks, *rows.stops]] = False
-        if rows.times is None:
-            free &= ~switches(rows)
-        else:
-            free &= ~are_near(rows.times, switch_times, SAME_TIME)
-        flags[name] = free
+        is_switch = switches(rows) if rows.times is None else are_near(rows.times, switch_times, SAME_TIME)
+        flags[name] = free & ~is_switch
     if promise is Promise.SYNCHRONISED:
         moving = {name: moves(rows) for name, rows in program.robots.items()}
         allowed = [

@@ -7,12 +7,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.export.rounding import LARGEST
+from cellplan.export.rounding import LARGEST, from_file_unit
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.controller import ControllerZero
 from cellplan.model.robot import Joint
-from cellplan.model.units import DEG, MM
 
 ARM: Final = 6  # axes that a controller counts as those of the arm; the axes before them are external
 NUDGES: Final = 4  # last decimals by which coupled axes move inwards before a position counts as unwritable
@@ -80,18 +79,14 @@ def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) 
     """Positions of the model in [rad] or [m] for numbers of a file, shape (N, n)."""
     positions = np.empty_like(numbers, dtype=np.float64)
     for place, joint in enumerate(robot.model.joints):
-        if angle is Angle.RADIANS:
-            positions[:, place] = numbers[:, place]
-        else:
-            positions[:, place] = np.deg2rad(numbers[:, place]) if joint.is_revolute else numbers[:, place] / MM
+        column = numbers[:, place]
+        positions[:, place] = column if angle is Angle.RADIANS else from_file_unit(joint, column)
     return _zero(robot).to_model(positions)
 
 
 def _scale(joint: Joint, angle: Angle) -> float:
     """Number in a file per position in [rad] or [m]."""
-    if angle is Angle.RADIANS:
-        return 1.0
-    return DEG if joint.is_revolute else MM
+    return 1.0 if angle is Angle.RADIANS else joint.display_unit.scale
 
 
 def _zero(robot: Robot) -> ControllerZero:

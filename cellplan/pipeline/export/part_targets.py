@@ -102,13 +102,12 @@ def _require_straight(frame: ExportFrame, program: ProgramRows, rows: RobotRows)
     far = (off > STRAIGHT_TOL) | (turned > STRAIGHT_TURN_TOL)
     if np.any(far):
         place = int(np.argmax(far))
-        raise NotVerifiedError(
-            [
-                f"robot '{rows.robot}': row {ends[place]}: a straight line to its target on the part is off the motion "
-                f"of the joints by {off[place] * MM:.3g} mm and {np.rad2deg(turned[place]):.3g} deg, allowed "
-                f"{STRAIGHT_TOL * MM:g} mm and {np.rad2deg(STRAIGHT_TURN_TOL):g} deg"
-            ]
+        finding = (
+            f"robot '{rows.robot}': row {ends[place]}: a straight line to its target on the part is off the motion "
+            f"of the joints by {off[place] * MM:.3g} mm and {np.rad2deg(turned[place]):.3g} deg, allowed "
+            f"{STRAIGHT_TOL * MM:g} mm and {np.rad2deg(STRAIGHT_TURN_TOL):g} deg"
         )
+        raise NotVerifiedError([finding])
 
 
 def _poses(frame: ExportFrame, program: ProgramRows, rows: RobotRows) -> Array:
@@ -153,12 +152,9 @@ def _with_joints(frame: ExportFrame, program: ProgramRows, rows: RobotRows, writ
     same = _same_configuration(stated, rows.configuration[at], to_numbers(robot, solutions, decimals=9))
     if not np.all(same):
         place = int(np.argmin(same))
-        raise NotVerifiedError(
-            [
-                f"robot '{rows.robot}': row {at[place]}: expected configuration {stated[place].tolist()}, "
-                f"got {rows.configuration[at[place]].tolist()}"
-            ]
-        )
+        expected, got = stated[place].tolist(), rows.configuration[at[place]].tolist()
+        finding = f"robot '{rows.robot}': row {at[place]}: expected configuration {expected}, got {got}"
+        raise NotVerifiedError([finding])
     q = rows.q.copy()
     q[at] = solutions
     return replace(rows, q=q)

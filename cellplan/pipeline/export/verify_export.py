@@ -125,13 +125,9 @@ def _robots(stored: StoredExport, run: VerifiedRun, choice: Choice) -> tuple[str
 def _placed(stored: StoredExport, error: InputError) -> InputError:
     """A finding of a reader with the folder before the name of the file."""
     findings = error.findings if isinstance(error, InvalidFileError) else [error]
-    names = tuple(stored.files)
-    return InvalidFileError(
-        [
-            InputError(f"{stored.folder}{'/' if str(finding).startswith(names) else ': '}{finding}")
-            for finding in findings
-        ]
-    )
+    names, folder = tuple(stored.files), stored.folder
+    placed = (f"{folder}{'/' if str(finding).startswith(names) else ': '}{finding}" for finding in findings)
+    return InvalidFileError([InputError(text) for text in placed])
 
 
 def _other_texts(stored: StoredExport, files: Mapping[str, str]) -> Iterator[InputError]:

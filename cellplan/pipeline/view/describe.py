@@ -182,17 +182,9 @@ def excluded_records(scene: Scene) -> list[Record]:
 
 def base_records(cell: Cell) -> list[Record]:
     """The base of each robot in the numbers of the cell file."""
-    records: list[Record] = []
-    for index, robot in enumerate(cell.robots):
-        X = robot.X_WB
-        records.append(
-            {
-                "robot": index,
-                "xyz_mm": _file_numbers(MM * X[:3, 3]),
-                "rpy_deg": _file_numbers(DEG * rpy_from_rotation(X[:3, :3])),
-            }
-        )
-    return records
+    poses = [robot.X_WB for robot in cell.robots]
+    numbers = [(_file_numbers(MM * X[:3, 3]), _file_numbers(DEG * rpy_from_rotation(X[:3, :3]))) for X in poses]
+    return [{"robot": index, "xyz_mm": xyz, "rpy_deg": rpy} for index, (xyz, rpy) in enumerate(numbers)]
 
 
 def _file_numbers(values: Iterable[float]) -> list[float]:
