@@ -129,10 +129,7 @@ def read_table(robot: Robot, text: str, file: str) -> JointTable:
     numbers = np.array([[float(field) for field in line.split(",")] for line in lines])
     positions = [from_file_unit(joint, numbers[:, 1 + index]) for index, joint in enumerate(robot.model.joints)]
     return JointTable(
-        robot=robot.name,
-        joints=robot.model.joint_names,
-        times=numbers[:, 0].copy(),
-        q=np.stack(positions, axis=1),
+        robot=robot.name, joints=robot.model.joint_names, times=numbers[:, 0].copy(), q=np.stack(positions, axis=1)
     )
 
 

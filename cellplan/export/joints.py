@@ -11,7 +11,6 @@ from cellplan.export.rounding import LARGEST, from_file_unit
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Robot
 from cellplan.model.controller import ControllerZero
-from cellplan.model.robot import Joint
 
 ARM: Final = 6  # axes that a controller counts as those of the arm; the axes before them are external
 NUDGES: Final = 4  # last decimals by which coupled axes move inwards before a position counts as unwritable
@@ -56,7 +55,7 @@ def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DE
         InputError: A position cannot be written with the decimals.
     """
     joints, quantum = robot.model.joints, 10.0**decimals
-    scale = np.array([_scale(joint, angle) for joint in joints])
+    scale = np.array([1.0 if angle is Angle.RADIANS else joint.display_unit.scale for joint in joints])
     numbers = _zero(robot).from_model(q) * scale
     if not np.all(np.abs(numbers) < LARGEST):
         raise InputError(f"robot '{robot.name}': expected positions below {LARGEST:g}, got one that is too large")
@@ -82,11 +81,6 @@ def from_numbers(robot: Robot, numbers: Array, *, angle: Angle = Angle.DEGREES) 
         column = numbers[:, place]
         positions[:, place] = column if angle is Angle.RADIANS else from_file_unit(joint, column)
     return _zero(robot).to_model(positions)
-
-
-def _scale(joint: Joint, angle: Angle) -> float:
-    """Number in a file per position in [rad] or [m]."""
-    return 1.0 if angle is Angle.RADIANS else joint.display_unit.scale
 
 
 def _zero(robot: Robot) -> ControllerZero:

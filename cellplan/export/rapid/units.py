@@ -171,12 +171,7 @@ def _unit(frame: ExportFrame, name: str, *, task: str | None, module: str) -> Ra
             f"robots.{name}: expected at most {EXTERNAL_AXES} axes beside an arm, got {len(axes.external)}"
         )
     return RapidUnit(
-        robot=robot,
-        task=task,
-        module=module,
-        tool=f"t_{module}",
-        axes=axes,
-        decimals=decimals_of(robot, DECIMALS),
+        robot=robot, task=task, module=module, tool=f"t_{module}", axes=axes, decimals=decimals_of(robot, DECIMALS)
     )
 
 

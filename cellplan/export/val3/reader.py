@@ -199,7 +199,8 @@ class _Val3Player:
             if self.steps > MOST_STEPS:
                 raise statement.error(f"at most {MOST_STEPS} statements to be done")
             if self.step and statement.kind not in {"SET", "WAIT"}:
-                raise statement.error(f"the rest of the handshake ({self._expected()})")
+                rest = _shown(handshake_steps(self.frame, self.robot)[self.step])
+                raise statement.error(f"the rest of the handshake ({rest})")
             if isinstance(node, Loop):
                 for value in node.values:
                     self._play(program, node.body, {**counters, node.counter: value})
@@ -288,10 +289,6 @@ class _Val3Player:
         self.step = (self.step + 1) % len(expected)
         if self.step == 0:
             self.marks.append(row)
-
-    def _expected(self) -> str:
-        """The next instruction of a handshake."""
-        return _shown(handshake_steps(self.frame, self.robot)[self.step])
 
 
 def _shown(step: HandshakeStep) -> str:

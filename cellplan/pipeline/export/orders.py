@@ -119,12 +119,7 @@ def certify_written(
 
 
 def blocked_orders(
-    run: VerifiedRun,
-    orders: Orders,
-    rows: ProgramRows,
-    corners: Mapping[str, Array],
-    *,
-    progress: Progress = silent,
+    run: VerifiedRun, orders: Orders, rows: ProgramRows, corners: Mapping[str, Array], *, progress: Progress = silent
 ) -> Iterator[tuple[int, str]]:
     """Places of the stretches of a program in which a pair is not clear in every order, with what is not.
 

@@ -14,6 +14,7 @@ from cellplan.pipeline.gate.picture_text import PIECE, unbalanced
 CellDrawings = Mapping[str, Mapping[str, str]]
 
 COURSE: Final = re.compile(r'(?<= d=")[MLHVlhvz\d. -]*(?=")')  # of a line
+LETTER: Final = re.compile("[A-Za-z]")  # of a course, which is set apart from its figures
 FIGURE: Final = re.compile(r"(?<![\w#-])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
 ROUNDING: Final = 3.0  # units of a sheet, each at most a tenth of a millimetre: what rounding to a whole one can do
 
@@ -74,16 +75,11 @@ def _is_same_piece(got: str, drawn: str) -> bool:
     """Whether two pieces are the same; figures of tags may differ by rounding."""
     if got == drawn:
         return True
-    one, other = (COURSE.sub(_apart, piece) for piece in (got, drawn))
+    one, other = (COURSE.sub(lambda course: LETTER.sub(r" \g<0> ", course[0]), piece) for piece in (got, drawn))
     if not drawn.startswith("<") or FIGURE.split(one) != FIGURE.split(other):
         return False
     figures = zip(FIGURE.findall(one), FIGURE.findall(other), strict=True)
     return all(abs(float(first) - float(second)) <= ROUNDING for first, second in figures)
-
-
-def _apart(course: re.Match[str]) -> str:
-    """The course of a line with its letters set apart from its figures."""
-    return re.sub("[A-Za-z]", r" \g<0> ", course[0])
 
 
 def _without_figures(piece: str) -> str:

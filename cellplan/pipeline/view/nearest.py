@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import inverse
 from cellplan.model.units import MM
 from cellplan.pipeline.view.result import point_numbers
 from cellplan.report.record.common import Record
-from cellplan.scene.bodies import SceneBody, is_ground
+from cellplan.scene.bodies import is_ground
 from cellplan.scene.near import NearPairs
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
@@ -171,12 +171,8 @@ def touching_pairs(scene: Scene, q: Array) -> list[tuple[int, int]]:
 def _counts(scene: Scene, pair: ScenePair) -> bool:
     """Whether a pair is to keep a clearance and moves against each other."""
     a, b = scene.bodies[pair.first], scene.bodies[pair.second]
-    return pair.rule is Rule.CLEARANCE and not (a.is_at_rest and b.is_at_rest) and not _is_joined(a, b)
-
-
-def _is_joined(a: SceneBody, b: SceneBody) -> bool:
-    """Whether two bodies are on one link."""
-    return a.robot is not None and a.robot == b.robot and a.link == b.link
+    is_joined = a.robot is not None and (a.robot, a.link) == (b.robot, b.link)
+    return pair.rule is Rule.CLEARANCE and not (a.is_at_rest and b.is_at_rest) and not is_joined
 
 
 def _is_bound(scene: Scene, row: int, distance: float) -> bool:

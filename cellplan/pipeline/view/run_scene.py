@@ -28,7 +28,6 @@ from cellplan.report.record.common import Record
 from cellplan.report.record.common import number as plain
 from cellplan.report.record.numbers import floored, seconds
 from cellplan.report.record.phases import instant_text
-from cellplan.scene.scene import Scene
 
 MOST_NUMBERS: Final = 800_000  # [-] joint positions of a page: 4.3 MB in base64
 TIME_DECIMALS: Final = 6  # of [s]
@@ -85,7 +84,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> Record:
         "certified": _certified(played),
         "contacts": contacts,
         "failures": failures,
-        "excluded": excluded_records(_with_most_pairs(scenes)),
+        "excluded": excluded_records(min(scenes, key=lambda scene: len(scene.excluded))),  # of most of the program
         "bases": [],
     }
 
@@ -284,8 +283,3 @@ def _facts(record: Record) -> list[list[str]]:
         where = " – ".join(whole["pair"] or [])
         facts.append(["smallest clearance", f"{distance}, {word}: {where} {instant_text(whole)}"])
     return facts
-
-
-def _with_most_pairs(scenes: Sequence[Scene]) -> Scene:
-    """The scene in which the fewest pairs are left out: that of most of the program."""
-    return min(scenes, key=lambda scene: len(scene.excluded))

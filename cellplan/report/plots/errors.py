@@ -31,11 +31,7 @@ class ErrorKind:
 POSITION: Final = ErrorKind(name="position error", units=(("mm", 1e3), ("µm", 1e6), ("nm", 1e9)), axes=("x", "y", "z"))
 ORIENTATION: Final = ErrorKind(
     name="orientation error",
-    units=(
-        ("deg", math.degrees(1.0)),
-        ("10⁻³ deg", math.degrees(1e3)),
-        ("10⁻⁶ deg", math.degrees(1e6)),
-    ),
+    units=(("deg", math.degrees(1.0)), ("10⁻³ deg", math.degrees(1e3)), ("10⁻⁶ deg", math.degrees(1e6))),
     axes=("rx", "ry", "rz"),
 )
 

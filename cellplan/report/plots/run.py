@@ -39,7 +39,7 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
         cell: Where tolerances, the required clearance and the order of the robots come from.
     """
     colours = robot_colours(cell)
-    robots = list(report.q) if report.tasks else _moving(report)
+    robots = list(report.q) if report.tasks else [name for name, q in report.q.items() if np.any(q != q[0])]
     over_all = {
         "margins": margins_figure(report, robots, colours),
         "speeds": speeds_figure(report, robots, colours),
@@ -57,11 +57,6 @@ def run_figures(report: Report, *, cell: Cell) -> dict[str, Figure]:
     if report.conditioning is not None:
         figures["singularity"] = _singularity_figure(report.conditioning, report.times, colours)
     return figures
-
-
-def _moving(report: Report) -> list[str]:
-    """Names of the robots that move at all."""
-    return [name for name, q in report.q.items() if np.any(q != q[0])]
 
 
 def _task_figure(accuracy: TaskAccuracy, times: Array, cell: Cell) -> Figure:

@@ -69,6 +69,7 @@ def detail(picture: StillPicture, camera: Camera, window: DetailWindow, classes:
         solid for solid in picture.solids if _reaches(solid, close, low, high) and not _hides(solid, picture, close)
     ]
     x, y, edge = window.x, window.y, window.edge
+    factor = scale / camera.scale
     box = f'x="{x}" y="{y}" width="{edge}" height="{edge}" rx="40"'
     return "\n".join(
         [
@@ -80,7 +81,7 @@ def detail(picture: StillPicture, camera: Camera, window: DetailWindow, classes:
             mark(picture, close),
             "</g>",
             f'<rect class="frame" {box}/>',
-            f'<text class="note" x="{x}" y="{y + edge + 210}">{_factor(scale / camera.scale)}</text>',
+            f'<text class="note" x="{x}" y="{y + edge + 210}">{factor:.{0 if factor >= 3.0 else 1}f} × enlarged</text>',
         ]
     )
 
@@ -101,11 +102,6 @@ def _shown(picture: StillPicture, camera: Camera) -> float:
         return PLACE_SHOWN
     across = float(np.linalg.norm(camera.axes[:2] @ (picture.mark[1] - picture.mark[0])))
     return max(LEAST_SHOWN, across / CONNECTION_SHARE)
-
-
-def _factor(ratio: float) -> str:
-    """How much larger the detail is, as text."""
-    return f"{ratio:.0f} × enlarged" if ratio >= 3.0 else f"{ratio:.1f} × enlarged"
 
 
 def _hides(solid: ShownSolid, picture: StillPicture, camera: Camera) -> bool:
