@@ -21,7 +21,7 @@ from cellplan.export.dialect import Dialect
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell import Relation, stacked_positions
-from cellplan.model.exported import ExportJob, ProgramRows, Promise
+from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.task import Task
 from cellplan.pipeline.export.judge import played_programs
 from cellplan.pipeline.export.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows
@@ -116,26 +116,15 @@ class _Choice:
         known: list[tuple[int, Mapping[str, slice]]] = []
         for stretch in self._played.stretches():
             inside = {name: _inside(times, stretch) for name, times in self._times.items()}
-            before = (rows for place, rows in known if place == stretch.place)
-            same = next((rows for rows in before if self._are_alike(rows, inside)), None)
+            played, before = self._played.rows, (o for place, o in known if place == stretch.place)
+            alike = (o for o in before if all(_are_alike(played[n], self._free[n], o[n], inside[n]) for n in inside))
+            same = next(alike, None)
             if same is None:
                 self._round(stretch, self._shared.scenes[stretch.place], inside)
                 known.append((stretch.place, inside))
             else:
                 for name, rows in inside.items():
                     self._chosen[name][rows] = self._chosen[name][same[name]]
-
-    def _are_alike(self, one: Mapping[str, slice], other: Mapping[str, slice]) -> bool:
-        """Whether two stretches of rows are the same after the same times, and may be rounded alike."""
-        for name in other:
-            rows, free, times = self._played.rows[name], self._free[name], self._times[name]
-            a, b = one[name], other[name]
-            if len(times[a]) != len(times[b]) or not len(times[a]) or np.any(free[a] != free[b]):
-                return False
-            late = np.abs(np.diff(times[a]) - np.diff(times[b]))
-            if not (np.all(late <= SAME_TIME) and np.all(np.abs(rows.q[a] - rows.q[b]) <= SAME)):
-                return False
-        return True
 
     def keep_orders(self, orders: Orders) -> None:
         """Take back what does not keep its distance in every order between two marks."""
@@ -239,6 +228,16 @@ def _inside(times: Array, stretch: ExecutedStretch) -> slice:
     """Rows in a phase, both ends included, from their times in [s], shape (N,)."""
     first, last = np.searchsorted(times, [stretch.begin - SAME_TIME, stretch.end + SAME_TIME])
     return slice(int(first), int(last))
+
+
+def _are_alike(rows: RobotRows, free: Flags, one: slice, other: slice) -> bool:
+    """Whether two stretches of rows are the same after the same times, and may be rounded alike."""
+    times = times_of(rows)
+    if len(times[one]) != len(times[other]) or not len(times[one]):
+        return False
+    late = np.abs(np.diff(times[one]) - np.diff(times[other]))
+    off = np.abs(rows.q[one] - rows.q[other])
+    return bool(np.all(late <= SAME_TIME) and np.all(off <= SAME) and np.all(free[one] == free[other]))
 
 
 def straight_depths(rows: PathRows) -> Iterator[tuple[Task, float, float]]:
