@@ -12,9 +12,7 @@ from cellplan.collision.distance import TIGHT_TOL
 from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Indices
 
-CURVE_FRACTION: Final = (
-    0.05  # [-] of the distance at the middle of its block: a bound this much below is drawn as it is
-)
+CURVE_FRACTION: Final = 0.05  # [-] of the distance in the middle of its block: a bound this far below is drawn as it is
 CURVE_TOL: Final = 1e-3  # [m] likewise by this length
 
 

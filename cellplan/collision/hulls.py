@@ -11,12 +11,8 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
 
 FLAT_FRACTION: Final = 1e-6  # [-] of the largest spread: thinner meshes count as flat; coal crashes on those below 1e-8
-GRID_FRACTION: Final = (
-    1e-9  # [-] of the extent: vertices nearer than that are one; coal crashes on heaps of almost equal ones
-)
-HULL_FRACTION: Final = (
-    1e-7  # [-] of the extent by which a vertex may stick out of the hull; without rounding it is none
-)
+GRID_FRACTION: Final = 1e-9  # [-] of the extent: nearer vertices are one; coal crashes on heaps of almost equal ones
+HULL_FRACTION: Final = 1e-7  # [-] of the extent by which a vertex may stick out of the hull; none without rounding
 MAX_CORNERS: Final = 2000  # the work of every distance grows with their number
 FEW_CORNER_COUNT: Final = 250  # coal keeps at most 255 neighbours of a corner: so few corners cannot have more
 MAX_GROWTH: Final = 1.1  # [-] by which a hull of some of the points may be blown up to hold the others

@@ -9,9 +9,7 @@ from cellplan.geometry.mesh.rays import line_crossings
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import Array
 
-Ends = tuple[
-    Array, Array
-]  # ways in [m] at which lines enter and leave a convex solid, shape (N,); enter > leave: never
+Ends = tuple[Array, Array]  # [m] where lines enter and leave a convex solid, shape (N,); enter > leave: never
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

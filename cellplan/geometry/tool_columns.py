@@ -14,9 +14,7 @@ from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Mesh, Solid, support_point
 from cellplan.geometry.transforms import Array
 
-GRAZE_TOL: Final = (
-    1e-5  # [m] an axis that is free this far to the side, or a back end that is so near the far side, only touches
-)
+GRAZE_TOL: Final = 1e-5  # [m] an axis free this far to the side, or a back end so near the far side, only touches
 SIDE_TOL: Final = 1e-4  # [m] what the side of a body reaches into a wall along it by less is touching, not depth
 EDGE_TOL: Final = 1e-6  # [m] columns of a rim stand this far within it, so that rounding does not lose them
 HALF_FRACTION: Final = 0.5  # [-] a column that is less than half as deep just beside grazes

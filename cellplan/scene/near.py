@@ -44,7 +44,11 @@ class NearPairs:
 
 def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
     """See ``Scene.near``."""
-    table = scene.near_table
+    return near_pairs_of(scene.near_table, scene, q, within)
+
+
+def near_pairs_of(table: NearTable, scene: "Scene", q: Array, within: float) -> NearPairs:
+    """The same of the pairs of a table."""
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
     nearby = table.find(scene.engine, D, within)
     return NearPairs(

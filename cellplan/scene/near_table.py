@@ -93,16 +93,13 @@ class NearTable:
         Args:
             screws: Of all axes, shape (axes, K, 6).
         """
-        links, forces, count = self.links_of(nearby), wrenches(nearby), screws.shape[1]
+        links = np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])  # that carry the bodies, (M, 2)
+        forces, count = wrenches(nearby), screws.shape[1]
         moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
         bounds = np.searchsorted(nearby.samples, np.arange(count + 1)).tolist()
         for sample, (first, last) in enumerate(pairwise(bounds)):
             moved[first:last] *= forces[first:last] @ screws[:, sample].T
         return moved
-
-    def links_of(self, nearby: NearbyPairs) -> Indices:
-        """Links that carry the bodies of pairs, shape (M, 2)."""
-        return np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])
 
     def _solids(self, engine: Engine, poses: BodyPoses, bounds: tuple[Array, Array], within: float) -> "Parts":
         """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""

@@ -31,12 +31,8 @@ from cellplan.scene.mounting import (
 )
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, near_in_chain, stands_on
 
-CONFIGURATION_COUNT: Final = (
-    48  # random configurations beside the reference; a pair that is free in one of ten escapes 0.6 % of trials
-)
-CONSTANT_DISTANCE_TOL: Final = (
-    1e-3  # [m] a distance that varies by less over all configurations is a matter of mounting, not of motion
-)
+CONFIGURATION_COUNT: Final = 48  # random ones beside the reference; a pair free in one of ten escapes 0.6 % of trials
+CONSTANT_DISTANCE_TOL: Final = 1e-3  # [m] a distance that varies by less is a matter of mounting, not of motion
 CONTACT_TOL: Final = 1e-6  # [m] poses are worked out to less than that: what stands on a floor may seem to float
 ROUNDING: Final = 1e-9  # [m] by which a distance may seem less than it is demanded to be
 FAULT_ORDER: Final = (Kind.PART, Kind.TOOL, Kind.ATTACHMENT, Kind.PEDESTAL, Kind.LINK)  # what is wrongly mounted first

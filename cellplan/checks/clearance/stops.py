@@ -43,9 +43,7 @@ SAME_PLACE: Final = 1e-9  # [m] values below it are none
 _WORDS: Final = {"stop_depth": ("depth", "at most"), "stop_clearance": ("smallest distance", "at least")}
 DEPTH_TOL: Final = 1e-6  # [m] as in the check of depths without stops
 
-Figure = Callable[
-    [Array, Array], Array
-]  # times [s] of the one robot and of the other, shape (M,) -> values, shape (M,)
+Figure = Callable[[Array, Array], Array]  # times of one robot and of the other in [s], shape (M,) -> values, shape (M,)
 
 
 def stop_report(

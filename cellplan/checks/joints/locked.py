@@ -11,9 +11,7 @@ from cellplan.model.cell import Cell, LockedJoint
 from cellplan.model.report import Check, TaskAccuracy
 from cellplan.model.settings.task import ToleranceEntry
 
-STANDSTILL_TOL: Final = (
-    1e-9  # [deg] or [mm] by which a joint that stands still may differ: a thousand units in the tables
-)
+STANDSTILL_TOL: Final = 1e-9  # [deg] or [mm] a joint that stands still may differ by: a thousand units in the tables
 
 
 def check_locked(cell: Cell, times: Array, q: Mapping[str, Array]) -> list[Check]:

@@ -13,17 +13,12 @@ def is_inside(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample
     """Say whether a piece of one body lies inside the mesh of the other at a sample, either way round."""
     for inner, outer in (pair, pair[::-1]):
         host, guest = engine.bodies[outer], engine.bodies[inner]
-        if not _has_inside(host):
-            continue
+        if not (isinstance(host.shape, Mesh) and (host.shape.is_closed or host.shape.is_leaky)):
+            continue  # the engine knows the whole body, or there is no inside
         in_world = guest.witnesses @ poses.R[inner, sample].T + poses.p[inner, sample]
         if _any_within(host, (in_world - poses.p[outer, sample]) @ poses.R[outer, sample]):
             return True
     return False
-
-
-def _has_inside(body: CollisionBody) -> bool:
-    """Whether the engine knows only the surface of a body that encloses a volume."""
-    return isinstance(body.shape, Mesh) and (body.shape.is_closed or body.shape.is_leaky)
 
 
 def _any_within(host: CollisionBody, points: Array) -> bool:

@@ -13,9 +13,7 @@ from cellplan.geometry.transforms import Array
 NODE_COUNT: Final = 12  # Gauss-Legendre nodes of a panel
 PANEL_CHUNK: Final = 4096  # panels worked on at once: about 10 MB
 RESOLVED_FRACTION: Final = 1e-12  # [-] a speed whose last Legendre coefficients are smaller than this share is resolved
-NEGLIGIBLE_FRACTION: Final = (
-    1e-14  # [-] of the whole length: less than this is rounding, whatever share of a panel it is
-)
+NEGLIGIBLE_FRACTION: Final = 1e-14  # [-] of the whole length: less is rounding, whatever share of a panel it is
 MAX_SPLITS: Final = 24  # halvings of a panel; only a cusp needs more
 MAX_NEWTON_STEPS: Final = 60  # far more than Newton needs; a step that leaves its bracket halves it instead
 MAX_QUICK_STEPS: Final = 8  # Newton steps without a bracket; speeds that are resolved on a panel hardly need five

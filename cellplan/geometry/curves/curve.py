@@ -11,9 +11,7 @@ from cellplan.geometry.transforms import Array
 
 Interval = tuple[float | Array, float | Array]  # stretch of the parameter, one or one per point: see spans_at
 
-CORNER_CONTROLS: Final = np.array(
-    [-1.0, -0.6, -0.4, 0.4, 0.6, 1.0]
-)  # [-] control points of a corner, see rounded_sides
+CORNER_CONTROLS: Final = np.array([-1.0, -0.6, -0.4, 0.4, 0.6, 1.0])  # [-] of a corner, see rounded_sides
 
 
 class Curve(Protocol):

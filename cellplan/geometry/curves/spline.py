@@ -7,9 +7,7 @@ import numpy as np
 from cellplan.geometry.curves.curve import BezierCurve
 from cellplan.geometry.transforms import Array
 
-END_POINT_COUNT: Final = (
-    5  # values whose polynomial gives the derivative at an end: an error of fourth order, as inside
-)
+END_POINT_COUNT: Final = 5  # values whose polynomial gives the derivative at an end: of fourth order, as inside
 
 
 def spline_through(knots: Array, values: Array, *, is_closed: bool) -> BezierCurve:

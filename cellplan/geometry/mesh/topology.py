@@ -62,7 +62,9 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     is_closed = len(whole) > 0 if edges.is_closed else encloses(whole)
     with_area = whole[_has_area(welded, whole)]
     flat = len(faces) - int(np.sum(_has_three_corners(corners))) + len(whole) - len(with_area)
-    _account_for(flat, total=len(faces), source=source)
+    if flat > LOST_FRACTION * len(faces):  # a few are usual
+        what = f"expected triangles of non-zero area, got {flat} of {len(faces)} degenerate"
+        raise InputError(f"{source}: {what}: is the file damaged?")
     if is_closed:
         with_area = turn_outward(welded, with_area, source=source)
     used, compact = np.unique(with_area, return_inverse=True)
@@ -74,7 +76,7 @@ def mesh_volume(mesh: Mesh) -> float:
 
     An open mesh encloses nothing: the figure then only shows how its triangles lean.
     """
-    return _volume(mesh.vertices, mesh.faces)
+    return float(face_volumes(mesh.vertices, mesh.faces).sum())
 
 
 def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices, EdgeCount]:
@@ -137,19 +139,6 @@ def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
     double_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     longest = np.sum((corner - np.roll(corner, -1, axis=1)) ** 2, axis=2).max(axis=1, initial=0.0)
     return double_area > AREA_FRACTION * longest
-
-
-def _account_for(lost: int, *, total: int, source: str) -> None:
-    """A few triangles without area are usual; many mean that the file is damaged."""
-    if lost > LOST_FRACTION * total:
-        raise InputError(
-            f"{source}: expected triangles of non-zero area, got {lost} of {total} degenerate: is the file damaged?"
-        )
-
-
-def _volume(vertices: Array, faces: Indices) -> float:
-    """Signed volume in [m³]."""
-    return float(face_volumes(vertices, faces).sum())
 
 
 def _as_faces(indices: NDArray[Any]) -> FaceArray:

@@ -18,9 +18,7 @@ SCHEMA: Final = "cellplan.manifest/1"
 SIZE_LIMIT: Final = 5_000_000  # [bytes] of the manifest; two hundred runs of sixty-four robots need less than half
 BUNDLED: Final = "bundled:"  # begins the name of an input that comes with the program
 NEAR: Final = "near:"  # begins that of a run of which the branches were kept; no file of the cell
-MADE_LATER: Final = frozenset(
-    {PROGRAMS, REHEARSAL, RECOVER, "view.html"}
-)  # made from a run after it was written; no part of it
+MADE_LATER: Final = frozenset({PROGRAMS, REHEARSAL, RECOVER, "view.html"})  # from a written run; no part of it
 IGNORED: Final = ".DS_Store"  # put into every folder by the file manager of one system
 KEYS: Final = ("schema", "cell", "status", "cell_file", "changes", "inputs", "versions", "files")
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")

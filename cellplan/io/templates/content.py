@@ -1,7 +1,6 @@
 """Files of a template: the cell with its schema, the files that it names, and a page on what to do next."""
 
 import json
-from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -50,12 +49,12 @@ def template_files(template: Template) -> dict[str, bytes]:
     """Content of every file of a template by its name, relative to the folder."""
     folder = shipped_cells()
     files = {CELL: _with_schema((folder / template.source).read_bytes(), f"./{CELL_SCHEMA}")}
-    files[CELL_SCHEMA] = _cell_schema()
+    files[CELL_SCHEMA] = _json(json_schema(bundled_names()))
     for name in template.files:
         content = (folder / name).read_bytes()
         if name.endswith(".yaml"):
             content = _with_schema(content, "../" * name.count("/") + TABLE_SCHEMA)
-            files[TABLE_SCHEMA] = _table_schema()
+            files[TABLE_SCHEMA] = _json(robot_table_schema())
         files[name] = content
     return files | {README: _page(template).encode()}
 
@@ -65,20 +64,8 @@ def _with_schema(content: bytes, schema: str) -> bytes:
     return f"# yaml-language-server: $schema={schema}\n".encode() + content
 
 
-@cache
-def _cell_schema() -> bytes:
-    """The schema of the cell file as ``cellplan schema`` prints it."""
-    return _json(json_schema(bundled_names()))
-
-
-@cache
-def _table_schema() -> bytes:
-    """The schema of a robot's table as ``cellplan schema --robot`` prints it."""
-    return _json(robot_table_schema())
-
-
 def _json(schema: dict[str, object]) -> bytes:
-    """A schema as text."""
+    """A schema as ``cellplan schema`` prints it."""
     return (json.dumps(schema, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 

@@ -1,6 +1,6 @@
 """Cooperation Jacobian by successive screw displacements: one walk from the part over the world to each tool."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def walk_from_part(cell: Cell, q: Array, operator: str) -> tuple[list[ScrewStep]
     else:
         robot, X_FP = holder
         X_PB = inverse(robot.model.X_BF @ X_FP)
-        steps += [_reversed(step) for step in reversed(_steps(cell, robot, q, X_PB=X_PB))]
+        steps += [replace(step, s_P=-step.s_P) for step in reversed(_steps(cell, robot, q, X_PB=X_PB))]
         X_PW = X_PB @ inverse(robot.X_WB)
     robot = cell.robot(operator)
     X_PB = X_PW @ robot.X_WB
@@ -121,15 +121,3 @@ def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[ScrewStep
         )
         for axis, position in zip(chain, axis_positions(chain, q[columns]), strict=True)
     ]
-
-
-def _reversed(step: ScrewStep) -> ScrewStep:
-    """The same axis passed from tip to base: what is seen to move is now the base side, the other way."""
-    return ScrewStep(
-        s_P=-step.s_P,
-        s0_P=step.s0_P,
-        is_revolute=step.is_revolute,
-        column=step.column,
-        share=step.share,
-        position=step.position,
-    )

@@ -16,7 +16,6 @@ from cellplan.io.input.findings import listed
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.idle import idle_robots
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check
 from cellplan.model.seeds import generator
 from cellplan.model.solver import GoalKind
 from cellplan.pipeline.plan.rounded import rounded
@@ -178,7 +177,8 @@ class _HomeSearch:
                 continue
             q = idle.q.copy()
             q[:, self._cell.columns(self._robot.name)] = home
-            failed = _first_failed(check_clearance(idle.scene, idle.run.schedule, q)[1])
+            checks = check_clearance(idle.scene, idle.run.schedule, q)[1]
+            failed = next((check for check in checks if not check.passed), None)
             if failed is not None:
                 self._failed[failed.message] += 1
                 self._trials.add(place, _at(idle.run.schedule.times, q, failed.at_s or 0.0))
@@ -203,10 +203,6 @@ def _idle_run(scene: Scene, run: PlannedRun, robot: str) -> _IdleRun:
 def with_homes_of(cell: Cell, other: Cell) -> Cell:
     """A cell with the homes of another one, which has the same robots."""
     return replace(cell, robots=tuple(replace(robot, home=other.robot(robot.name).home) for robot in cell.robots))
-
-
-def _first_failed(checks: Sequence[Check]) -> Check | None:
-    return next((check for check in checks if not check.passed), None)
 
 
 def _at(times: Array, q: Array, at_s: float) -> Array:

@@ -15,7 +15,6 @@ from cellplan.model.idle import idle_robots
 from cellplan.model.motion import Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.progress import Progress, silent
-from cellplan.model.task import Task
 from cellplan.pipeline.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.pipeline.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.pipeline.plan.program_faults import (
@@ -176,13 +175,11 @@ class _Worked:
         for robot in self.cell.robots:
             is_new = robot.start is None and (robot.name in at_work or robot.name in self._standing)
             robots.append(replace(robot, start=started.robot(robot.name).start) if is_new else robot)
-        tasks = [_with_posture(task, started) if task.name in at_work.values() else task for task in self.cell.tasks]
+        tasks = [
+            replace(task, start_posture=started.robot(task.robot).start) if task.name in at_work.values() else task
+            for task in self.cell.tasks
+        ]
         self.cell = replace(self.cell, robots=tuple(robots), tasks=tuple(tasks))
-
-
-def _with_posture(task: Task, started: Cell) -> Task:
-    """A task with the configuration in which its robot begins it."""
-    return replace(task, start_posture=started.robot(task.robot).start)
 
 
 def _everyone_at_home(cell: Cell, run: PlannedRun) -> PlannedRun:

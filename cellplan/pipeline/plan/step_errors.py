@@ -15,9 +15,7 @@ POINTS: Final = 2000  # [-] nominal times at which the bend of the joint path is
 HALF_STEP: Final = 1e-3  # [s] of nominal time, but for short paths
 SHARES: Final = tuple(tenth / 10.0 for tenth in range(1, 10))  # [-] of a step at which errors are taken
 SAFELY: Final = 1.02  # [-] by which a speed is lowered more than the square root of an error asks for
-PER_BEND: Final = (
-    6.5  # [-] a step of length h has the error b h^2 / 8; out of rest, where b grows with time, b h^2 / 6.8
-)
+PER_BEND: Final = 6.5  # [-] a step of length h errs by b h^2 / 8; out of rest, where b grows with time, b h^2 / 6.8
 
 
 class StepErrors:

@@ -1,6 +1,6 @@
 """Redundancy: secondary goals and joint weights that change along the motion, at all nodes of a window at once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -8,7 +8,6 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.batched import Placement
 from cellplan.kinematics.link_forest import LinkForest
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
-from cellplan.model.cell import Relation
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.joint_weights import HEADING_DAMPING, JointWeights
@@ -92,7 +91,8 @@ class Redundancy:
         X_WT = state.X_WT[:, constraints.operators]
         X_WR = constraints.reference_frames(state.X_WP[:, None])
         J = cooperation_jacobian(state, X_WT[..., :3, 3], signs, X_WR=X_WR)
-        picks = _picks(constraints.tasks, X)
+        desired = np.moveaxis(X, (2, 3), (0, 1))
+        picks = [constraint_rows(task, X_RT) for task, X_RT in zip(constraints.tasks, desired, strict=True)]
         return Stance(
             q=q,
             state=state,
@@ -107,8 +107,3 @@ class Redundancy:
 def redundancy(motion: MotionTask, tasks: BatchTasks) -> Redundancy | None:
     """Goals and changing weights of a cell; None where it asks for the smallest weighted velocities alone."""
     return Redundancy(motion, tasks) if motion.cell.solver.is_varied else None
-
-
-def _picks(tasks: Sequence[Relation], X: Array) -> list[Array]:
-    """Rows that pick what each task constrains, shape (K, m_i, 6), at desired poses of shape (4, 4, tasks, K)."""
-    return [constraint_rows(task, np.moveaxis(X[:, :, index], -1, 0)) for index, task in enumerate(tasks)]

@@ -36,9 +36,7 @@ from cellplan.planning.tracking.motion_task import MotionTask
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer
 TO_CLOSE: Final = 1e-7  # [m] and [rad]: what no tool is back to brings no joint back
-STEADY: Final = (
-    1e-11  # [rad] and [m]: configurations this near to their limit depend smoothly on a drift, as a search asks
-)
+STEADY: Final = 1e-11  # [rad] and [m]: so near to their limit, configurations depend smoothly on a drift
 KINKED: Final = 1e-4  # [rad] and [m] to which passes settle where nearest points slide round edges: no nearer do they
 ONLY: Final = np.zeros(1, dtype=np.intp)  # the one cell among all of a collocation
 

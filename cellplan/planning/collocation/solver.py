@@ -35,9 +35,7 @@ FREE_PASSES: Final = 3  # before a pass is judged by that
 LONGEST_MOVE: Final = np.pi  # [rad] or [m]: a pass that moves a joint farther has lost its way
 OVERSHOOT: Final = 2.0  # largest error anywhere, of the largest that is checked; see `_errors`
 TOOL_SHARE: Final = 0.25  # of the accuracy: tool errors at the nodes that passes may leave
-CONFIGURATION_SHARE: Final = (
-    10.0  # configurations may be this many times as far from their limit as tools, in [rad] for [m]
-)
+CONFIGURATION_SHARE: Final = 10.0  # times as far from their limit as tools may configurations be, in [rad] for [m]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -30,11 +30,6 @@ class Stage:
     move: PartMove | None = None  # the straight move that grips or puts down the part; None in all other stages
     dwell: float | None = None  # time in [s] for which all robots stand; None for a motion
 
-    @property
-    def is_transfer(self) -> bool:
-        """Whether its motion is that of transfer moves, which no task describes."""
-        return self.dwell is None and not self.phase.tasks
-
 
 def program_stages(cell: Cell) -> tuple[Stage, ...]:
     """The stages of one cycle of a program from home to home.
@@ -70,13 +65,10 @@ def _worked_on(cell: Cell) -> Iterator[Stage]:
         block_cell = _cell_of_block(cell, block, first)
         work = _phase(block_cell, f"work-{number}")
         if block.dwell > 0.0:
-            yield Stage(phase=_dwell(work, f"dwell-{number}"), cell=_without_tasks(block_cell), dwell=block.dwell)
+            standing = {robot: Hold(at_home=robot in work.idle) for robot in work.roles}
+            dwell = Phase(name=f"dwell-{number}", roles=standing)
+            yield Stage(phase=dwell, cell=_without_tasks(block_cell), dwell=block.dwell)
         yield Stage(phase=work, cell=block_cell)
-
-
-def _dwell(work: Phase, name: str) -> Phase:
-    """A phase in which all robots stand where another one begins."""
-    return Phase(name=name, roles={robot: Hold(at_home=robot in work.idle) for robot in work.roles})
 
 
 def _at_home(cell: Cell, name: str) -> Phase:
@@ -109,7 +101,8 @@ def _straight(cell: Cell, move: PartMove, place: PartPlaceEntry) -> Stage:
     holder = cell.positioners[0]
     move_cell = with_move(replace(cell, robots=robots), move, place, holder)
     motion = replace(move_cell.motion, mode=Mode.SIMULTANEOUS, duration=None, cyclic=False)
-    move_cell = replace(move_cell, robots=_with_start(move_cell.robots, holder, None), motion=motion)
+    robots = tuple(replace(robot, start=None) if robot.name == holder else robot for robot in move_cell.robots)
+    move_cell = replace(move_cell, robots=robots, motion=motion)
     is_lying = move in (PartMove.GRIP, PartMove.RELEASE)
     return Stage(phase=_phase(move_cell, move.value), cell=move_cell, move=move, place=place if is_lying else None)
 
@@ -141,10 +134,6 @@ def task_start(robot: Robot, task: Task, first: dict[str, str]) -> Array | None:
     if task.start_posture is not None:
         return task.start_posture
     return robot.start if first[robot.name] == task.name else None
-
-
-def _with_start(robots: Sequence[Robot], name: str, start: Array | None) -> tuple[Robot, ...]:
-    return tuple(replace(robot, start=start) if robot.name == name else robot for robot in robots)
 
 
 def _with_transfers(cell: Cell, program: ProgramEntry, between: Sequence[Stage]) -> Iterator[Stage]:

@@ -32,9 +32,7 @@ class Failures:
     """
 
     arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
-    missed: dict[str, list[MissedGoal]] = field(
-        default_factory=dict
-    )  # goals that no configuration within the limits reaches
+    missed: dict[str, list[MissedGoal]] = field(default_factory=dict)  # goals that no configuration reaches
     misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
     beyond: dict[str, list[Array]] = field(default_factory=dict)
     off: dict[str, tuple[float, float]] = field(default_factory=dict)

@@ -104,11 +104,6 @@ def on_nearest_turns(model: RobotModel, q: Array) -> Array:
     return q - 2 * np.pi * np.where(turning, np.round((q - middle) / (2 * np.pi)), 0.0)
 
 
-def margin_shares(model: RobotModel, q: Array) -> Array:
-    """Smallest distance to a joint limit as share of half the range, shape (...): 1 in the middle, 0 on a limit."""
-    return joint_margin_shares(model, q).min(axis=-1)
-
-
 def joint_margin_shares(model: RobotModel, q: Array) -> Array:
     """Distance of each joint to its nearer limit as share of half its range, 1 where it has none, shape (..., n)."""
     bounded = np.isfinite(model.lower) & np.isfinite(model.upper)

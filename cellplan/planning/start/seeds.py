@@ -81,9 +81,7 @@ def with_seeds(
     """
     moved: list[MovedStart] = []
     carriers = cell.positioners[:1]
-    for relation in sorted(
-        cell.relations, key=lambda relation: relation.robot not in carriers
-    ):  # the part goes with a carrier
+    for relation in sorted(cell.relations, key=lambda it: it.robot not in carriers):  # the part goes with a carrier
         robot = cell.robot(relation.robot)
         holder = cell.robot(carriers[0]).start if carriers else None
         X_WR = part_pose(cell, holder) if relation.relative_to is Frame.PART else np.eye(4)

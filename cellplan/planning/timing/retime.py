@@ -40,9 +40,7 @@ MOST_TIGHTENINGS: Final = 6  # [-] times that the speed is lowered where tools m
 MOST_ROOTS: Final = 8  # [-] times that errors between rows are taken to grow with the square of the step
 MARGIN: Final = 1e-7  # [-] by which a motion is made slower than the limits ask for
 
-Slower = Callable[
-    [Array, Array], float
-]  # nominal times and joints in the rows -> factor of time that the limits ask for
+Slower = Callable[[Array, Array], float]  # nominal times and joints in the rows -> factor of time for the limits
 
 
 class StepTolerance(Protocol):

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Flags, Indices
 from cellplan.geometry.transforms import Array
 from cellplan.model.report import ClearanceClass
-from cellplan.scene.near import NearPairs
+from cellplan.scene.near import NearPairs, near_pairs_of
 from cellplan.scene.near_table import NearTable, WatchedPairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -45,7 +45,6 @@ class ClosestPairs:
             classes: Classes of pairs that are considered; those of one robot with itself only when asked for.
         """
         self._scene = scene
-        self._X_WB = np.array([robot.X_WB for robot in scene.cell.robots])
         chosen = np.array([pair.rule is Rule.CLEARANCE and pair.clearance_class in classes for pair in scene.pairs])
         self._table = _among(scene.near_table, chosen)
 
@@ -64,18 +63,7 @@ class ClosestPairs:
             q: Stacked joint vectors, shape (K, nq), in [rad] or [m].
             within: Distance in [m] from which on pairs are left out.
         """
-        table = self._table
-        D = table.forest.displacements(q, self._X_WB)
-        nearby = table.find(self._scene.engine, D, within)
-        return NearPairs(
-            rows=nearby.rows,
-            samples=nearby.samples,
-            distances=nearby.distances,
-            normals=nearby.normals,
-            first=nearby.first,
-            second=nearby.second,
-            by_joints=table.by_joints(D, nearby),
-        )
+        return near_pairs_of(self._table, self._scene, q, within)
 
     def at(self, q: Array, *, within: float) -> tuple[ClosestPair, ...]:
         """Pairs nearer than a distance at one configuration, shape (nq,), in the order of ``Scene.pairs``.

@@ -22,9 +22,7 @@ from cellplan.planning.tracking.task_constraints import TaskConstraints, constra
 
 Drift = Callable[[int, Array], Array]
 
-LOST_DISTANCE: Final = (
-    0.5  # [m] a tool this far from its path has left it for good: the configuration means nothing any more
-)
+LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it: the configuration means nothing any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)

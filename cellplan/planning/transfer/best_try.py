@@ -22,9 +22,7 @@ from cellplan.scene.pairs import ScenePair
 from cellplan.scene.scene import Scene
 
 STEP: Final = 0.05  # [s] between two rows of a try at top speed: some 5 deg of an arm
-DEPTHS: Final = (
-    24  # [-] configurations of a try at which the depth of a pair that touches is measured, and as many at the deepest
-)
+DEPTHS: Final = 24  # [-] configurations of a try at which a touching pair is measured, and as many at the deepest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

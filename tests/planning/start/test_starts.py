@@ -17,7 +17,7 @@ from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.planning.start.inverse_kinematics import (
-    margin_shares,
+    joint_margin_shares,
     random_configurations,
     reaching_configurations,
     within_limits,
@@ -151,7 +151,7 @@ def test_a_wrist_that_turns_round_begins_where_a_whole_turn_has_room(tmp_path):
     schedule = schedule_tasks(cell, list(toolpaths.values()))
     q = integrate_schedule(MotionTask(cell, schedule, ["kuka"], start)).q
     assert abs(q[-1, 3] - q[0, 3]) == pytest.approx(2 * np.pi, abs=1e-2)  # the tracking error at the end of the path
-    assert margin_shares(cell.robot("kuka").model, q).min() > 0.0
+    assert joint_margin_shares(cell.robot("kuka").model, q).min() > 0.0
 
 
 @pytest.mark.slow
@@ -239,8 +239,8 @@ def test_turning_joints_are_brought_back_by_whole_turns(cell):
 def test_margin_share_is_one_in_the_middle_and_nil_on_a_limit(cell):
     model = cell.robot("kuka").model
     middle = 0.5 * (model.lower + model.upper)
-    assert margin_shares(model, middle) == pytest.approx(1.0)
-    assert margin_shares(model, model.upper) == pytest.approx(0.0)
+    assert joint_margin_shares(model, middle) == pytest.approx(1.0)
+    assert joint_margin_shares(model, model.upper) == pytest.approx(0.0)
 
 
 def test_a_task_that_settles_may_start_beside_its_path(cell):

@@ -53,14 +53,14 @@ class XacroSettings:
 def read_elements(
     path: Path, settings: XacroSettings | None, remarks: Remarks
 ) -> tuple[Element, tuple[Path, ...] | None]:
-    """The root element of an XML file, and what a xacro file includes; None for a file that is none.
+    """The root element of an XML file, and the files that a xacro file includes, each once; None for another file.
 
     Args:
         path: The file; one whose name ends in ``.xacro`` is expanded.
         settings: What a xacro file needs to be expanded.
     """
     if path.suffix.lower() == XACRO_SUFFIX:
-        return expand_xacro(path, settings or XacroSettings(), remarks)
+        return _Expansion(path, settings or XacroSettings(), remarks).run()
     return read_xml(path), None
 
 
@@ -70,18 +70,6 @@ def argument_names(path: Path) -> frozenset[str]:
     return frozenset(
         name.decode(errors="replace") for pattern in (DECLARED, ARGUMENT) for name in pattern.findall(text)
     )
-
-
-def expand_xacro(path: Path, settings: XacroSettings, remarks: Remarks) -> tuple[Element, tuple[Path, ...]]:
-    """Expand a xacro file.
-
-    Returns:
-        The root element, and the files that were read beside the first one, each once.
-
-    Raises:
-        InputError: With file and, where it is known, line, for a file that cannot be expanded.
-    """
-    return _Expansion(path, settings, remarks).run()
 
 
 class _Files:

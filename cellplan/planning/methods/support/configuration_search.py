@@ -33,9 +33,7 @@ class Bounds:
         return np.clip(q, self.lowest, self.highest)
 
 
-Pass = Callable[
-    [Expansion, Bounds, int], tuple[Expansion, int]
-]  # from an expansion, with so many rounds left, to a better one
+Pass = Callable[[Expansion, Bounds, int], tuple[Expansion, int]]  # with so many rounds left, to a better expansion
 
 
 class ConfigurationSearch:
