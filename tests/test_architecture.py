@@ -41,8 +41,14 @@ def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def functions(tree: ast.AST) -> Iterator[Function]:
-    return (node for node in ast.walk(tree) if isinstance(node, Function))
+@cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of the tree of a file."""
+    return tuple(ast.walk(parsed(path)))
+
+
+def functions(path: Path) -> Iterator[Function]:
+    return (node for node in nodes(path) if isinstance(node, Function))
 
 
 def has_docstring(node: Function) -> bool:
@@ -66,7 +72,7 @@ def parameters(node: Function) -> list[ast.arg]:
 @cache
 def imported_modules(path: Path) -> set[str]:
     modules = set()
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             modules |= {alias.name.partition(".")[0] for alias in node.names}
         if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
@@ -93,7 +99,7 @@ def test_functions_and_classes_stay_small() -> None:
 
 def oversized(path: Path) -> Iterator[str]:
     """Functions and classes of a file that are too large."""
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if isinstance(node, Function):
             if body_lines(node) > BODY_LINES:
                 yield f"{node.name}: {body_lines(node)} lines"
@@ -131,10 +137,9 @@ def test_no_import_closes_a_circle() -> None:
 
 def module_imports(path: Path) -> set[str]:
     """Modules from which a file imports names, without those that it imports for type checkers only."""
-    nodes = list(ast.walk(parsed(path)))
-    branches = [node for node in nodes if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
+    branches = [node for node in nodes(path) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
     for_types = {child for branch in branches for statement in branch.body for child in ast.walk(statement)}
-    found = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module and node not in for_types]
+    found = [node for node in nodes(path) if isinstance(node, ast.ImportFrom) and node.module and node not in for_types]
     return {node.module for node in found} | {f"{node.module}.{alias.name}" for node in found for alias in node.names}
 
 
@@ -207,7 +212,7 @@ def test_every_test_asserts_something() -> None:
 def called_names(path: Path) -> dict[str, set[str]]:
     """What each function of a file calls, by the last part of the name; a statement ``assert`` counts as a call."""
     found: dict[str, set[str]] = {}
-    for node in functions(parsed(path)):
+    for node in functions(path):
         names = found.setdefault(node.name, set())
         for child in ast.walk(node):
             if isinstance(child, ast.Assert):
@@ -231,7 +236,7 @@ BLOCKING = {"wait", "join", "result", "exception", "acquire", "communicate"}  # 
 def waits_without_limit(path: Path) -> list[str]:
     """Calls of a file that wait for a process, a thread or an answer for as long as it takes."""
     lines = []
-    for node in ast.walk(parsed(path)):
+    for node in nodes(path):
         if not isinstance(node, ast.Call) or any(keyword.arg == "timeout" for keyword in node.keywords):
             continue
         is_method = isinstance(node.func, ast.Attribute) and node.func.attr in BLOCKING

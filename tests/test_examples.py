@@ -53,9 +53,9 @@ WRITTEN = {
     "plot_joint": ["outputs/examples/joint.png"],
     "solve": ["outputs/examples/solve/report.html", "outputs/examples/solve/tables/right.csv"],
 }
-MARKS = dict.fromkeys(
-    ("gallery/layout_result", "gallery/sweep_into_frame", "layout"), pytest.mark.slow
-)  # with processes
+PROCESSES = ("gallery/layout_result", "gallery/sweep_into_frame", "layout")
+OTHERS = ("batch_of_cells", "rehearse", "gallery/clearance_over_time", "gallery/solve_and_plot")  # solve as others do
+MARKS = dict.fromkeys((*PROCESSES, *OTHERS), pytest.mark.slow)
 
 
 def test_every_example_is_run() -> None:

@@ -105,6 +105,7 @@ def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Pa
     assert not any(lives(helper) for helper in helpers)
 
 
+@pytest.mark.slow
 def test_a_program_that_is_killed_leaves_no_process_behind(cells: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
         [*PROGRAM, "solve", str(cells / "four_robots.yaml"), "-q", "-o", str(tmp_path / "run"), "--duration", "60"]

@@ -109,6 +109,8 @@ LONG = {  # their commands and functions have tests of their own, which are quic
     "see-the-cell.md",
     "skew.md",
     "stops.md",
+    "README.md",
+    "keep-the-branch.md",
 }
 RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else ()) for page in PAGES]
 

@@ -360,6 +360,7 @@ def test_a_figure_that_follows_its_recipe_is_in_the_table_of_a_sweep(extended: P
     assert 0.0 < values[0] < 3.0
 
 
+@pytest.mark.slow
 def test_a_kind_of_result_that_follows_its_recipe_is_written_and_shown(extended: Path) -> None:
     run(extended, "travels", "plate.yaml", "-o", "travels")
 

@@ -139,6 +139,7 @@ def require_the_same_motion(cell: Path, folder: Path, names: list[str]) -> None:
             np.testing.assert_allclose(other_joints, joints, rtol=0.0, atol=JOINTS_DEG, err_msg=file)
 
 
+@pytest.mark.slow
 def test_kernels_of_the_linear_algebra_change_no_verdict_and_no_printed_figure(tmp_path: Path) -> None:
     require_the_same_motion(write_cell(tmp_path / "cell"), tmp_path, ["Haswell", "Sandybridge"])
 

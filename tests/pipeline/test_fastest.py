@@ -75,6 +75,7 @@ def test_the_common_speed_is_faster_and_its_path_the_same(found: ShortestCycles)
     assert np.abs(cycle.solution.motion.q[-1] - laws.solution.motion.q[-1]).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_the_command_says_the_same(cell: Cell, found: ShortestCycles, tmp_path: Path) -> None:
     status, out, err = run_command(f"cellplan fastest {cell.origin.file} --json --points 0 --quiet", tmp_path)
 

@@ -107,6 +107,7 @@ def test_a_feed_that_no_joint_can_hold_is_named_with_the_greatest_that_holds(tmp
     assert "joint_acceleration_assumed" in failed[1]
 
 
+@pytest.mark.slow
 def test_two_feeds_that_do_not_hold_are_both_named(tmp_path: Path) -> None:
     cell = cell_of(tmp_path, THREE_FEEDS.replace("feed_mm_s: 50", "feed_mm_s: 900"))
 

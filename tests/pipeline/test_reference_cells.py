@@ -87,6 +87,7 @@ def test_first_layout_breaks_kuka_b2_and_staubli_c4(initial):
     assert not failed(initial.runs[0].report, "joint_velocity")
 
 
+@pytest.mark.slow
 def test_pairwise_passes_for_each_task_while_the_others_stand_still(pairs):
     assert pairs.passed
     assert [run.name for run in pairs.runs] == ["circle", "rhombus", "rectangle"]
@@ -106,6 +107,7 @@ def test_with_the_part_at_rest_staubli_d4_and_f4_break_position_and_speed(at_res
     assert np.ptp(report.q["reis"], axis=0).max() == 0.0
 
 
+@pytest.mark.slow
 def test_positioner_works_harder_together_than_in_pairs_and_operators_hardest_alone(four_robots, pairs, at_rest):
     """The qualitative conclusion of section 5.6: travel of the REIS and of the operators in modes 1, 2 and 3."""
 
@@ -156,6 +158,7 @@ def test_moving_the_whole_cell_changes_nothing(coarse):
         )  # [m] twice 0.1 mm
 
 
+@pytest.mark.slow
 def test_written_tables_verify_and_any_edit_shows(coarse):
     tables = dict(coarse.runs[0].program.tables)
     assert verify(coarse.cell, tables).passed
@@ -223,6 +226,7 @@ def test_resolved_cell_gives_the_same_motion(coarse, tmp_path):
     np.testing.assert_array_equal(again.runs[0].motion.q, coarse.runs[0].motion.q)
 
 
+@pytest.mark.slow
 def test_failed_run_leaves_no_tables_unless_asked(initial, tmp_path):
     write_run(initial, tmp_path / "plain")
     write_run(initial, tmp_path / "kept", keep_rejected=True)
@@ -236,6 +240,7 @@ def test_failed_run_leaves_no_tables_unless_asked(initial, tmp_path):
         assert "# verdict: REJECTED: joint kuka/B2 is" in tables[robot.name]
 
 
+@pytest.mark.slow
 def test_pairwise_writes_one_program_and_a_report_for_each_task(pairs, tmp_path):
     write_run(pairs, tmp_path / "run")
     record = json.loads((tmp_path / "run" / "report.json").read_text())
@@ -246,6 +251,7 @@ def test_pairwise_writes_one_program_and_a_report_for_each_task(pairs, tmp_path)
         assert json.loads((tmp_path / "run" / name / "report.json").read_text())["status"] == "passed"
 
 
+@pytest.mark.slow
 def test_idle_robots_stand_at_homes_that_are_free_of_the_part(pairs, cells, tmp_path):
     """At their own tasks two of them would be in its way; the thesis takes them out of the cell altogether."""
     cell = load_cell(cells / "four_robots.yaml")

@@ -34,6 +34,7 @@ LONG = {
     "three_tasks_each",
     "in_turn",
     "fixed_part",
+    "four_controllers",
     "load_sharing",
     "mesh_part_csv",
     "multimove",

@@ -81,6 +81,7 @@ def kill_at_random(folder: Path, moment: random.Random, workers: int) -> bool:
     return is_killed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, pytest.param(50, marks=pytest.mark.slow)])
 def test_kills_at_random_moments_lose_no_finished_trial(tmp_path: Path, count: int) -> None:
     whole, moment, kills, study = undisturbed(tmp_path / "whole"), random.Random(count), 0, 0

@@ -79,6 +79,7 @@ def test_the_patches_of_a_surface_hold_what_their_halves_hold() -> None:
     np.testing.assert_array_equal(covered, np.sort(triangles.mean(axis=1), axis=0))
 
 
+@pytest.mark.slow
 def test_a_tool_is_as_deep_in_bodies_that_touch_as_in_the_one_solid_they_make() -> None:
     rng, tool = np.random.default_rng(8), prepare("tool", Box((0.004, 0.004, 0.2)))
     hosts = [prepare("part", mesh) for mesh in (assembly(), as_one())]

@@ -22,6 +22,7 @@ def searched(folder: Path, **endless: tuple[str, ...]) -> LayoutResult:
     return searched_pair(folder, *settings)
 
 
+@pytest.mark.slow
 def test_an_endless_joint_changes_nothing_where_two_turns_do_not_bind(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> None:

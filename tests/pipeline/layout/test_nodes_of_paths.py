@@ -68,6 +68,7 @@ def test_a_path_that_bends_between_its_knots_gets_more_nodes_and_a_smooth_one_no
     assert enough_nodes(prepared(request_of(wavy, points=400, wave=40.0)).schedule, NODES) <= 2 * MOST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("points", "wave"), [(25, 20.0), pytest.param(30, 30.0, marks=pytest.mark.slow)])
 def test_a_layout_that_solve_passes_is_followed_and_certified(tmp_path: Path, points: int, wave: float) -> None:
     slow = ("motion.duration_s=60", "motion.step_s=0.02")

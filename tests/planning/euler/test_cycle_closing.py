@@ -52,6 +52,7 @@ def test_four_robots_come_back_only_when_they_are_asked_to() -> None:
     assert drift[True] < np.radians(0.005)  # the tools come back to within the tracking error of a step of 10 ms
 
 
+@pytest.mark.slow
 def test_a_closed_motion_follows_the_tasks_as_well_as_an_open_one() -> None:
     """The drift lies in the null space of the tasks, so that the error stays that of Euler's method."""
     errors = {}

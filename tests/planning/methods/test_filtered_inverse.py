@@ -53,6 +53,7 @@ def test_case_two_lets_the_filtered_inverses_nearer_to_the_singular_point_with_l
         assert settled(run, run.manipulability).min() < settled(damped, damped.manipulability).min() < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_case_three_avoids_the_singular_point_below_four_radians_per_second_and_comes_back(step):
     for run in runs("III", step).values():
