@@ -28,7 +28,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion, Schedule
-from cellplan.model.solver import NULL_SPACE_METHODS, Integrator, MethodName
+from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
@@ -123,10 +123,10 @@ CASES = (
 def problem_of(case: Case) -> Problem:
     """The cell with its toolpaths on the part, its start posture found and its clock set, for Euler's steps."""
     cell = load_cell(ROOT / case.file)
-    cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.EULER))
+    cell = replace(cell, solver=cell.solver.changed(integrator="euler"))
     if case.step_s is not None:
         gain = cell.solver.gain * cell.motion.step / case.step_s
-        motion, solver = replace(cell.motion, step=case.step_s), replace(cell.solver, gain=gain)
+        motion, solver = replace(cell.motion, step=case.step_s), cell.solver.changed(gain_per_s=gain)
         cell = replace(cell, motion=motion, solver=solver)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
     start = choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values())).start
@@ -168,7 +168,7 @@ def rows_of(case: Case, rounds: int) -> list[Row]:
 
 def followed(problem: Problem, method: MethodName) -> Motion | str:
     """The motion, or why there is none."""
-    cell = replace(problem.cell, solver=replace(problem.cell.solver, method=method))
+    cell = replace(problem.cell, solver=problem.cell.solver.changed(method=method))
     try:
         return integrate_schedule(MotionTask(cell, problem.schedule, problem.moving, problem.start))
     except CellplanError as error:

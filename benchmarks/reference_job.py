@@ -152,7 +152,7 @@ def _schedule(cell: Cell) -> Schedule:
 def _end(cell: Cell, steps: int, *, start: Array) -> Array:
     """Where the joints end by so many Euler steps per sample, with the feedback as strong in each, shape (nq,)."""
     motion = replace(cell.motion, step=cell.motion.step / steps)
-    finer = replace(cell, motion=motion, solver=replace(cell.solver, gain=cell.solver.gain * steps))
+    finer = replace(cell, motion=motion, solver=cell.solver.changed(gain_per_s=cell.solver.gain * steps))
     end: Array = integrate_schedule(
         MotionTask(finer, _schedule(finer), [robot.name for robot in cell.robots], start)
     ).q[-1]

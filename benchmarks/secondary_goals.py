@@ -8,7 +8,7 @@ import argparse
 import statistics
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,24 +17,20 @@ import numpy as np
 from cellplan import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Motion
-from cellplan.model.solver import GoalKind, Integrator, SecondaryGoal
+from cellplan.model.settings.solver import SecondaryEntry
+from cellplan.model.solver import Integrator
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.tracking.motion_task import MotionTask
 
 ROOT = Path(__file__).resolve().parent.parent
-GAINS = {
-    GoalKind.MANIPULABILITY: 1.0,
-    GoalKind.JOINT_LIMITS: 100.0,
-    GoalKind.OBSTACLES: 0.1,
-    GoalKind.POSTURE: 1.0,
-}  # the defaults of the cell file
+GOALS = tuple(SecondaryEntry.model_fields)
 
 
-def motion_task(cell: Cell, goals: Sequence[SecondaryGoal], integrator: Integrator) -> MotionTask:
+def motion_task(cell: Cell, goals: Mapping[str, Mapping[str, float]], integrator: Integrator) -> MotionTask:
     """The cell's tasks with these goals; it has its start postures."""
-    cell = replace(cell, solver=replace(cell.solver, goals=tuple(goals), integrator=integrator))
+    cell = replace(cell, solver=cell.solver.changed(secondary=goals, integrator=integrator))
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     return MotionTask(cell, schedule, tuple(robot.name for robot in cell.robots), start)
@@ -49,7 +45,7 @@ def main() -> None:
     if options.rounds < 1:
         parser.error("--rounds: expected at least 1")
     cell = load_cell(ROOT / options.cell)
-    goals = {"none": (), **{kind.value: (SecondaryGoal(kind=kind, gain=gain),) for kind, gain in GAINS.items()}}
+    goals: dict[str, dict[str, dict[str, float]]] = {"none": {}, **{name: {name: {}} for name in GOALS}}
     cases = [(name, integrator) for name in goals for integrator in (Integrator.ACCURATE, Integrator.EULER)]
     times: dict[tuple[str, Integrator], list[float]] = {case: [] for case in cases}
     motions: dict[tuple[str, Integrator], Motion] = {}

@@ -25,7 +25,7 @@ from cellplan.model.cell import Cell, Mode, MotionSettings, Obstacle, Part, Robo
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
@@ -88,7 +88,7 @@ def scene_with(model: RobotModel, things: Sequence[Obstacle]) -> Scene:
         tasks=(),
         obstacles=(floor, *things),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=ROW_STEP),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        solver=SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=500.0),
         checks=ChecksEntry(clearance_mm=1e3 * CLEARANCE),
         origin=Origin(),
         inputs={},

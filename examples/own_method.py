@@ -11,7 +11,6 @@ import numpy as np
 
 import cellplan.planning.methods
 from cellplan import load_cell, solve
-from cellplan.model.solver import Integrator
 from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 CELL = Path(__file__).resolve().parent / "plate.yaml"
@@ -31,7 +30,7 @@ def own_method(problem: TrackingProblem):
 if __name__ == "__main__":
     cellplan.planning.methods.__path__.append(str(Path(__file__).resolve().parent))
     cell = load_cell(CELL)
-    cell = replace(cell, solver=replace(cell.solver, method="own_method", integrator=Integrator.EULER))
+    cell = replace(cell, solver=cell.solver.model_copy(update={"method": "own_method", "integrator": "euler"}))
     (task,) = solve(cell).runs[0].report.accuracy
     error = np.linalg.norm(task.position_error, axis=1).max()  # [m]
     print(f"{task.task}: {len(task.position_error) - 1} Euler steps, position error {1e3 * error:.4f} mm")

@@ -48,7 +48,7 @@ def test_nothing_is_taken_for_a_cell_with_another_value_and_nothing_can_be_spoil
     first.motion.q[:] = 0.0
 
     np.testing.assert_array_equal(solve(cell).motion.q, expected)
-    other = solve(replace(cell, solver=replace(cell.solver, seed=cell.solver.seed + 1)))
+    other = solve(replace(cell, solver=cell.solver.changed(seed=cell.solver.seed + 1)))
 
     assert len(list(memo.iterdir())) == 2
     assert other.cell.solver.seed == cell.solver.seed + 1

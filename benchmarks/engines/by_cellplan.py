@@ -7,7 +7,6 @@ from pathlib import Path
 from job import Array, Job
 
 from cellplan import load_cell
-from cellplan.model.solver import Integrator
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -20,7 +19,7 @@ def prepare(job: Job, *, accuracy_m: float) -> Callable[[], Array]:
     The targets of the nodes, which are not those of the samples, are computed within the run.
     """
     cell = load_cell(Path(job.cell))
-    solver = replace(cell.solver, integrator=Integrator.ACCURATE, accuracy=accuracy_m)
+    solver = cell.solver.changed(integrator="accurate", accuracy_mm=1e3 * accuracy_m)
     cell = replace(cell, solver=solver)
     schedule = schedule_tasks(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     moving = [robot.name for robot in cell.robots]

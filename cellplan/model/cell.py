@@ -22,7 +22,7 @@ from cellplan.model.rod import Rod
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.program import ProgramEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task import Frame, Task
 
 
@@ -273,7 +273,7 @@ class Cell(Presented):
     tasks: tuple[Task, ...]
     obstacles: tuple[Obstacle, ...]
     motion: MotionSettings
-    solver: SolverSettings
+    solver: SolverEntry
     checks: ChecksEntry
     origin: Origin
     inputs: Mapping[str, str]

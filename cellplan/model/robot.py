@@ -1,5 +1,6 @@
 """Robot: joint axes and link bodies at the reference configuration, where every joint reads zero."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
@@ -10,6 +11,7 @@ from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array, is_rigid
 from cellplan.model.controller import ControllerZero
 from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry, ReachEntry
+from cellplan.model.settings.units import Deg, Mm, in_si
 from cellplan.model.units import DisplayUnit, joint_unit
 
 BASE = -1  # index of the link that does not move, where a link is named by the joint that carries it
@@ -248,3 +250,15 @@ class RobotModel:
     def velocity(self) -> Array:
         """Speed limits, shape (n,)."""
         return np.array([joint.velocity for joint in self.joints])
+
+
+def start_keys(model: RobotModel) -> tuple[str, ...]:
+    """Keys of a start posture by joint name: ``a1_deg``, ``rail_mm``."""
+    return tuple(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in model.joints)
+
+
+def configuration_in_si(model: RobotModel, given: Iterable[float] | Mapping[str, float]) -> Array:
+    """Joint positions in [rad] or [m] from degrees and millimetres, in order or by key, shape (n,)."""
+    values = [given[key] for key in start_keys(model)] if isinstance(given, Mapping) else given
+    pairs = zip(model.joints, values, strict=True)
+    return in_si(Deg(value) if joint.is_revolute else Mm(value) for joint, value in pairs)

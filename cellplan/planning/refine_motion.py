@@ -59,7 +59,7 @@ def _with_errors(motion: Motion, task: MotionTask) -> tuple[Motion, Array]:
     errors = AccurateRun(replace(task, start=motion.q[0])).errors(schedule, motion.q[:last])
     worst = max(made.error_between, float(errors.max(initial=0.0)))
     checked = replace(motion, resolution=replace(made, error_between=worst))
-    return checked, schedule.times[:last][_peaks(errors, task.cell.solver.accuracy)]
+    return checked, schedule.times[:last][_peaks(errors, task.cell.solver.accuracy_mm.si)]
 
 
 def _peaks(errors: Array, allowed: float) -> NDArray[np.bool_]:

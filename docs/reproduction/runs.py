@@ -74,7 +74,7 @@ def paper_cell(name: str, *, method: str | None = None, values: Mapping[str, obj
         cell = cell.with_values(values)
     if method is not None and str(OWN_METHODS) not in cellplan.planning.methods.__path__:
         cellplan.planning.methods.__path__.append(str(OWN_METHODS))
-    return cell if method is None else replace(cell, solver=replace(cell.solver, method=method))  # type: ignore[arg-type]
+    return cell if method is None else replace(cell, solver=cell.solver.model_copy(update={"method": method}))
 
 
 def curves(cell: Cell) -> Curves:

@@ -85,10 +85,10 @@ def straight(cell: Cell, start: Sequence[float], way: Sequence[float], *, step: 
                 end=float(times[-1]),
             )
         )
-    settings = replace(cell.solver, gain=0.5 / step, search=SearchEntry(rounds=ROUNDS))
+    settings = cell.solver.changed(gain_per_s=0.5 / step, search=SearchEntry(rounds=ROUNDS))
     cell = replace(
         cell,
-        solver=replace(settings, **solver),
+        solver=settings.changed(**solver),
         motion=replace(cell.motion, step=step, duration=float(times[-1])),
         robots=tuple(replace(robot, start=q[cell.columns(robot.name)]) for robot in cell.robots),
     )
@@ -171,9 +171,9 @@ SITUATIONS: dict[str, Callable[[], Situation]] = {
     "step a hundred times too long": lambda: planar(BENT, [1.5, 1.0, 0], step=0.2),
     "whole path in the reach of one step": lambda: planar(BENT, [-5.0, 0.3, 0], step=0.2),
     "start off the path": off_the_path,
-    "gain at its upper bound": lambda: planar(BENT, [0.1, 0.1, 0], gain=1.999 / STEP),
-    "gain at its upper bound and singular": lambda: planar([0, 0, 0], [-0.01, 0, 0], gain=1.999 / STEP),
-    "hardly any gain": lambda: planar(BENT, [0.1, 0.1, 0], gain=1e-9),
+    "gain at its upper bound": lambda: planar(BENT, [0.1, 0.1, 0], gain_per_s=1.999 / STEP),
+    "gain at its upper bound and singular": lambda: planar([0, 0, 0], [-0.01, 0, 0], gain_per_s=1.999 / STEP),
+    "hardly any gain": lambda: planar(BENT, [0.1, 0.1, 0], gain_per_s=1e-9),
     "damping 0": lambda: planar(BENT, [0.1, 0.1, 0], damping=0.0),
     "damping 0 and singular": lambda: planar([0, 0, 0], [-0.01, 0, 0], damping=0.0),
     "damping 0 and all but singular": lambda: planar([0, 1e-7, 0], [-0.01, 0, 0], damping=0.0),

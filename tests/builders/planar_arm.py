@@ -40,7 +40,7 @@ def planar_arm_cell(*, method: str = "quadratic_program", limits: dict[str, dict
         robots=(arm,),
         part=replace(cell.part, X_WP=np.eye(4)),
         tasks=(make_task("arm", axes=(0, 1)),),
-        solver=replace(cell.solver, method=method, gain=500.0),
+        solver=cell.solver.changed(method=method, gain_per_s=500.0),
     )
 
 

@@ -10,11 +10,11 @@ from builders.random_cells import make_task, random_cell
 from cellplan.geometry.transforms import Array, pose_from
 from cellplan.model.cell import Cell, Part, Robot, Tool
 from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.solver import SolverSettings
 
 
-def planar_cell(lengths: Sequence[float], solver: SolverSettings, *, settle: float = 0.0) -> Cell:
+def planar_cell(lengths: Sequence[float], solver: SolverEntry, *, settle: float = 0.0) -> Cell:
     """One arm in the plane z = 0 of the world, which is the part's frame; its task is the position of its tip."""
     joints = np.concatenate([[0.0], np.cumsum(lengths)])
     axes = [("R", (0.0, 0.0, 1.0), (x, 0.0, 0.0)) for x in joints[:-1]]

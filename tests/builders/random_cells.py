@@ -10,8 +10,8 @@ from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, 
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind
 
 
@@ -130,7 +130,7 @@ def random_cell(
         tasks=tuple(make_task(name) for name in names[1:]),
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=1e-3),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        solver=SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=500.0),
         checks=ChecksEntry(),
         origin=Origin(),
         inputs={},

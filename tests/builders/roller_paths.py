@@ -9,7 +9,7 @@ from cellplan.geometry.transforms import Array, pose, rotation_vector
 from cellplan.model.cell import Cell, Mode, MotionSettings, Part
 from cellplan.model.origin import Origin
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task import (
     CirclePath,
     PathSpec,
@@ -67,7 +67,7 @@ def clocked(*tasks: Task, duration: float | None = 4.0, step: float = 0.001, ori
         tasks=tasks,
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=duration, step=step),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        solver=SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=500.0),
         checks=ChecksEntry(),
         origin=origin,
         inputs={},

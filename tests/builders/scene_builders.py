@@ -11,8 +11,8 @@ from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import Body, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 
 QUARTER = 0.5 * np.pi
@@ -144,7 +144,7 @@ def make_cell(*robots: Robot, part: Part | None = None, things=(), tasks=(), che
         tasks=tuple(tasks),
         obstacles=tuple(things),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=1.0, step=0.001),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=500.0, damping=None, seed=0),
+        solver=SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=500.0),
         checks=checks or ChecksEntry(),
         origin=Origin(),
         inputs={},

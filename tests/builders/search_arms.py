@@ -16,8 +16,7 @@ from cellplan.model.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.model.settings.solver import SearchEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SearchEntry, SolverEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -71,7 +70,7 @@ def arm_cell(model: RobotModel, *, method: str, axes=(0, 1, 2), **search) -> Cel
         start=None,
         weights=np.ones(len(model.joints)),
     )
-    solver = SolverSettings(method=method, gain=100.0, damping=None, seed=0, search=SearchEntry(**search))
+    solver = SolverEntry(integrator="euler", method=method, gain_per_s=100.0, search=SearchEntry(**search))
     return Cell(
         name="arm",
         robots=(robot,),

@@ -15,7 +15,6 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell, Grasp
 from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Motion, Schedule
-from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
 from cellplan.model.toolpath import Toolpath
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
@@ -49,7 +48,7 @@ class Case:
         """The motion, with changed solver settings; not to be changed."""
         key = ("motion", *sorted(changes.items()))
         if key not in self._planned:
-            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            cell = replace(self.cell, solver=self.cell.solver.changed(**changes))
             self._planned[key] = plan_motion(replace(self.task, cell=cell))
         return self._planned[key]
 
@@ -57,7 +56,7 @@ class Case:
         """The whole motion as polynomials; not to be changed."""
         key = ("path", *sorted(changes.items()))
         if key not in self._planned:
-            cell = replace(self.cell, solver=replace(self.cell.solver, **changes))
+            cell = replace(self.cell, solver=self.cell.solver.changed(**changes))
             run = AccurateRun(replace(self.task, cell=cell))
             self._planned[key] = run.path(self.start, begin=0.0, end=run.end)
         return self._planned[key]
@@ -71,7 +70,7 @@ def case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | N
 
 
 def _case_of(cell: Cell, *, moving: Sequence[str] | None = None, start: Array | None = None) -> Case:
-    cell = replace(cell, solver=replace(cell.solver, integrator=Integrator.ACCURATE))
+    cell = replace(cell, solver=cell.solver.changed(integrator="accurate"))
     schedule = schedule_paths(cell, [clock_path(cell, task, build_toolpath(task, cell.part)) for task in cell.tasks])
     if start is None:
         start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
@@ -105,7 +104,7 @@ def slowly_clocked(cell: Cell, step: float, **changes: Any) -> Cell:
     return replace(
         cell,
         motion=replace(cell.motion, step=step, **changes),
-        solver=replace(cell.solver, gain=0.5 / step),
+        solver=cell.solver.changed(gain_per_s=0.5 / step),
     )
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from cellplan.geometry.transforms import Array
-from cellplan.model.settings.solver import DampedLeastSquaresEntry, FilteredInverseEntry
-from cellplan.model.solver import MethodName, SolverSettings
+from cellplan.model.settings.solver import DampedLeastSquaresEntry, FilteredInverseEntry, SolverEntry
+from cellplan.model.solver import MethodName
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 
@@ -64,9 +64,10 @@ class VargasRun:
 def vargas_run(name: str, method: MethodName, step: float) -> VargasRun:
     """One case by one method."""
     case = CASES[name]
-    solver = SolverSettings(
+    solver = SolverEntry(
+        integrator="euler",
         method=method,
-        gain=5.0,
+        gain_per_s=5.0,
         damping=0.3,
         seed=0,
         damped_least_squares=DampedLeastSquaresEntry(measure="manipulability", region=1.0),

@@ -6,7 +6,8 @@ from typing import get_args
 import pytest
 
 import cellplan.planning.methods
-from cellplan.model.solver import ACCURATE_METHODS, METHODS, NULL_SPACE_METHODS, MethodName, SolverSettings
+from cellplan.model.settings.solver import SolverEntry
+from cellplan.model.solver import ACCURATE_METHODS, METHODS, NULL_SPACE_METHODS, MethodName
 
 FOLDER = Path(cellplan.planning.methods.__file__).parent
 
@@ -31,5 +32,5 @@ def test_methods_without_a_null_space_are_those_without_a_pseudo_inverse() -> No
 def test_a_method_that_feeds_errors_back_uses_the_gain_and_a_search_does_not(name: MethodName) -> None:
     text = (FOLDER / f"{name}.py").read_text(encoding="utf-8")
 
-    assert SolverSettings(method=name, gain=1.0, damping=None, seed=0).traits is METHODS[name]
+    assert SolverEntry(integrator="euler", method=name, gain_per_s=1.0).traits is METHODS[name]
     assert ("configuration_search" in text or "search_cost" in text) == METHODS[name].is_search

@@ -61,7 +61,9 @@ def test_the_part_goes_where_the_task_in_the_world_says(planar):
 @pytest.mark.slow
 def test_moving_the_whole_cell_changes_no_joint_table(cells):
     cell = with_overrides(load_cell(cells / "load_sharing_planar.yaml"), duration=3.0)
-    cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0), obstacles=())
+    cell = replace(
+        cell, motion=replace(cell.motion, step=0.01), solver=cell.solver.changed(gain_per_s=50.0), obstacles=()
+    )
     first = solve(cell)
     X = pose((0.0, 0.0, 0.3))  # the path is given in the world: along z all three components of it stay
     robots = tuple(replace(robot, X_WB=X @ robot.X_WB) for robot in first.cell.robots)

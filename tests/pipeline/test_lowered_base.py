@@ -16,7 +16,7 @@ LOWERED = 0.7  # [m] by which the base of the REIS is too low
 @pytest.mark.slow
 def test_the_part_and_the_links_that_hit_the_floor_are_named_with_their_instants(cells):
     cell = load_cell(cells / "four_robots_initial.yaml")
-    cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=replace(cell.solver, gain=50.0))
+    cell = replace(cell, motion=replace(cell.motion, step=0.01), solver=cell.solver.changed(gain_per_s=50.0))
     run = solve(cell).runs[0]
     reis = replace(cell.robot("reis"), X_WB=pose((0.0, 0.0, -LOWERED)) @ cell.robot("reis").X_WB)
     low = Scene.from_cell(replace(cell, robots=(reis, *cell.robots[1:])))

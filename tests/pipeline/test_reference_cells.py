@@ -136,7 +136,9 @@ def test_euler_reference_agrees_with_a_finer_one(cells):
     gain = cell.motion.step * cell.solver.gain
     ends = []
     for step in (2e-3, 1e-3):
-        timed = replace(cell, motion=replace(cell.motion, step=step), solver=replace(cell.solver, gain=gain / step))
+        timed = replace(
+            cell, motion=replace(cell.motion, step=step), solver=cell.solver.changed(gain_per_s=gain / step)
+        )
         ends.append(case_of(timed).resolved(integrator=Integrator.EULER).q[-1])
     assert np.degrees(np.abs(ends[0] - ends[1]).max()) < 0.06  # Euler at 1 ms is 0.024 deg from the limit
 

@@ -70,7 +70,7 @@ def test_another_engine_sees_all_tools_on_their_paths(given: Case) -> None:
         state = model.state(motion.q[row])
         for number, scheduled in enumerate(given.schedule.tasks, start=1):
             found = inverse(state.X_WP) @ state.X_WT[number]
-            np.testing.assert_allclose(found, scheduled.X_PT[row], rtol=0.0, atol=2.0 * CELL.solver.accuracy)
+            np.testing.assert_allclose(found, scheduled.X_PT[row], rtol=0.0, atol=2.0 * CELL.solver.accuracy_mm.si)
 
 
 def test_a_path_that_stands_still_is_a_part_at_rest(free: Case) -> None:

@@ -13,7 +13,8 @@ from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangl
 from cellplan.errors import DivergedError, InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.settings.solver import SolverEntry
+from cellplan.model.solver import Integrator
 from cellplan.model.task import SpacePolylinePath
 from cellplan.planning.methods.weighted_pseudo_inverse import SINGULAR_REGION
 from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING
@@ -22,9 +23,9 @@ EULER = Integrator.EULER
 MOST_SOLVES = 20_000  # [-] systems of equations, four times what the hardest of these motions takes
 
 
-def arm(points: list[Any], start: list[float], *, step: float = 1e-3, damping: float | None = None) -> Case:
+def arm(points: list[Any], start: list[float], *, step: float = 1e-3, damping: float | str = "auto") -> Case:
     """A planar arm of links of 1 m whose tip goes along straight lines from where it is in 1 s."""
-    solver = SolverSettings(method="weighted_pseudo_inverse", gain=0.5 / step, damping=damping, seed=0)
+    solver = SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=0.5 / step, damping=damping)
     cell = planar_cell([1.0] * len(start), solver)
     q = np.array(start)
     tip = ScrewChain(cell.robots[0]).tool_poses(q[None])[0, :3, 3]
@@ -52,7 +53,7 @@ def test_euler_s_steps_lead_to_the_same_posture_the_better_the_shorter_they_are(
     assert gaps[0] / gaps[1] == pytest.approx(2.0, rel=0.2)  # first order: Euler's drift in the null space
     assert gaps[1] / gaps[2] == pytest.approx(2.0, rel=0.1)
     assert np.abs(2.0 * finest - fine - accurate).max() < np.radians(0.01)
-    roughly = case.resolved(accuracy=1e-6).q[-1]
+    roughly = case.resolved(accuracy_mm=1e-3).q[-1]
     assert np.abs(2.0 * finest - fine - roughly).max() < np.radians(0.02)
 
 
@@ -72,8 +73,8 @@ def test_the_same_input_gives_the_same_bytes() -> None:
 
 def test_more_accuracy_takes_more_work_and_gives_less_error() -> None:
     case = triangles(CELLS["mixed"], side=0.15)
-    exact = case.resolved(accuracy=1e-12).q
-    loose, tight = (case.resolved(accuracy=accuracy) for accuracy in (1e-4, 1e-8))
+    exact = case.resolved(accuracy_mm=1e-9).q
+    loose, tight = (case.resolved(accuracy_mm=accuracy) for accuracy in (1e-1, 1e-5))
 
     assert loose.resolution.solves < tight.resolution.solves
     assert np.abs(tight.q - exact).max() < 0.05 * np.abs(loose.q - exact).max()
@@ -157,7 +158,7 @@ def test_what_is_just_out_of_reach_is_followed_to_its_edge_and_then_by_damped_st
     desired, first = task.X_PT[:, :2, 3], round(motion.resolution.euler_from / case.schedule.step)
 
     off_path = np.linalg.norm(tips(case, motion.q) - desired, axis=1)
-    assert off_path[: first + 1].max() <= 2.0 * case.cell.solver.accuracy
+    assert off_path[: first + 1].max() <= 2.0 * case.cell.solver.accuracy_mm.si
     assert 1.8 < np.linalg.norm(desired[first]) <= 2.0
 
     gain = case.cell.solver.gain

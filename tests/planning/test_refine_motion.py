@@ -72,7 +72,7 @@ def test_no_instant_of_the_clock_is_farther_off_than_the_motion_says(name: str) 
     assert motion.resolution is not None
     assert motion.resolution.error_between is not None
     assert seen_by_the_checks(case, motion.q).max() <= motion.resolution.error_between + NOISE
-    assert motion.resolution.error_between <= case.cell.solver.accuracy
+    assert motion.resolution.error_between <= case.cell.solver.accuracy_mm.si
 
 
 def test_an_instant_that_is_looked_at_becomes_an_end_of_panels() -> None:
@@ -91,7 +91,7 @@ def test_what_the_nodes_and_the_points_between_them_miss_is_found_and_resolved()
     circle, *others = case.schedule.paths
     dented = replace(circle, toolpath=replace(circle.toolpath, tip=Dented(circle.toolpath.tip)))
     case = replace(case, schedule=schedule_paths(case.cell, (dented, *others)))
-    allowed = case.cell.solver.accuracy
+    allowed = case.cell.solver.accuracy_mm.si
 
     missed, found = case.resolved(), closely(case)
 

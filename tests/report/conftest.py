@@ -27,8 +27,8 @@ from cellplan.model.report import (
 )
 from cellplan.model.robot import Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.solver import SolverSettings
 from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 from cellplan.report.record.common import Provenance
 
@@ -114,7 +114,7 @@ def _cell(name: str, kinds: str = "rrrrrr") -> Cell:
         tasks=tuple(_task(task, robot) for task, robot in TASKS.items()),
         obstacles=(),
         motion=MotionSettings(mode=Mode.SIMULTANEOUS, duration=4.0, step=0.001),
-        solver=SolverSettings(method="weighted_pseudo_inverse", gain=650.0, damping=None, seed=7),
+        solver=SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=650.0, seed=7),
         checks=ChecksEntry(),
         origin=Origin(file="cell.yaml"),
         inputs={"cell.yaml": "7c" * 32, "robots/kuka_kr6.yaml": "1f" * 32},

@@ -13,7 +13,7 @@ from cellplan.io.cell.build_mounting import build_attachments, build_mount, rail
 from cellplan.io.cell.build_tool import build_tool
 from cellplan.io.cell.path_rules import build_path
 from cellplan.io.cell.rules import needs_surface
-from cellplan.io.robots.rules import Given, configuration_in_si, home_configuration, start_posture
+from cellplan.io.robots.rules import Given, home_configuration, start_posture
 from cellplan.io.schema import CellDocument
 from cellplan.io.schema.cell import CycleEntry, MotionEntry
 from cellplan.io.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
@@ -28,7 +28,7 @@ from cellplan.io.schema.tool import OF_ROD
 from cellplan.io.shapes import MeshReader, centred_solid, direction, obstacle_shape
 from cellplan.model.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing
 from cellplan.model.origin import Origin
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import RobotModel, configuration_in_si
 from cellplan.model.settings.units import Mm, in_si, si_or_none
 from cellplan.model.task import (
     CirclePath,

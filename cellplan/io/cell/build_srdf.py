@@ -11,11 +11,10 @@ from cellplan.geometry.transforms import Array
 from cellplan.io.cell.referenced_files import Sources
 from cellplan.io.cell.write import in_file_units
 from cellplan.io.input.findings import unknown_name
-from cellplan.io.robots.rules import start_keys
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.robot import POSITION_WORDS, RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import RobotModel, start_keys
 from cellplan.model.settings.units import Deg, Mm
 
 if TYPE_CHECKING:  # read only for a cell that names an SRDF

@@ -7,9 +7,8 @@ from typing import Final
 
 from cellplan.io.cell.changes import COMPONENTS
 from cellplan.io.input.findings import did_you_mean, listed, shown, unknown_name
-from cellplan.io.robots.rules import start_keys
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import RobotModel, start_keys
 
 OF_ROBOT: Final = ("base", "tool", "start_deg", "start", "weights", "path", "branch")
 OF_TASK: Final = ("spin_deg", "robot")

@@ -21,7 +21,6 @@ from cellplan.io.cell.build_controllers import control_findings
 from cellplan.io.cell.build_grips import grip_findings, tool_names
 from cellplan.io.cell.build_layout import read_layout
 from cellplan.io.cell.build_mounting import accuracy_findings, mounted_names, mounting_findings, on_mount, rail_entries
-from cellplan.io.cell.build_solver import build_solver
 from cellplan.io.cell.build_srdf import apply_srdfs
 from cellplan.io.cell.changes import changed, plain_values
 from cellplan.io.cell.path_rules import path_findings
@@ -265,7 +264,7 @@ def _cell(
         tasks=tuple(build_task(name, whole, models, targets.__getitem__, origin) for name in whole.tasks),
         obstacles=tuple(build_obstacle(name, entry, mesh) for name, entry in whole.environment.items()),
         motion=build_motion(whole.motion),
-        solver=build_solver(whole.solver, whole.motion.step_s, models),
+        solver=whole.solver.at_step(whole.motion.step_s),
         checks=whole.checks,
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),

@@ -7,14 +7,13 @@ import numpy as np
 
 from cellplan.io.cell.as_listed import holders_as_written, operators_as_written
 from cellplan.io.input.findings import Finding, KeyPath, listed, unknown_name
-from cellplan.io.robots.rules import configuration_findings, configuration_in_si, start_keys
+from cellplan.io.robots.rules import configuration_findings
 from cellplan.io.schema.joint_path import JointPathEntry
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.joint_spline import JointSpline
-from cellplan.model.robot import RobotModel
-from cellplan.model.solver import beside_smallest
+from cellplan.model.robot import RobotModel, configuration_in_si, start_keys
+from cellplan.model.settings.solver import SolverEntry
 
 SAME_START: Final = 1e-8  # [rad] or [m] by which a start posture may differ from the start of the path: rounding
 REMOVE: Final = "remove it, or remove the path"
@@ -85,9 +84,9 @@ def _excluded(name: str, valid: ValidEntries, document: YamlDocument) -> Iterato
 
 def _beside_smallest(solver: SolverEntry) -> tuple[str, ...]:
     """Keys of the solver that exclude a given path, which goes with the smallest weighted velocities alone."""
-    if solver.integrator is not None and solver.integrator != "auto":  # an explicit accurate mode has its own rule
+    if solver.integrator != "auto":  # an explicit accurate mode has its own rule
         return ("integrator",) if solver.integrator == "euler" else ()
-    return beside_smallest(solver.method, solver.weighting, has_goals=any(goal for _, goal in solver.secondary))
+    return solver.beside_smallest
 
 
 def _rows(place: KeyPath, path: JointPathEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:

@@ -6,11 +6,11 @@ from typing import Any, Final
 
 from cellplan.io.cell.as_listed import holders_as_written, operators_as_written
 from cellplan.io.input.findings import Finding, KeyPath, did_you_mean, unknown_name
-from cellplan.io.robots.rules import configuration_findings, configuration_in_si
+from cellplan.io.robots.rules import configuration_findings
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import RobotModel, configuration_in_si
 from cellplan.model.sequence import order_faults
 from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.settings.units import Mm

@@ -6,9 +6,9 @@ from typing import Final
 from cellplan.io.input.findings import Finding, KeyPath, listed, shown, unknown_name
 from cellplan.io.robots.rules import configuration_findings
 from cellplan.io.schema.partial import ValidEntries
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.robot import RobotModel
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.solver import ACCURATE_METHODS, METHODS, NULL_SPACE_METHODS
 
 FEEDBACK_LIMIT: Final = 2.0  # gain_per_s * step_s at which Euler's steps become unstable
@@ -39,11 +39,6 @@ def accurate_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[F
             f"{METHODS[solver.method].steps_because}; choose {listed(ACCURATE_METHODS)}, {OR_EULER}"
         )
         yield document.finding(("solver", "method"), text)
-
-
-def _goals(solver: SolverEntry) -> list[str]:
-    """Names of the goals that are given."""
-    return [name for name, goal in dict(solver.secondary).items() if goal is not None]
 
 
 def solver_findings(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
@@ -78,7 +73,7 @@ def solver_findings(valid: ValidEntries, models: Mapping[str, RobotModel], docum
 def _without_null_space(solver: SolverEntry, valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
     """Goals that a method without a null space cannot pursue."""
     text = f"expected a method with a null space besides the tasks ({listed(NULL_SPACE_METHODS)})"
-    if _goals(solver):
+    if solver.secondary.goals:
         yield document.finding(("solver", "secondary"), f"{text}, got '{solver.method}'")
     if valid.motion is not None and valid.motion.cyclic:
         yield document.finding(("motion", "cyclic"), f"{text}, got '{solver.method}'")

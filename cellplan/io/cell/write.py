@@ -7,16 +7,16 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array, pose, rpy_from_rotation
 from cellplan.io.cell.build_accelerations import written_rule
-from cellplan.io.robots.rules import configuration_in_si, start_keys
 from cellplan.io.schema.cell import MotionEntry
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, Part, Robot
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot import RobotModel, configuration_in_si, start_keys
 from cellplan.model.sequence import sequence_of
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.units import Deg, Mm, file_number, in_si
-from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.solver import Integrator
 from cellplan.model.task import SampledPath, Task, TimedPath
 from cellplan.model.units import MM
 
@@ -57,7 +57,7 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     if len(cell.tasks) != len(tasks) or str(cell.motion.mode) != document["motion"]["mode"]:
         document.pop("layout", None)  # it may name other tasks, or choose between other modes
     document["motion"] = _motion(document["motion"], cell)
-    document["solver"] = _solver(document["solver"], cell.solver)
+    document["solver"] = _solver(cell.solver)
     document["checks"] = {**document["checks"], "clearance_mm": cell.checks.clearance_mm}
     return document
 
@@ -135,17 +135,10 @@ def _in_sequence(entry: Mapping[str, Any], task: Task, cell: Cell) -> dict[str, 
     return {key: written[key] for key in TaskEntry.model_fields if key in written}
 
 
-def _solver(entry: Mapping[str, Any], solver: SolverSettings) -> dict[str, Any]:
-    """The solver, its method, integrator and gain as they were used; what the cell gives besides stays."""
-    used = {
-        "method": solver.method,
-        "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
-        "accuracy_mm": file_number(solver.accuracy, is_revolute=False),
-        "gain_per_s": solver.gain,
-        "damping": "auto" if solver.damping is None else solver.damping,
-        "seed": solver.seed,
-    }
-    return used | {key: value for key, value in entry.items() if key not in used}
+def _solver(solver: SolverEntry) -> dict[str, Any]:
+    """The solver with its integrator as it was used."""
+    integrator = Integrator.ACCURATE if solver.is_accurate else Integrator.EULER
+    return solver.model_dump(exclude_none=True) | {"integrator": str(integrator)}
 
 
 def _motion(entry: Mapping[str, Any], cell: Cell) -> dict[str, Any]:

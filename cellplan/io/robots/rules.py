@@ -1,6 +1,6 @@
 """What a cell says about a robot must fit its model: start posture, weights and limits, joint by joint."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
@@ -12,16 +12,11 @@ from cellplan.io.robots.build_payload import payload_findings
 from cellplan.io.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.io.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.io.yaml.reader import YamlDocument
-from cellplan.model.robot import Joint, RobotModel
-from cellplan.model.settings.units import Deg, Mm, in_si, si_or_none
+from cellplan.model.robot import Joint, RobotModel, configuration_in_si, start_keys
+from cellplan.model.settings.units import Mm, si_or_none
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
 Given = tuple[float, ...] | dict[str, Any] | None  # a configuration in the units of a file; None: to be found
-
-
-def start_keys(model: RobotModel) -> tuple[str, ...]:
-    """Keys of a start posture by joint name: ``a1_deg``, ``rail_mm``."""
-    return tuple(f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in model.joints)
 
 
 def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
@@ -32,13 +27,6 @@ def start_posture(entry: RobotEntry, model: RobotModel) -> Array | None:
 def home_configuration(entry: RobotEntry, model: RobotModel) -> Array | None:
     """Home in [rad] or [m] as written; None when it is to be found."""
     return None if entry.given_home is None else configuration_in_si(model, entry.given_home)
-
-
-def configuration_in_si(model: RobotModel, given: Iterable[float] | Mapping[str, float]) -> Array:
-    """Joint positions in [rad] or [m] from degrees and millimetres, in order or by key, shape (n,)."""
-    values = [given[key] for key in start_keys(model)] if isinstance(given, Mapping) else given
-    pairs = zip(model.joints, values, strict=True)
-    return in_si(Deg(value) if joint.is_revolute else Mm(value) for joint, value in pairs)
 
 
 def limits_in_si(entry: LimitsEntry) -> StatedLimits:

@@ -6,7 +6,6 @@ from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry, PartShapeEntry
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import (
     CornerChoice,
     Seconds,
@@ -30,6 +29,7 @@ from cellplan.model.settings.entry import (
 )
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.program import ProgramEntry
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import LONGEST_S
 from cellplan.model.settings.units import Mm, Ms, Within
 

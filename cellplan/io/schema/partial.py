@@ -16,7 +16,6 @@ from cellplan.io.schema.cell import (
 from cellplan.io.schema.messages import AnyEntry, valid_entry, validate
 from cellplan.io.schema.robot import RobotEntry
 from cellplan.io.schema.shapes import ObstacleEntry
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 from cellplan.model.settings.acceleration import AccelerationChoice
@@ -24,6 +23,7 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.program import ProgramEntry
+from cellplan.model.settings.solver import SolverEntry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,7 +24,7 @@ from cellplan.model.settings.entry import (
     require_one,
     rule,
 )
-from cellplan.model.settings.robot import BodyAccuracyEntry, PayloadEntry
+from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
 from cellplan.model.settings.units import (
     Deg,
     DegPerS,
@@ -53,8 +53,6 @@ SlidingAcceleration = Annotated[MmPerS2, Within(gt=0.0, le=STEEPEST)]
 TurningJerk = Annotated[DegPerS3, Within(gt=0.0, le=STEEPEST)]
 SlidingJerk = Annotated[MmPerS3, Within(gt=0.0, le=STEEPEST)]
 Weight = Annotated[float, Field(ge=WEIGHT_RANGE[0], le=WEIGHT_RANGE[1])]
-FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
-JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 
 TURNING_LIMITS: Final = ("lower_deg", "upper_deg", "velocity_deg_s", "acceleration_deg_s2", "jerk_deg_s3")
 SLIDING_LIMITS: Final = ("lower_mm", "upper_mm", "velocity_mm_s", "acceleration_mm_s2", "jerk_mm_s3")

@@ -5,7 +5,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from cellplan.io.schema.path import PathEntry
-from cellplan.io.schema.robot import Configuration, JointPosition
+from cellplan.io.schema.robot import Configuration
 from cellplan.model.settings.checks import ToolDepth
 from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
@@ -20,6 +20,7 @@ from cellplan.model.settings.entry import (
     require_each_once,
     rule,
 )
+from cellplan.model.settings.robot import JointPosition
 from cellplan.model.settings.task import (
     FARTHEST_STAND_OFF_MM,
     LONGEST_S,

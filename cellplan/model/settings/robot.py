@@ -9,7 +9,9 @@ from cellplan.model.settings.units import Mm, Within
 
 HEAVIEST_KG: Final = 100_000.0  # no robot lifts more
 ROUGHEST_MM: Final = 1_000.0  # bodies that are farther off stand for nothing
+FARTHEST: Final = 100_000.0  # [deg] or [mm] of a joint
 
+JointPosition = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Accuracy = Annotated[Mm, Within(ge=0.0, le=ROUGHEST_MM)]
 LoadFigure = Annotated[float, Field(gt=0.0, le=HEAVIEST_KG)]
 

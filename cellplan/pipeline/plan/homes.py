@@ -17,7 +17,6 @@ from cellplan.model.cell import Cell, Robot
 from cellplan.model.idle import idle_robots
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
-from cellplan.model.solver import GoalKind
 from cellplan.pipeline.plan.rounded import rounded
 from cellplan.pipeline.plan.run import PlannedRun
 from cellplan.planning.modes import homeless, standing
@@ -89,7 +88,7 @@ def with_homes(cell: Cell, homes: Mapping[str, Array], *, given: Cell) -> Cell:
 
 def depends_on_homes(cell: Cell, runs: Sequence[PlannedRun]) -> bool:
     """Whether the motion of a run is another one when idle robots stand elsewhere: a goal keeps away from them."""
-    keeps_away = any(goal.kind is GoalKind.OBSTACLES for goal in cell.solver.goals)
+    keeps_away = cell.solver.secondary.obstacles is not None
     return keeps_away and any(homeless(cell, run.phase) for run in runs)
 
 

@@ -8,7 +8,6 @@ from typing import Any
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.io.input.findings import listed
-from cellplan.io.robots.rules import configuration_in_si
 from cellplan.io.run.clock_table import parse_clock
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.io.run.manifest import NEAR
@@ -16,6 +15,7 @@ from cellplan.io.run.stored import CELL, CLOCK, StoredRun, read_stored_run
 from cellplan.io.yaml.reader import parse_yaml
 from cellplan.model.branches import Branches
 from cellplan.model.cell import Cell, Robot
+from cellplan.model.robot import configuration_in_si
 from cellplan.planning.sequence.part_moves import PartMove
 
 

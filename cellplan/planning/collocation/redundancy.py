@@ -45,7 +45,7 @@ class Redundancy:
         self._weights = JointWeights(cell, model)
         rests = rests_of(cell, motion.schedule)
         self._goals = SecondaryGoals(cell, model, tasks=relations, start=motion.start, rests=rests)
-        self.breaks = self._goals.breaks if cell.solver.goals else np.zeros(0)
+        self.breaks = self._goals.breaks if cell.solver.secondary.goals else np.zeros(0)
 
     def velocities(
         self, times: Array, q: Array, desired: Desired, *, placement: Placement, mobile: Array, drift: Array | None
@@ -66,7 +66,7 @@ class Redundancy:
             weights = self._weights.along(state, known.T, heading=damped.speeds(drift).T).T
         linear = self._tasks.linearise(q, desired, placement, mobile=mobile, weights=weights)
         speeds = linear.speeds(drift)
-        if not self._cell.solver.goals:
+        if not self._cell.solver.secondary.goals:
             return linear, speeds
         stance = self._stance(known.T, state, screws, X=desired[0], signs=self._signs * mobile, weights=weights.T)
         extra = linear.null_space_projection(self._goals.speeds(times, stance, step=0.0).T)

@@ -11,7 +11,6 @@ from cellplan.model.cell import Cell
 from cellplan.model.clocked_path import distinct
 from cellplan.model.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.solver import GoalKind
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
@@ -59,7 +58,7 @@ class AccurateRun:
         cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
         if not schedule.is_continuous:
             raise TypeError("accurate run: expected a desired motion between samples, got none")
-        accuracy = min(cell.solver.accuracy, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy
+        accuracy = min(cell.solver.accuracy_mm.si, TO_CLOSE) if cell.motion.cyclic else cell.solver.accuracy_mm.si
         tasks = BatchTasks(cell, motion.relations, motion.moving, is_refined=cell.motion.cyclic)
         placement, self.end = tasks.chains.placement(cell), float(schedule.times[-1])
         breaks, jumps = schedule.breaks, schedule.jumps
@@ -163,8 +162,8 @@ def _configuration_tol(cell: Cell) -> float | None:
     """How near configurations have to be to their limit in [rad] and [m]; None for what goes with the accuracy."""
     if cell.motion.cyclic:
         return STEADY
-    if any(goal.kind is GoalKind.OBSTACLES for goal in cell.solver.goals):
-        return max(KINKED, CONFIGURATION_SHARE * cell.solver.accuracy)
+    if cell.solver.secondary.obstacles is not None:
+        return max(KINKED, CONFIGURATION_SHARE * cell.solver.accuracy_mm.si)
     return None
 
 

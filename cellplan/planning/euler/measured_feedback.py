@@ -13,6 +13,7 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
 from cellplan.model.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.settings.solver import SecondaryEntry
 from cellplan.model.task import Task
 from cellplan.planning.euler.integrate import integrate_schedule, refuse_long_step
 from cellplan.planning.methods import method_named
@@ -70,8 +71,11 @@ def settled_start(motion: MotionTask) -> Array:
     still = Schedule(times=times, tasks=tuple(_standing(task, len(times)) for task in motion.schedule.tasks))
     newton = replace(
         cell,
-        solver=replace(
-            cell.solver, method="weighted_pseudo_inverse", gain=1.0 / cell.motion.step, damping=None, goals=()
+        solver=cell.solver.changed(
+            method="weighted_pseudo_inverse",
+            gain_per_s=1.0 / cell.motion.step,
+            damping="auto",
+            secondary=SecondaryEntry(),
         ),
         motion=replace(cell.motion, cyclic=False),
     )

@@ -107,7 +107,7 @@ class StartTrials:
         self._schedules: dict[tuple[str, ...], Schedule] = {}
         # which joint fails is not known beforehand
         motion = replace(once.motion, step=self._step, locked=(), cyclic=False)
-        solver = replace(once.solver, gain=GAIN / self._step, method=TRIED_WITH)
+        solver = once.solver.changed(gain_per_s=GAIN / self._step, method=TRIED_WITH)
         self._cell = replace(self._once, motion=motion, solver=solver)
         self._alone: dict[str, Cell] = {}
         self._phases = plan_phases(self._cell).program
@@ -237,7 +237,9 @@ class StartTrials:
         if robot not in self._alone:
             whole = self._cell
             names = (
-                {robot, *whole.positioners[:1]} if not whole.solver.goals else {robot.name for robot in whole.robots}
+                {robot, *whole.positioners[:1]}
+                if not whole.solver.secondary.goals
+                else {robot.name for robot in whole.robots}
             )
             self._alone[robot] = replace(
                 whole,

@@ -107,11 +107,12 @@ class TrackingProblem:
         every = self.constraints.column_signs(self._model.carries_flange)
         self.signs = every * (1.0 - self.constraints.follows_path)
         self._given_signs = every * self.constraints.follows_path
-        self.gain, self.damping = cell.solver.gain, cell.solver.damping
+        self.gain = cell.solver.gain
+        self.damping = None if cell.solver.damping == "auto" else cell.solver.damping
         self.motion, self.drift = motion, drift
         self._last: tuple[Array, CellState] | None = None
         goals = partial(SecondaryGoals, cell, self._model, tasks=self.tasks, start=motion.start)
-        self._goals = goals(rests=rests_of(cell, schedule)) if cell.solver.goals else None
+        self._goals = goals(rests=rests_of(cell, schedule)) if cell.solver.secondary.goals else None
         self._goal_step = float(self.times[1] - self.times[0]) if len(self.times) > 1 else cell.motion.step
         self._locked_since = locked_since(cell)
 

@@ -21,7 +21,14 @@ from cellplan.geometry.transforms import Array
 from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.model.cell import Cell, Relation
 from cellplan.model.motion import Schedule
-from cellplan.model.solver import GoalKind, SecondaryGoal
+from cellplan.model.robot import configuration_in_si
+from cellplan.model.settings.solver import (
+    ConfigurationGoalEntry,
+    GoalEntry,
+    JointLimitsGoalEntry,
+    ManipulabilityGoalEntry,
+    ObstacleGoalEntry,
+)
 from cellplan.model.task import Frame
 from cellplan.planning.timing.common_cycles import common_cycles
 from cellplan.planning.tracking.manipulability import ManipulabilityGradient
@@ -73,7 +80,8 @@ class SecondaryGoals:
             start: Stacked configuration at the first time, shape (nq,).
             rests: Times in [s] at which the goals ask for nothing: the ends of the motion and of cycles to close.
         """
-        self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in cell.solver.goals]
+        goals = cell.solver.secondary.goals.values()
+        self._pulls = [(goal.gain, _pull(goal, cell, model, tasks=tasks, start=start)) for goal in goals]
         limits = cell.joint_limits
         self._lower, self._upper, self._limits = limits.lower, limits.upper, SPEED_SHARE * limits.velocity
         self._rests = rests
@@ -147,17 +155,17 @@ def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) 
     return np.clip(np.min(np.where(moves, margin, 1.0), axis=-1, initial=1.0), 0.0, 1.0)
 
 
-def _pull(goal: SecondaryGoal, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
+def _pull(goal: GoalEntry, cell: Cell, model: CombinedModel, *, tasks: Sequence[Relation], start: Array) -> Pull:
     """The function that gives the slope of one goal."""
-    match goal.kind:
-        case GoalKind.MANIPULABILITY:
+    match goal:
+        case ManipulabilityGoalEntry():
             return _manipulability(cell, model, tasks)
-        case GoalKind.JOINT_LIMITS:
+        case JointLimitsGoalEntry():
             return _joint_limits(cell)
-        case GoalKind.OBSTACLES:
-            return _obstacles(cell, goal.within)
-        case GoalKind.POSTURE:
-            return _configuration(cell, goal.configurations, start=start)
+        case ObstacleGoalEntry():
+            return _obstacles(cell, goal.within_mm.si)
+        case ConfigurationGoalEntry():
+            return _configuration(cell, goal.at, start=start)
 
 
 def _manipulability(cell: Cell, model: CombinedModel, tasks: Sequence[Relation]) -> Pull:
@@ -194,11 +202,11 @@ def _joint_limits(cell: Cell) -> Pull:
     return _springs(np.concatenate(stiffness), np.concatenate(middles))
 
 
-def _configuration(cell: Cell, desired: Mapping[str, Array], *, start: Array) -> Pull:
+def _configuration(cell: Cell, desired: Mapping[str, Mapping[str, float]], *, start: Array) -> Pull:
     """``w = -1/2 |q - q_desired|^2``; robots without a desired configuration are drawn back to where they start."""
     middle = start.copy()
-    for robot, configuration in desired.items():
-        middle[cell.columns(robot)] = configuration
+    for robot, given in desired.items():
+        middle[cell.columns(robot)] = configuration_in_si(cell.robot(robot).model, given)
     return _springs(np.ones(len(middle)), middle)
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.branches import MovedStart
 from cellplan.model.motion import Motion, NearestSingular
-from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.settings.solver import SolverEntry
+from cellplan.model.solver import Integrator
 from cellplan.model.units import DEG, MM, joint_unit
 from cellplan.report.record.common import Number, entry_record, number
 
@@ -133,7 +134,7 @@ class SolverRecord(TypedDict):
 
 
 def solver_record(
-    solver: SolverSettings,
+    solver: SolverEntry,
     motion: Motion | None = None,
     transfers: Mapping[str, str] | None = None,
     moved: Iterable[MovedStart] = (),
@@ -148,16 +149,11 @@ def solver_record(
     return {
         "method": solver.method,
         "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
-        "accuracy_mm": number(MM * solver.accuracy),
+        "accuracy_mm": number(solver.accuracy_mm),
         "gain_per_s": number(solver.gain),
-        "damping": "auto" if solver.damping is None else number(solver.damping),
+        "damping": "auto" if solver.damping == "auto" else number(solver.damping),
         "settings": _own_settings(solver),
-        "secondary": {
-            str(goal.kind): {"gain": number(goal.gain), "within_mm": number(MM * goal.within)}
-            if goal.kind == "obstacles"
-            else {"gain": number(goal.gain)}
-            for goal in solver.goals
-        },
+        "secondary": {name: entry_record(goal, without={"at"}) for name, goal in solver.secondary.goals.items()},
         "weighting": entry_record(solver.weighting),
         "iterations": None if motion is None else _iterations_record(motion),
         "slack": None if motion is None else _slack_record(motion),
@@ -182,7 +178,7 @@ def moved_start_record(moved: MovedStart) -> MovedStartRecord:
     }
 
 
-def _own_settings(solver: SolverSettings) -> SettingsRecord:
+def _own_settings(solver: SolverEntry) -> SettingsRecord:
     """Settings of the method itself; only the recursive search has a sequence."""
     match solver.method:
         case "damped_least_squares":

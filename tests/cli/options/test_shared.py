@@ -7,8 +7,8 @@ import typer
 
 from cellplan.cli.options import shared
 from cellplan.cli.solve.solve import SolveOptions
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.model.cell import Mode
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.solver import Integrator, MethodName
 
 

@@ -56,7 +56,7 @@ def test_the_base_cell_is_read_in_metres_and_radians(load: Load) -> None:
     assert task.tolerance.position_mm.si == pytest.approx(1e-4)
     assert cell.motion.mode is Mode.SIMULTANEOUS
     assert (cell.motion.duration, cell.motion.step) == (4.0, 0.001)
-    assert (cell.solver.gain, cell.solver.damping, cell.solver.seed) == (500.0, None, 0)
+    assert (cell.solver.gain, cell.solver.damping, cell.solver.seed) == (500.0, "auto", 0)
     assert (cell.checks.clearance_mm.si, cell.checks.contact_zone_mm.si) == (0.005, 0.02)
 
 

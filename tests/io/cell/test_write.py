@@ -16,7 +16,7 @@ from cellplan.io.robots.bundled import load_bundled
 from cellplan.io.yaml.reader import parse_yaml
 from cellplan.io.yaml.writer import yaml_text
 from cellplan.model.cell import Cell, Mode
-from cellplan.model.solver import Integrator, SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 
 Load = Callable[..., Cell]
 KUKA = load_bundled("kuka_kr6")
@@ -27,9 +27,8 @@ def same(a: object, b: object) -> bool:
 
     A copy names the integrator that ``auto`` stands for.
     """
-    if isinstance(a, SolverSettings) and isinstance(b, SolverSettings) and a.integrator is None:
-        named = Integrator.ACCURATE if a.is_accurate else Integrator.EULER
-        return same(dataclasses.replace(a, integrator=named), b)
+    if isinstance(a, SolverEntry) and isinstance(b, SolverEntry) and a.integrator == "auto":
+        return same(a.changed(integrator="accurate" if a.is_accurate else "euler"), b)
     if isinstance(a, np.ndarray):
         return isinstance(b, np.ndarray) and np.array_equal(a, b)
     if isinstance(a, tuple):
@@ -216,6 +215,6 @@ def test_secondary_goals_are_written_with_their_defaults(cells: Path, tmp_path: 
 
     again = reload(cell, tmp_path)
 
-    assert [goal.gain for goal in cell.solver.goals] == [1.0, 100.0, 0.1, 1.0]
+    assert [goal.gain for goal in cell.solver.secondary.goals.values()] == [1.0, 100.0, 0.1, 1.0]
     assert "obstacles: {gain: 0.1, within_mm: 200}" in render_cell(cell)
     assert same(cell.solver, again.solver)

@@ -14,7 +14,6 @@ from cellplan.model.cell_errors import CellErrors
 from cellplan.model.rehearsal import Outcome
 from cellplan.model.settings.cell_errors import MeasurementEntry, PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.solver import Integrator
 from cellplan.pipeline.overrides import with_overrides
 
 pytestmark = pytest.mark.usefixtures("kept_solutions")
@@ -34,7 +33,7 @@ def pair(cells):
     cell = load_cell(cells / "planar_pair.yaml")
     task = replace(cell.task("circle"), tolerance=TOLERANCE)
     motion = replace(cell.motion, step=0.05)
-    solver = replace(cell.solver, gain=10.0, integrator=Integrator.EULER)  # as the corrected passes are planned
+    solver = cell.solver.changed(gain_per_s=10.0, integrator="euler")  # as the corrected passes are planned
     solved = solve(replace(cell, tasks=(task,), motion=motion, solver=solver))
     return solved.cell
 

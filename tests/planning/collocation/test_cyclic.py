@@ -12,7 +12,7 @@ from builders.timed_cells import Case, between_samples, case_of, largest_error, 
 
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.cyclic import PERIODIC, closed_path
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
@@ -36,7 +36,7 @@ def cyclic(case: Case, cycles: int, *, step: float = 0.05, **words: Any) -> Case
 def circling(**words: Any) -> Case:
     """A planar arm with two joints to spare whose tip goes round and round without a stop."""
     start = np.array([0.4, 0.7, -0.5, 0.9])
-    cell = planar_cell([1.0] * 4, SolverSettings(method="weighted_pseudo_inverse", gain=10.0, damping=None, seed=0))
+    cell = planar_cell([1.0] * 4, SolverEntry(integrator="euler", method="weighted_pseudo_inverse", gain_per_s=10.0))
     tip = ScrewChain(cell.robots[0]).tool_poses(start[None])[0, :3, 3]
     path = CirclePath(plane=PlaneName.XY, center=(tip[0] - 0.3, tip[1]), radius=0.3)
     words = {"path": path, "axes": (0, 1), "tool_axis": np.eye(3)[2], "time_law": CONSTANT} | words
@@ -134,7 +134,7 @@ def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
 
 def test_a_coarse_accuracy_does_not_keep_cycles_from_closing() -> None:
     case = cyclic(triangles(CELLS["sliding"]), 2)
-    coarse = replace(case.cell, solver=replace(case.cell.solver, accuracy=1e-3))
+    coarse = replace(case.cell, solver=case.cell.solver.changed(accuracy_mm=1.0))
     assert drift(closed(replace(case, cell=coarse)), [0.0, 1.0, 2.0]).max() <= closing_tol(case)
 
 

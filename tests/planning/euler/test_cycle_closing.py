@@ -30,7 +30,7 @@ def four_robots(*, cyclic: bool) -> tuple[Cell, np.ndarray]:
     cell = replace(
         cell,
         motion=replace(cell.motion, step=0.01, cyclic=cyclic),
-        solver=replace(cell.solver, gain=50.0),
+        solver=cell.solver.changed(gain_per_s=50.0),
     )
     return cell, np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
 
@@ -104,7 +104,7 @@ def test_nicolato_s_ellipse_closes_in_each_of_25_cycles() -> None:
     at_ends = {}
     for cyclic in (False, True):
         motion = replace(cell.motion, step=0.0025, cyclic=cyclic)
-        _, found = planned(replace(cell, motion=motion, solver=replace(cell.solver, gain=200.0)), arm.start)
+        _, found = planned(replace(cell, motion=motion, solver=cell.solver.changed(gain_per_s=200.0)), arm.start)
         at_ends[cyclic] = found.q[::800]
 
     assert len(at_ends[True]) == 26

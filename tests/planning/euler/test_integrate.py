@@ -58,7 +58,7 @@ def largest_error(cell, schedule, motion):
 
 def solved(step, *, gain_times_step=0.5, moving=None, cell=None):
     cell = cell or random_cell(31, operators=2, joints=7)
-    cell = replace(cell, solver=replace(cell.solver, gain=gain_times_step / step))
+    cell = replace(cell, solver=cell.solver.changed(gain_per_s=gain_times_step / step))
     start = np.random.default_rng(0).uniform(-1, 1, cell.joint_count)
     schedule = lissajous_schedule(cell, start, step)
     everyone = [robot.name for robot in cell.robots]
@@ -82,7 +82,7 @@ def test_feedback_removes_a_start_error_at_the_rate_of_the_gain():
     """``e(t + dt) = (1 - K dt) e(t)`` for a tool that is to stand still (Eq. D.7)."""
     cell = random_cell(33, operators=1)
     step, share = 1e-3, 0.2
-    cell = replace(cell, solver=replace(cell.solver, gain=share / step))
+    cell = replace(cell, solver=cell.solver.changed(gain_per_s=share / step))
     start = np.random.default_rng(1).uniform(-1, 1, cell.joint_count)
     task = cell.tasks[0]
     X = np.tile(relative_pose(cell, task, start[None])[0], (41, 1, 1))
@@ -99,7 +99,7 @@ def test_feedback_removes_a_start_error_at_the_rate_of_the_gain():
 def test_equal_motion_of_positioner_and_operators_is_never_needed():
     """Without a desired twist nothing moves at all."""
     cell = random_cell(34, operators=2, joints=7)
-    cell = replace(cell, solver=replace(cell.solver, gain=100.0))
+    cell = replace(cell, solver=cell.solver.changed(gain_per_s=100.0))
     start = np.random.default_rng(2).uniform(-1, 1, cell.joint_count)
     schedule = lissajous_schedule(cell, start, 5e-3)
     still = tuple(
@@ -123,7 +123,7 @@ def test_lost_path_is_named_with_its_instant():
 
 def test_task_without_free_joints_is_refused_without_damping():
     cell = random_cell(31, operators=1)
-    cell = replace(cell, solver=replace(cell.solver, damping=0.0))
+    cell = replace(cell, solver=cell.solver.changed(damping=0.0))
     start = np.random.default_rng(0).uniform(-1, 1, cell.joint_count)
     schedule = lissajous_schedule(cell, start, 2e-3)
     with pytest.raises(NoSolutionError, match="singular"):

@@ -46,7 +46,7 @@ def test_every_long_search_is_a_situation():
 @pytest.mark.parametrize(("name", "method"), CASES)
 def test_finite_joints_honestly_judged_or_a_refusal_that_names_the_cause(name, method):
     situation = SITUATIONS[name]()
-    cell = replace(situation.cell, solver=replace(situation.cell.solver, method=method))
+    cell = replace(situation.cell, solver=situation.cell.solver.changed(method=method))
     refusal, motion = "", None
     try:
         motion = integrate_schedule(MotionTask(cell, situation.schedule, situation.moving, situation.start))

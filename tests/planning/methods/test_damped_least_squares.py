@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.errors import NoSolutionError
-from cellplan.model.settings.solver import DampedLeastSquaresEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import DampedLeastSquaresEntry, SolverEntry
 from cellplan.planning.methods.damped_least_squares import (
     LARGEST_DAMPING,
     damped_least_squares,
@@ -30,10 +29,14 @@ BY_VALUE = DampedLeastSquaresEntry(region=0.5)
 BY_MANIPULABILITY = DampedLeastSquaresEntry(measure="manipulability", region=1.0)
 
 
-def one_step(q, *, settings=BY_VALUE, damping=None, weights=(1.0, 1.0, 1.0), drift=None):
+def one_step(q, *, settings=BY_VALUE, damping="auto", weights=(1.0, 1.0, 1.0), drift=None):
     """Joint speeds of the first step of an arm whose tip is to leave its place at a constant velocity."""
-    solver = SolverSettings(
-        method="damped_least_squares", gain=GAIN, damping=damping, seed=0, damped_least_squares=settings
+    solver = SolverEntry(
+        integrator="euler",
+        method="damped_least_squares",
+        gain_per_s=GAIN,
+        damping=damping,
+        damped_least_squares=settings,
     )
     cell = planar_cell(LENGTHS, solver, settle=1.0)
     cell = replace(cell, robots=(replace(cell.robots[0], weights=np.array(weights)),))

@@ -12,8 +12,7 @@ from builders.vargas_cases import TRANSIENT, vargas_run
 from cellplan.errors import DivergedError
 from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.settings.solver import FilteredInverseEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import FilteredInverseEntry, SolverEntry
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import TrackingProblem
@@ -79,10 +78,10 @@ VELOCITY = np.array([0.2, -0.3])
 
 def arm_problem(q, *, filter_gain, gain=5.0, weights=(1.0, 1.0, 1.0), zero=False, offset=(0.0, 0.0)):
     """An arm whose tip is to leave its place, or one beside it, at a constant velocity."""
-    solver = SolverSettings(
+    solver = SolverEntry(
+        integrator="euler",
         method="filtered_inverse",
-        gain=gain,
-        damping=None,
+        gain_per_s=gain,
         seed=0,
         filtered_inverse=FilteredInverseEntry(gain_per_s=filter_gain, start="zero" if zero else "inverse"),
     )
@@ -156,7 +155,7 @@ def test_speed_that_no_sub_step_follows_is_refused_by_name(method):
 @pytest.mark.parametrize("method", METHODS[1:])
 def test_locked_and_idle_joints_stand_exactly_still(method):
     cell = random_cell(41, operators=2, joints=7)
-    solver = replace(cell.solver, gain=50.0, filtered_inverse=FilteredInverseEntry(gain_per_s=100.0))
+    solver = cell.solver.changed(gain_per_s=50.0, filtered_inverse=FilteredInverseEntry(gain_per_s=100.0))
     locked = LockedJoint(robot="op0", joint="j3", since=0.095)
     cell = replace(cell, solver=solver, motion=replace(cell.motion, locked=(locked,)))
     q = np.random.default_rng(4).uniform(-1, 1, cell.joint_count)

@@ -5,8 +5,7 @@ from builders.planar_arms import planar_cell, tip_jacobians, tip_schedule, tips
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.model.settings.solver import FilteredInverseEntry
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import FilteredInverseEntry, SolverEntry
 from cellplan.planning.methods.filtered_inverse_ii import filtered_inverse_ii
 from cellplan.planning.methods.support.filtered_jacobian import FilteredMotion
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -18,10 +17,10 @@ ANGLE = st.floats(-3.0, 3.0)
 
 def resting_problem(q):
     """The tip is to go to a place nearby and rest there; the filter hardly moves."""
-    solver = SolverSettings(
+    solver = SolverEntry(
+        integrator="euler",
         method="filtered_inverse_ii",
-        gain=1.0,
-        damping=None,
+        gain_per_s=1.0,
         seed=0,
         filtered_inverse=FilteredInverseEntry(gain_per_s=1e-12),
     )

@@ -184,7 +184,7 @@ def test_all_tools_of_a_cell_are_brought_to_their_place_on_the_part(cell, compon
         "two axes": {"axes": (0, 1)},
     }[component]
     tasks = tuple(make_task(task.robot, **changes) for task in cell.tasks)
-    cell = replace(cell, tasks=tasks, solver=replace(cell.solver, method=method))
+    cell = replace(cell, tasks=tasks, solver=cell.solver.changed(method=method))
     start = np.random.default_rng(3).uniform(-0.5, 0.5, cell.joint_count)
     schedule = wave_schedule(cell, start)
 
@@ -259,7 +259,7 @@ def test_lost_path_is_refused_by_name(method):
 
 def test_same_input_gives_the_same_motion():
     cell = random_cell(32, operators=1, joints=7, held=False)
-    cell = replace(cell, solver=replace(cell.solver, method="heuristic_search"))
+    cell = replace(cell, solver=cell.solver.changed(method="heuristic_search"))
     start = np.random.default_rng(3).uniform(-0.5, 0.5, cell.joint_count)
     schedule = wave_schedule(cell, start)
     first, second = (integrate_schedule(MotionTask(cell, schedule, ["op0"], start)) for _ in range(2))

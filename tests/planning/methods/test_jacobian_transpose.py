@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.model.cell import LockedJoint
-from cellplan.model.solver import SolverSettings
+from cellplan.model.settings.solver import SolverEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.jacobian_transpose import (
     LEFT_OPEN,
@@ -28,7 +28,7 @@ STEP = 0.01
 
 
 def arm(gain, *, locked=()):
-    solver = SolverSettings(method="jacobian_transpose", gain=gain, damping=None, seed=0)
+    solver = SolverEntry(integrator="euler", method="jacobian_transpose", gain_per_s=gain)
     cell = planar_cell(LENGTHS, solver, settle=100.0)
     return replace(cell, motion=replace(cell.motion, locked=locked))
 

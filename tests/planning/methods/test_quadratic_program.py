@@ -191,7 +191,7 @@ def test_no_limit_is_ever_broken(seed):
     cell = replace(
         cell,
         robots=tuple(robots),
-        solver=replace(cell.solver, method="quadratic_program", gain=float(rng.choice([0.0, 200.0]))),
+        solver=cell.solver.changed(method="quadratic_program", gain_per_s=float(rng.choice([0.0, 200.0])) or None),
     )
     chain = ScrewChain(cell.robots[1])
     X = np.linalg.inv(

@@ -42,7 +42,7 @@ def cell() -> Cell:
         robots=tuple(replace(robot, start=np.array(START[robot.name])) for robot in given.robots),
         tasks=(task,),
         motion=replace(given.motion, duration=4.0, step=0.005),
-        solver=replace(given.solver, gain=100.0),
+        solver=given.solver.changed(gain_per_s=100.0),
     )
 
 

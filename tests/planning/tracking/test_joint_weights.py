@@ -40,7 +40,7 @@ def test_slope_points_to_the_nearer_limit_and_stays_finite_at_and_beyond_it():
 
 
 def weighted(cell, **strengths):
-    return replace(cell, solver=replace(cell.solver, weighting=WeightingEntry(**strengths)))
+    return replace(cell, solver=cell.solver.changed(weighting=WeightingEntry(**strengths)))
 
 
 def weights_of(cell, q, *, xdot=None, J=None):

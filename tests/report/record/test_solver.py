@@ -6,11 +6,9 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from cellplan.io.cell.build_solver import build_solver
-from cellplan.io.schema.solver import SolverEntry
 from cellplan.model.motion import Motion, Resolution
-from cellplan.model.settings.solver import WeightingEntry
-from cellplan.model.solver import Integrator, MethodName, SolverSettings
+from cellplan.model.settings.solver import SolverEntry, WeightingEntry
+from cellplan.model.solver import Integrator, MethodName
 from cellplan.report.page.render import report_page
 from cellplan.report.record.run import run_record
 from cellplan.report.record.solver import solver_record
@@ -27,8 +25,8 @@ OWN_SECTION = {
 }
 
 
-def settings(method: MethodName = "weighted_pseudo_inverse", **given: Any) -> SolverSettings:
-    return build_solver(SolverEntry.model_validate({"method": method, **given}), 1e-3, {})
+def settings(method: MethodName = "weighted_pseudo_inverse", **given: Any) -> SolverEntry:
+    return SolverEntry.model_validate({"method": method, **given}).at_step(1e-3)
 
 
 def motion(iterations: list[float], slack: list[float]) -> Motion:
@@ -36,7 +34,7 @@ def motion(iterations: list[float], slack: list[float]) -> Motion:
     return Motion(times=0.5 * np.arange(n), q=np.zeros((n, 1)), iterations=np.array(iterations), slack=np.array(slack))
 
 
-def said(solver: SolverSettings, of: Motion | None = None) -> list[str]:
+def said(solver: SolverEntry, of: Motion | None = None) -> list[str]:
     return list(method_lines(solver_record(solver, of), 1e-3))
 
 
@@ -121,9 +119,9 @@ def test_the_record_says_what_the_accurate_mode_took() -> None:
 
 
 def test_a_method_that_rules_the_accurate_mode_out_is_never_said_to_be_accurate() -> None:
-    changed = replace(settings("damped_least_squares"), weighting=WeightingEntry(load=1.0))
+    changed = settings("damped_least_squares", weighting=WeightingEntry(load=1.0))
 
-    assert changed.integrator is None
+    assert changed.integrator == "auto"
     assert solver_record(changed)["integrator"] == "euler"
     assert "Euler steps" in said(changed)[0]
 
@@ -158,7 +156,7 @@ def test_every_weight_that_can_change_is_recorded() -> None:
 
 @pytest.fixture
 def searched(passed_run: Any) -> Any:
-    solver = replace(passed_run.cell.solver, method="recursive_search")
+    solver = passed_run.cell.solver.changed(method="recursive_search")
     return replace(passed_run, cell=replace(passed_run.cell, solver=solver))
 
 

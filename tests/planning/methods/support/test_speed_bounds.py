@@ -69,7 +69,7 @@ def test_a_joint_at_its_limit_may_only_leave_it():
 
 def test_ramp_stands_in_for_acceleration_limits_that_are_not_known():
     cell = planar_arm_cell(limits={"q1": {"acceleration": 7.0, "velocity": 2.0}, "q2": {"velocity": 3.0}})
-    cell = replace(cell, solver=replace(cell.solver, quadratic_program=QuadraticProgramEntry(ramp_s=0.5)))
+    cell = replace(cell, solver=cell.solver.changed(quadratic_program=QuadraticProgramEntry(ramp_s=0.5)))
     bounds = JointBounds(cell).at(np.zeros(4), np.zeros(4), 1e-3)
     np.testing.assert_allclose(bounds.upper[:2], [7e-3, 6e-3], rtol=1e-6)  # room for rounding on the way to the table
 
