@@ -13,7 +13,7 @@ import os
 import pickle
 import pkgutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
@@ -26,7 +26,7 @@ from cellplan.model.progress import Progress
 from cellplan.pipeline.solution import Solution
 
 Events = list[tuple[Any, ...]]  # what was said of the progress, call by call
-Names = dict[tuple[str, str], object]  # what each name of the package stands for
+Names = dict[str, dict[str, object]]  # what each name of a module or class of the package stands for
 HARMLESS = {  # names whose replacement changes no figure: where plots and trials run, how often a line is printed
     ("cellplan.guard.forked", "processors"),
     ("cellplan.study.session", "Workers"),
@@ -236,11 +236,20 @@ def _package_names() -> Names:
     names: Names = {}
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] == "cellplan":
-            for key, value in list(vars(module).items()):
-                names[name, key] = value
+            names[name] = dict(vars(module))
+            for key, value in names[name].items():
                 if isinstance(value, type) and value.__module__ == name:
-                    names |= {(f"{name}.{key}", own): each for own, each in vars(value).items()}
+                    names[f"{name}.{key}"] = dict(vars(value))
     return names
+
+
+def _names_now(holder: str) -> Mapping[str, object]:
+    """The names of a module or class as they are; none where it is gone."""
+    if holder in sys.modules:
+        return vars(sys.modules[holder])
+    module, _, name = holder.rpartition(".")
+    value = getattr(sys.modules.get(module), name, None)
+    return vars(value) if isinstance(value, type) else {}
 
 
 def _is_patched() -> bool:
@@ -250,7 +259,9 @@ def _is_patched() -> bool:
 
 def _replaced() -> list[str]:
     """The names of the package that stand for something else."""
-    now = _package_names()
     missing = object()
-    changed = [key for key, value in _state.names.items() if now.get(key, missing) is not value]
+    changed: list[tuple[str, str]] = []
+    for holder, names in _state.names.items():
+        now = _names_now(holder)
+        changed += [(holder, key) for key, value in names.items() if now.get(key, missing) is not value]
     return [".".join(key) for key in changed if key not in HARMLESS]

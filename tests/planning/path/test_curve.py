@@ -128,7 +128,7 @@ def test_pieces_join_and_leave_a_corner_in_their_own_direction() -> None:
     assert np.allclose(path.pieces[1].twists_per_length(np.zeros(1))[0, :3], [0, -0.5, -np.sqrt(0.75)], atol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["rhombus", "rectangle"])
+@pytest.mark.parametrize("name", ["rhombus", pytest.param("rectangle", marks=pytest.mark.slow)])
 def test_blended_paths_are_one_piece_near_the_corners(name: str) -> None:
     task, blend = ON_ROLLER[name], 0.01
     sharp, round_ = build_toolpath(task, ROLLER), build_toolpath(replace(task, blend=blend), ROLLER)
