@@ -114,7 +114,7 @@ def mesh_points(
     pin.forwardKinematics(kinematics, data, pin.neutral(kinematics))
     pin.updateGeometryPlacements(kinematics, data, shapes, places)
     X = pose_from(rotation_about(np.array([0.0, 0.0, 1.0]), turn), np.zeros(3))
-    found: dict[int, list[Array]] = {}
+    results: dict[int, list[Array]] = {}
     for shape, place in zip(shapes.geometryObjects, places.oMg, strict=True):
         link = shape.parentJoint - 1
         if link >= len(model.joints) or not Path(shape.meshPath).is_file() or "hand" in shape.name:
@@ -124,23 +124,23 @@ def mesh_points(
         points = transform_points(X @ place.homogeneous, spread * shape.meshScale)
         if is_moved and link != BASE:
             points = points + model.joints[link].point_B - X[:3, :3] @ data.oMi[link + 1].translation
-        found.setdefault(link, []).append(points)
-    return {link: np.concatenate(parts) for link, parts in found.items()}
+        results.setdefault(link, []).append(points)
+    return {link: np.concatenate(parts) for link, parts in results.items()}
 
 
 def compare(model: RobotModel, points_B: dict[int, Array]) -> list[LinkAccuracy]:
     """Each link of a table compared with points on its mesh in B at the reference configuration."""
     directions = np.random.default_rng(SEED).normal(size=(DIRECTIONS, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    found = []
+    results = []
     for link, points in sorted(points_B.items()):
         solids = [body for body in model.bodies if body.link == link]
-        to_each = [distance_to(body.shape, transform_points(inverse(body.X_BS), points)) for body in solids]
-        missed = np.maximum(np.min(to_each, axis=0), 0.0)
+        distances = [distance_to(body.shape, transform_points(inverse(body.X_BS), points)) for body in solids]
+        missed = np.maximum(np.min(distances, axis=0), 0.0)
         hull = (points @ directions.T).max(axis=0)
         skin = np.concatenate([skin_points(body, SPREAD // 10) for body in solids])
         beyond = np.maximum((skin @ directions.T - hull).max(axis=1), 0.0)
-        found.append(
+        results.append(
             LinkAccuracy(
                 link="base" if link == BASE else model.joints[link].name,
                 outside=float(missed.max()),
@@ -149,7 +149,7 @@ def compare(model: RobotModel, points_B: dict[int, Array]) -> list[LinkAccuracy]
                 fat=float(np.percentile(beyond, 95)),
             )
         )
-    return found
+    return results
 
 
 def main(arguments: list[str]) -> None:

@@ -61,14 +61,14 @@ class Compared:
 
     kind: ClearanceClass
     certified: float
-    found: float
+    searched: float
     is_exact: bool
 
     @property
     def is_right(self) -> bool:
         """Whether the certified distance is not above the truth, and near it where it says so."""
-        return self.certified <= self.found + ROUNDING and (
-            not self.is_exact or self.found - self.certified <= EXACT + ROUNDING
+        return self.certified <= self.searched + ROUNDING and (
+            not self.is_exact or self.searched - self.certified <= EXACT + ROUNDING
         )
 
 
@@ -113,11 +113,11 @@ def compare(cell: Cell, q: Array) -> list[Compared]:
     """Certified distances beside those that brute force finds, of all classes in which nothing touches."""
     scene = Scene.from_cell(cell)
     report, _ = check_clearance(scene, Schedule(times=0.01 * np.arange(len(q)), tasks=()), q)
-    found = brute_force(scene, q)
+    result = brute_force(scene, q)
     return [
-        Compared(kind=kind, certified=minimum.minimum, found=found[kind], is_exact=minimum.exact)
+        Compared(kind=kind, certified=minimum.minimum, searched=result[kind], is_exact=minimum.exact)
         for kind, minimum in report.minima.items()
-        if minimum.minimum is not None and minimum.certified and kind in found
+        if minimum.minimum is not None and minimum.certified and kind in result
     ]
 
 
@@ -152,9 +152,9 @@ def _closer(
     for _ in range(ROUNDS):
         times = np.clip(at + width * np.linspace(-1.0, 1.0, 11), 0.0, len(q) - 1.0)
         poses = scene.pair_poses(pair, _between(q, times))
-        found = [_distance(shapes, poses, pair, k) for k in range(len(times))]
-        best = int(np.argmin(found))
-        at, distance, width = float(times[best]), min(distance, found[best]), 0.2 * width
+        result = [_distance(shapes, poses, pair, k) for k in range(len(times))]
+        best = int(np.argmin(result))
+        at, distance, width = float(times[best]), min(distance, result[best]), 0.2 * width
     return distance
 
 
@@ -197,7 +197,7 @@ def main() -> None:
                 wrong += not one.is_right
                 word = "exact" if one.is_exact else "at least"
                 verdict = "right" if one.is_right else "WRONG"
-                figures = f"{word} {1e3 * one.certified:.3f} mm, found {1e3 * one.found:.3f} mm"
+                figures = f"{word} {1e3 * one.certified:.3f} mm, found {1e3 * one.searched:.3f} mm"
                 print(f"cell {seed} {one.kind}: {figures}: {verdict}", flush=True)
             print(f"cell {seed}: {time.process_time() - begin:.1f} s of processor time")
     print(f"{wrong} of all are wrong")

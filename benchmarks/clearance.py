@@ -115,9 +115,9 @@ def brute_force(scene: Scene, q: Array, count: int) -> tuple[dict[str, float], f
     samples = rng.choice(len(q), size=20, replace=False)
     poses, engine = scene.body_poses(q[samples]), Engine(scene.engine.bodies)
     smallest: dict[str, float] = {}
-    asked = rng.choice(rows, size=count)
+    chosen = rng.choice(rows, size=count)
     begin = time.process_time()
-    for number, row in enumerate(asked.tolist()):
+    for number, row in enumerate(chosen.tolist()):
         sample = number % len(samples)
         hit = engine.touch(*ends[row], poses, sample=sample)
         distance = 0.0 if hit else engine.surface_distance(*ends[row], poses, sample=sample)
@@ -137,11 +137,11 @@ def record(cell: Cell, arms: str, samples: int, *, rounds: int) -> dict[str, Any
     scene, report, seconds = certify(cell, schedule, q, rounds=rounds)
     smallest, brute_s = brute_force(scene, q, BRUTE)
     minima: dict[str, dict[str, Any]] = {
-        str(kind): {"minimum_mm": 1e3 * found.minimum, "certified": found.certified, "at_s": found.at_s}
-        for kind, found in report.minima.items()
-        if found.minimum is not None
+        str(kind): {"minimum_mm": 1e3 * value.minimum, "certified": value.certified, "at_s": value.at_s}
+        for kind, value in report.minima.items()
+        if value.minimum is not None
     }
-    agrees = all(1e-3 * found["minimum_mm"] <= smallest.get(kind, np.inf) + 1e-9 for kind, found in minima.items())
+    agrees = all(1e-3 * value["minimum_mm"] <= smallest.get(kind, np.inf) + 1e-9 for kind, value in minima.items())
     return {
         "arms": arms,
         "bodies": len(scene.bodies),
@@ -164,11 +164,11 @@ def section(figures: dict[str, Any], rounds: int) -> Section:
     rows = [
         (
             kind,
-            f"{found['minimum_mm']:.1f} mm",
-            f"{found['at_s']:.3f} s",
-            "certified" if found["certified"] else "not certified",
+            f"{value['minimum_mm']:.1f} mm",
+            f"{value['at_s']:.3f} s",
+            "certified" if value["certified"] else "not certified",
         )
-        for kind, found in figures["minima"].items()
+        for kind, value in figures["minima"].items()
     ]
     agrees = "nothing nearer" if figures["brute_force_finds_nothing_nearer"] else "**something nearer**"
     return Section(

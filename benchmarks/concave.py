@@ -78,19 +78,19 @@ def cases() -> Sequence[Case]:
 
 def measured(folder: Path, *, rounds: int) -> list[dict[str, Any]]:
     """Processor times of all cases and their ratios, medians of some rounds; cells are written into a folder."""
-    found = []
+    results = []
     for case in cases():
-        beside = rod_of(0.08, 0.2, sides=len(case.mesh.faces) // 4)
+        rod = rod_of(0.08, 0.2, sides=len(case.mesh.faces) // 4)
         away = (0.0, case.at[1] + 0.19, case.at[2])
-        both = (case, replace(case, mesh=beside, at=away))
+        both = (case, replace(case, mesh=rod, at=away))
         seconds: tuple[list[float], list[float]] = ([], [])
         smallest = [np.nan, np.nan]
         for _ in range(rounds):
             for place, one in enumerate(both):
                 taken, smallest[place] = checked(*cell_of(folder, one))
                 seconds[place].append(taken)
-        concave, convex = (statistics.median(each) for each in seconds)
-        found.append(
+        concave, convex = (statistics.median(second) for second in seconds)
+        results.append(
             {
                 "case": case.name,
                 "triangles": len(case.mesh.faces),
@@ -101,10 +101,10 @@ def measured(folder: Path, *, rounds: int) -> list[dict[str, Any]]:
                 "convex_mm": 1e3 * smallest[1],
             }
         )
-    return found
+    return results
 
 
-def lines_of(found: Sequence[dict[str, Any]]) -> list[str]:
+def lines_of(result: Sequence[dict[str, Any]]) -> list[str]:
     """The figures in Markdown."""
     head = ("case", "triangles", "not convex", "convex", "ratio", "smallest distances")
     rows = [
@@ -116,7 +116,7 @@ def lines_of(found: Sequence[dict[str, Any]]) -> list[str]:
             f"{one['ratio']:.1f}",
             f"{one['concave_mm']:.1f} mm, {one['convex_mm']:.1f} mm",
         )
-        for one in found
+        for one in result
     ]
     return [
         "A body that is not convex beside a convex one of as many triangles and about the same size: processor time of "
@@ -126,9 +126,9 @@ def lines_of(found: Sequence[dict[str, Any]]) -> list[str]:
     ]
 
 
-def goal_of(found: Sequence[dict[str, Any]]) -> Goal:
+def goal_of(result: Sequence[dict[str, Any]]) -> Goal:
     """No case costs too many times what a convex body does."""
-    worst = max(float(one["ratio"]) for one in found)
+    worst = max(float(one["ratio"]) for one in result)
     return Goal(
         text=f"a body that is not convex takes at most {GOAL:g} times the processor time of a convex one",
         measured=f"{worst:.1f}",

@@ -15,8 +15,8 @@ from typing import Final
 from cellplan import load_cell, solve
 
 CELLS: Final = Path(__file__).resolve().parent.parent / "cells"
-KEPT: Final = Path(__file__).with_name("counts.json")
-ROOM: Final = (
+STORED: Final = Path(__file__).with_name("counts.json")
+SLACK: Final = (
     0.1  # [-] share by which a count may grow null_space_projection: rounding differs a little between machines
 )
 SPARE: Final = 5  # [-] and this much besides, for counts near zero
@@ -60,10 +60,10 @@ def counted(case: Case) -> dict[str, int]:
 
 def grown(case: Case, counts: Mapping[str, int]) -> list[str]:
     """One line on each count that is larger than it may be."""
-    kept: dict[str, int] = json.loads(KEPT.read_text(encoding="utf-8"))[case.name]
-    most = {name: math.floor((1.0 + ROOM) * kept.get(name, 0)) + SPARE for name in counts}
+    stored: dict[str, int] = json.loads(STORED.read_text(encoding="utf-8"))[case.name]
+    most = {name: math.floor((1.0 + SLACK) * stored.get(name, 0)) + SPARE for name in counts}
     return [
-        f"{case.name}: {name} grew from {kept.get(name, 0)} to {count}, at most {most[name]} expected; "
+        f"{case.name}: {name} grew from {stored.get(name, 0)} to {count}, at most {most[name]} expected; "
         "find out why, or keep the new count by: python benchmarks/counts.py --write"
         for name, count in counts.items()
         if count > most[name]
@@ -75,11 +75,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Count the work that it is to solve a few cells.")
     parser.add_argument("--write", action="store_true", help="keep the counts as those to compare with")
     options = parser.parse_args()
-    found = {case.name: counted(case) for case in CASES}
-    text = json.dumps(found, indent=2)
+    result = {case.name: counted(case) for case in CASES}
+    text = json.dumps(result, indent=2)
     print(text)
     if options.write:
-        KEPT.write_text(f"{text}\n", encoding="utf-8")
+        STORED.write_text(f"{text}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

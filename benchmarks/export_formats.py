@@ -62,7 +62,7 @@ def rows_of(robot: Robot, times: np.ndarray, rng: np.random.Generator) -> RobotR
     )
 
 
-def drawn_job(cell: Cell, dialect: Dialect) -> ExportJob:
+def random_job(cell: Cell, dialect: Dialect) -> ExportJob:
     """A job of all robots of a cell: 4000 rows, or as many as the cycle of a controller gives in the same time."""
     rng, robots = np.random.default_rng(0), {}
     for robot in cell.robots:
@@ -87,7 +87,7 @@ def texts_only() -> float:
     """Write and read back every format; processor time of all."""
     cell, total = load_cell(CELL), 0.0
     for name, dialect in DIALECTS.items():
-        job = drawn_job(cell, dialect)
+        job = random_job(cell, dialect)
         stages = Stages()
 
         def work(dialect: Dialect = dialect, job: ExportJob = job, stages: Stages = stages) -> None:
@@ -112,12 +112,12 @@ def whole_exports(run_folder: Path, cell: Path, repeats: int) -> float:
         stages = Stages()
         begun = time.process_time()
         with tempfile.TemporaryDirectory() as folder:
-            found = export_programs(run, Path(folder), progress=stages.passed)
+            exports = export_programs(run, Path(folder), progress=stages.passed)
         totals.append(time.process_time() - begun)
         for stage, seconds in stages.seconds.items():
             by_stage.setdefault(stage, []).append(seconds)
-        for each in found if repeat == 0 else ():
-            print(f"{each.form:12} {'written' if each.refusal is None else f'not written: {each.refusal}'}")
+        for entry in exports if repeat == 0 else ():
+            print(f"{entry.form:12} {'written' if entry.refusal is None else f'not written: {entry.refusal}'}")
     for stage, times in by_stage.items():
         print(f"{stage:53} {statistics.median(times):8.2f} s")
     return statistics.median(totals)

@@ -32,7 +32,7 @@ TOOL: Final = {"length_mm": [100, 250], "tilt_deg": [0, 60], "roll_deg": [-180, 
 THIN: Final = {"radius_mm": 1, "stick_out_mm": 90}  # of a rod in place of a tool without bodies
 
 
-def asked(cell: Path, limits: str, timing: CycleTiming, free: tuple[str, ...]) -> LayoutRequest:
+def request_for(cell: Path, limits: str, timing: CycleTiming, free: tuple[str, ...]) -> LayoutRequest:
     """A search with bases and tools as they are."""
     rules = [f"robots.{robot.name}.acceleration={RULES[limits]}" for robot in load_cell(cell).robots]
     return LayoutRequest(
@@ -47,7 +47,7 @@ def asked(cell: Path, limits: str, timing: CycleTiming, free: tuple[str, ...]) -
 
 def together(cell: Path) -> LayoutRequest:
     """A search of bases, tools and the path of the positioner; tools without bodies become thin rods."""
-    given, request = load_cell(cell), asked(cell, "none", CycleTiming.LAWS, ())
+    given, request = load_cell(cell), request_for(cell, "none", CycleTiming.LAWS, ())
     settings, vary = list(request.settings), [f"{given.positioners[0]}.path"]
     for name in dict.fromkeys(task.robot for task in given.tasks):
         tool, tip = given.robot(name).tool, given.robot(name).tool.X_FT
@@ -80,7 +80,7 @@ def section(cell: Path, trials: int, timings: tuple[CycleTiming, ...], *, with_l
     """The whole table."""
     head = ("free", "accelerations", "timing", "certified, s", "margin, deg", "clearance, mm", "trials", "finish, s")
     rows = [
-        measured(asked(cell, limits, timing, free), ", ".join(free), limits, trials)
+        measured(request_for(cell, limits, timing, free), ", ".join(free), limits, trials)
         for limits in RULES
         for timing in timings
         for free in FREE

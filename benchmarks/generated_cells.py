@@ -134,7 +134,7 @@ def _task(k: int, angle: float, *, at: float) -> list[str]:
     """Lines of one task: a closed path on the upper face, next to its robot."""
     turn = f"angle_deg: {math.degrees(angle):.6f}"
     center = f"center_mm: [{_mm(at * math.cos(angle))}, {_mm(at * math.sin(angle))}]"
-    drawn = {
+    shapes = {
         "circle": f"circle: {{radius_mm: 80, plane: xy, {center}}}",
         "rectangle": f"rectangle: {{sides_mm: [130, 110], plane: xy, {center}, {turn}}}",
         "rhombus": f"rhombus: {{diagonals_mm: [180, 140], plane: xy, {center}, {turn}}}",
@@ -142,7 +142,7 @@ def _task(k: int, angle: float, *, at: float) -> list[str]:
     return [
         f"  t{k + 1}:",
         f"    robot: r{k + 1}",
-        f"    path: {{{drawn}, project: +z}}",
+        f"    path: {{{shapes}, project: +z}}",
         "    tool_axis: normal",
         f"    tool_x: [{math.cos(angle):.9f}, {math.sin(angle):.9f}, 0]",
         "    tolerance: {position_mm: 0.1, orientation_deg: 0.01}",
@@ -173,12 +173,12 @@ def _starts(cell: Cell) -> dict[str, str]:
 def _start(cell: Cell, robot: Robot, task: Task, *, X_WP: np.ndarray, ready: np.ndarray) -> np.ndarray:
     """The configuration on the start of a task that is found from a configuration ready for work."""
     X_PT = build_toolpath(task, cell.part).X_PT_start
-    found = within_limits(
+    result = within_limits(
         robot.model, reaching_configurations(ScrewChain(robot), task, X_PT, X_WP=X_WP, seeds=ready[None])
     )
-    if not len(found):
+    if not len(result):
         raise ValueError(f"{robot.name}: the start of its task was not reached")
-    return found[0]
+    return result[0]
 
 
 def main() -> None:

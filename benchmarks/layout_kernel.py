@@ -75,13 +75,13 @@ class Bench:
     def seconds(self, call: Callable[[], object], *, times: int = 1) -> float:
         """Median processor time of a call, after one that does not count."""
         call()
-        found = []
+        results = []
         for _ in range(self._rounds):
             begin = time.process_time()
             for _ in range(times):
                 call()
-            found.append((time.process_time() - begin) / times)
-        return statistics.median(found)
+            results.append((time.process_time() - begin) / times)
+        return statistics.median(results)
 
     def run(self) -> Figure:
         """Motions against the accurate mode."""
@@ -91,17 +91,17 @@ class Bench:
         def accurate() -> Screening:
             return screen_layouts(self.cell, self.schedule, candidates, moving=self.moving, accuracy=FINE)
 
-        exact, found = accurate(), run(self.job, layouts.of_places(few))
-        kept, figures = exact.is_followed & found.is_followed, MotionFigures.of(self.job, found)
-        fastest, expected = figures.speeds.value[kept].max(axis=1), exact.speed_ratios[kept].max(axis=1)
-        nodes = (np.abs(found.qd[kept]) / self.job.limits.velocity).max(axis=(1, 2))
+        exact, motions = accurate(), run(self.job, layouts.of_places(few))
+        held, figures = exact.is_followed & motions.is_followed, MotionFigures.of(self.job, motions)
+        fastest, expected = figures.speeds.value[held].max(axis=1), exact.speed_ratios[held].max(axis=1)
+        nodes = (np.abs(motions.qd[held]) / self.job.limits.velocity).max(axis=(1, 2))
         ratio, at_nodes = float(np.abs(fastest / expected - 1.0).max()), float(np.abs(nodes / expected - 1.0).max())
-        margin = float(np.degrees(np.abs(figures.margins[kept] - exact.margins[kept]).max()))
+        margin = float(np.degrees(np.abs(figures.margins[held] - exact.margins[held]).max()))
         return Figure(
             name=f"motion of one of {COUNT} candidates, {NODES} nodes; accurate mode",
             kernel_s=self.seconds(lambda: run(self.job, layouts)) / COUNT,
             other_s=self.seconds(accurate) / COMPARED,
-            agrees=f"{kept.sum()} of {COMPARED}: fastest joint {100 * ratio:.2f} % (at nodes {100 * at_nodes:.2f} %), "
+            agrees=f"{held.sum()} of {COMPARED}: fastest joint {100 * ratio:.2f} % (at nodes {100 * at_nodes:.2f} %), "
             f"margins {margin:.3f}°",
             is_met=at_nodes <= 0.005 and margin <= 0.1,
         )
@@ -129,8 +129,8 @@ class Bench:
         q, qd = np.ascontiguousarray(self.motion.q[0]), np.ascontiguousarray(self.motion.qd[0])
 
         def exact() -> tuple[Array, Array]:
-            found = differentiate(self.job, alone, q, qd, directions)
-            return found.q, found.qd
+            derivatives = differentiate(self.job, alone, q, qd, directions)
+            return derivatives.q, derivatives.qd
 
         def differences() -> tuple[Array, Array]:
             both = run(self.job, _displaced(alone, directions))
@@ -166,7 +166,7 @@ class Bench:
     def near(self) -> Figure:
         """Near pairs against every pair."""
         q, scene = self._keys(), self.scene
-        found = scene.near(q, WITHIN)
+        near = scene.near(q, WITHIN)
 
         poses, exact = scene.body_poses(q), dict[tuple[int, int], float]()
         begin = time.process_time()
@@ -176,7 +176,7 @@ class Bench:
         every_s = time.process_time() - begin
         solids = [
             (row, k, d)
-            for row, k, d in zip(found.rows.tolist(), found.samples.tolist(), found.distances.tolist(), strict=True)
+            for row, k, d in zip(near.rows.tolist(), near.samples.tolist(), near.distances.tolist(), strict=True)
             if (row, k) in exact
         ]
         above = max(d - exact[row, k] for row, k, d in solids)
@@ -185,7 +185,7 @@ class Bench:
             name=f"pairs within {1e3 * WITHIN:g} mm at {KEYS} configurations; every pair",
             kernel_s=self.seconds(lambda: scene.near(q, WITHIN), times=5),
             other_s=every_s,
-            agrees=f"{len(found.rows)} pairs, at most {1e3 * above:.2f} mm above the proved distance",
+            agrees=f"{len(near.rows)} pairs, at most {1e3 * above:.2f} mm above the proved distance",
             is_met=bool(above <= 1e-4) and not is_missed,
         )
 
@@ -193,13 +193,13 @@ class Bench:
         """Yes or no against the smallest distances."""
         times, t = self.job.times, np.arange(0.0, float(self.job.times[-1]) + 5e-4, 1e-3)
         q = np.stack([np.interp(t, times, column) for column in self.motion.q[0].T], axis=1)
-        verdict = certify(self.scene, q, with_minimum=False).is_kept
+        verdict = certify(self.scene, q, with_minimum=False).is_met
         return Figure(
             name=f"yes or no of the certificate, {len(t)} samples; smallest distances",
             kernel_s=self.seconds(lambda: certify(self.scene, q, with_minimum=False)),
             other_s=self.seconds(lambda: certify(self.scene, q)),
             agrees=f"both say {'yes' if verdict else 'no'}",
-            is_met=verdict == certify(self.scene, q).is_kept,
+            is_met=verdict == certify(self.scene, q).is_met,
         )
 
     def _keys(self) -> Array:
@@ -209,15 +209,15 @@ class Bench:
 
 def _directions(layout_job: Job) -> Directions:
     """26 variables: x, y, z, yaw of the operators' bases, five of the positioner's joints, three of each tool."""
-    found, place = Directions.none(layout_job, 26), iter(range(26))
+    result, place = Directions.none(layout_job, 26), iter(range(26))
     for robot in range(1, 4):
         for axis in (0, 1, 2, 5):
-            found.base[robot, axis, next(place)] = 1.0
+            result.base[robot, axis, next(place)] = 1.0
         for axis in (0, 2, 4):
-            found.tool[robot, axis, next(place)] = 1.0
+            result.tool[robot, axis, next(place)] = 1.0
     for joint in range(1, 6):
-        found.start[joint, next(place)] = 1.0
-    return found
+        result.start[joint, next(place)] = 1.0
+    return result
 
 
 def _displaced(layout: Layouts, directions: Directions) -> Layouts:
@@ -236,19 +236,19 @@ def _displaced(layout: Layouts, directions: Directions) -> Layouts:
 def measure_all(rounds: int) -> list[Figure]:
     """All comparisons."""
     bench = Bench(rounds)
-    found = []
+    results = []
     for compare in (bench.run, bench.run_near, bench.differentiate, bench.moved, bench.near, bench.certify):
-        found.append(compare())
-        print(f"layout kernel: {found[-1].name}", file=sys.stderr)
-    return found
+        results.append(compare())
+        print(f"layout kernel: {results[-1].name}", file=sys.stderr)
+    return results
 
 
 def section(figures: list[Figure], rounds: int) -> Section:
     """The figures as a section of the page."""
     rows = []
-    for each in figures:
-        seconds = (f"{1e3 * each.kernel_s:.2f} ms", f"{1e3 * each.other_s:.1f} ms")
-        rows.append((each.name, *seconds, digits(each.other_s / each.kernel_s)))
+    for figure in figures:
+        seconds = (f"{1e3 * figure.kernel_s:.2f} ms", f"{1e3 * figure.other_s:.1f} ms")
+        rows.append((figure.name, *seconds, digits(figure.other_s / figure.kernel_s)))
     return Section(
         title="Kernel of the layout search",
         lines=[
@@ -256,7 +256,7 @@ def section(figures: list[Figure], rounds: int) -> Section:
             "",
             *table(("what; beside what", "kernel, CPU", "beside, CPU", "×"), rows),
         ],
-        goals=[Goal(text=each.name.split(";")[0], measured=each.agrees, met=each.is_met) for each in figures],
+        goals=[Goal(text=figure.name.split(";")[0], measured=figure.agrees, met=figure.is_met) for figure in figures],
     )
 
 
@@ -265,7 +265,7 @@ def main() -> None:
     options = benchmark_options("The kernel of the layout search beside what it replaces.", what="calls", rounds=5)
     figures = measure_all(options.rounds)
     if options.json:
-        print(json.dumps([asdict(each) for each in figures], indent=1, default=bool))
+        print(json.dumps([asdict(figure) for figure in figures], indent=1, default=bool))
     else:
         print(section(figures, options.rounds).text())
 

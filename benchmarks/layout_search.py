@@ -106,16 +106,16 @@ def by_programs(cell: Searched, seed: int, seconds: float) -> tuple[float | None
             x, start = point.x, point.start
         count += 1
         limit = None if best is None else 1.25 * best.cycle
-        found = improve(problem, x, start, cell.demands, Effort(give_up_above=limit))
-        best = _better(best, found)
+        improvement = improve(problem, x, start, cell.demands, Effort(give_up_above=limit))
+        best = _better(best, improvement)
     return None if best is None else best.cycle, count
 
 
-def _better(best: Improved | None, found: Improved | None) -> Improved | None:
+def _better(best: Improved | None, improved: Improved | None) -> Improved | None:
     """The better one of two."""
-    if found is None or not found.is_conforming:
+    if improved is None or not improved.is_conforming:
         return best
-    return found if best is None or found.cycle < best.cycle else best
+    return improved if best is None or improved.cycle < best.cycle else best
 
 
 def by_chance(cell: Searched, seed: int, seconds: float) -> tuple[float | None, int]:
@@ -142,10 +142,10 @@ def by_cma(cell: Searched, seed: int, seconds: float) -> tuple[float | None, int
     options = {"seed": seed + 1, "popsize": POPULATION, "bounds": bounds, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(problem.given)), 1.0, options)
     while time.process_time() - begin < seconds and not strategy.stop():
-        drawn = strategy.ask()
-        points = [np.clip(problem.given + z * problem.scale, problem.lower, problem.upper) for z in drawn]
+        samples = strategy.ask()
+        points = [np.clip(problem.given + z * problem.scale, problem.lower, problem.upper) for z in samples]
         values = [_value(cell, x, cell.start)[0] for x in points]
-        strategy.tell(drawn, values)
+        strategy.tell(samples, values)
         best, count = min(best, *values), count + len(values)
     return best if best < MISSED else None, count
 
@@ -162,8 +162,8 @@ def _value(cell: Searched, x: Array, start: Array) -> tuple[float, Array]:
 
 def methods() -> dict[str, Search]:
     """The searches by name."""
-    found: dict[str, Search] = {"sequential programs": by_programs, "random search": by_chance}
-    return {**found, "CMA-ES": by_cma} if find_spec("cma") is not None else found
+    results: dict[str, Search] = {"sequential programs": by_programs, "random search": by_chance}
+    return {**results, "CMA-ES": by_cma} if find_spec("cma") is not None else results
 
 
 def section(options: argparse.Namespace) -> Section:

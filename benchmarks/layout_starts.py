@@ -57,7 +57,7 @@ class Row:
     is_certified: bool
     seconds: float
     starts: int
-    found: int
+    successes: int
     improved: int
     solved: int
     solve_seconds: float
@@ -162,7 +162,7 @@ def _line(row: Row) -> str:
     verdict = "certified" if row.is_certified else "NOT certified"
     return (
         f"{row.cell:18} seed {row.seed:2}  {verdict:13} {row.seconds:6.1f} s (solve {row.solve_seconds:5.1f} s)  "
-        f"{row.starts} starts, {row.found} candidates, {row.improved} improved, {row.solved} solved"
+        f"{row.starts} starts, {row.successes} candidates, {row.improved} improved, {row.solved} solved"
     )
 
 

@@ -151,7 +151,7 @@ def rows_of(case: Case, rounds: int) -> list[Row]:
             times[method].append(time.process_time() - begin)
             if number == 0:
                 outcomes[method] = outcome if isinstance(outcome, str) else judged(problem, outcome)
-    costs = {method: statistics.median(each) for method, each in times.items()}
+    costs = {method: statistics.median(time) for method, time in times.items()}
     steps = len(problem.schedule.times) - 1
     return [
         Row(
@@ -217,12 +217,12 @@ def table(rows: dict[str, list[Row]]) -> list[str]:
         "| limits kept | secondary goals |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
-    for title, each in rows.items():
-        for index, row in enumerate(each):
+    for title, entry in rows.items():
+        for index, row in enumerate(entry):
             lead = f"| {title if index == 0 else ''} | `{row.method}` "
             cost = f"| {plain(row.step_cpu_s * 1e3, 1)} ms | {rounded(row.ratio)} "
-            room = "yes" if row.method in NULL_SPACE_METHODS else "no"
-            lines.append(f"{lead}{cells_of(row, cost)}| {room} |")
+            null_space = "yes" if row.method in NULL_SPACE_METHODS else "no"
+            lines.append(f"{lead}{cells_of(row, cost)}| {null_space} |")
     return lines
 
 
@@ -261,8 +261,8 @@ def draw(rows: dict[str, list[Row]]) -> None:
     mpl.rcParams.update({"svg.hashsalt": "cellplan", "svg.fonttype": "none", "font.size": 9})
     figure = Figure(figsize=(9.0, 5.2), layout="constrained")
     axes = figure.add_subplot()
-    for (_, each), marker in zip(rows.items(), MARKERS, strict=True):
-        for row in each:
+    for (_, entry), marker in zip(rows.items(), MARKERS, strict=True):
+        for row in entry:
             if row.result is not None:
                 colour = COLOURS[METHODS.index(row.method)]
                 axes.plot(

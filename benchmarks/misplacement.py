@@ -50,15 +50,15 @@ def main() -> None:
         best = record["best"]
         print(f"{name}: {record['status']}, {seconds:.0f} s of this processor beside those of the workers", flush=True)
         if best is None:
-            print("  " + "; ".join(each["reason"] for each in record["top"] if each["reason"]))
+            print("  " + "; ".join(entry["reason"] for entry in record["top"] if entry["reason"]))
             continue
         cycles.append(best["cycle_s"])
         print(f"  cycle {best['cycle_s']:.4f} s, margin {best['margin_deg']:.2f} deg")
-        if (found := record["misplacement"]) is not None:
+        if (result := record["misplacement"]) is not None:
             for group in ("seeded", "by_derivatives", "ends"):
-                print(f"  {group}: {found[f'{group}_kept']} of {found[group]} passed every check")  # type: ignore[literal-required]
-            longer = 100.0 * (found["cycle_s"] / found["nominal_cycle_s"] - 1.0)
-            print(f"  {longer:.1f} % longer than this layout in place by the search, {found['nominal_cycle_s']:.4f} s")
+                print(f"  {group}: {result[f'{group}_kept']} of {result[group]} passed every check")  # type: ignore[literal-required]
+            longer = 100.0 * (result["cycle_s"] / result["nominal_cycle_s"] - 1.0)
+            print(f"  {longer:.1f} % longer than this layout in place by the search, {result['nominal_cycle_s']:.4f} s")
     if len(cycles) == 2:
         print(f"one cycle for all corners is {100.0 * (cycles[1] / cycles[0] - 1.0):.1f} % longer")
 

@@ -123,20 +123,20 @@ def section(rounds: int) -> Section:
 
 def goals(results: Mapping[str, Result]) -> list[Goal]:
     """What the engines of cellplan were to reach, alone and beside their rivals."""
-    found = []
+    collected = []
     for engine in ENGINES:
         if engine.goal_s is None or engine.goal_m is None or engine.name not in results:
             continue
         result = results[engine.name]
         error, rivals = result.errors.smooth, {name: results[name] for name in RIVALS if name in results}
-        found.append(
+        collected.append(
             Goal(
                 text=f"{engine.name}: at most {1e3 * engine.goal_s:g} ms, and {digits(1e3 * engine.goal_m)} mm between",
                 measured=f"{1e3 * result.cpu_s:.0f} ms, {digits(1e3 * error)} mm",
                 met=result.cpu_s <= engine.goal_s and error <= engine.goal_m,
             )
         )
-        found += [
+        collected += [
             Goal(
                 text=f"{engine.name}: at least {TIMES_FASTER:g} times faster than {name} at no larger error",
                 measured=f"{rival.cpu_s / result.cpu_s:.1f} times, {digits(1e3 * error)} mm to "
@@ -146,17 +146,17 @@ def goals(results: Mapping[str, Result]) -> list[Goal]:
             for name, rival in rivals.items()
             if engine is ENGINES[0]
         ]
-    return found
+    return collected
 
 
 def _choices(results: Mapping[str, Result]) -> dict[str, list[str]]:
     """Names and versions of the engines that took part, by what was chosen for them."""
-    found: dict[str, list[str]] = {}
+    collected: dict[str, list[str]] = {}
     for engine in ENGINES:
         if engine.name in results:
             version = f" {results[engine.name].version}" if engine in PEERS else ""
-            found.setdefault(engine.choices, []).append(f"{engine.name}{version}")
-    return found
+            collected.setdefault(engine.choices, []).append(f"{engine.name}{version}")
+    return collected
 
 
 def _row(name: str, result: Result, results: Mapping[str, Result], *, steps: int) -> list[str]:
@@ -181,8 +181,8 @@ def main() -> None:
     )
     if options.json:
         results, left_out = measure(reference_job(), options.rounds)
-        found = {name: asdict(result) for name, result in results.items()}
-        print(json.dumps({"results": found, "left_out": left_out}, indent=1))
+        result = {name: asdict(result) for name, result in results.items()}
+        print(json.dumps({"results": result, "left_out": left_out}, indent=1))
         return
     print(section(options.rounds).text())
 

@@ -68,7 +68,7 @@ class BruteForce:
     def near(self, q: Array, within: float) -> dict[tuple[str, str], tuple[float, float]]:
         """Distance and demand in [m] of all pairs nearer than so much beyond their demand, by names."""
         X = self._poses(q)
-        found = {}
+        results = {}
         for pair in self._pairs:
             first, second = pair.first, pair.second
             if pair.is_ground:
@@ -80,11 +80,11 @@ class BruteForce:
                     continue
                 distance = _distance(self._shapes[first], X[first], self._shapes[second], X[second])
                 if distance <= 0.0:
-                    solids = [self._scene.bodies[each].shape for each in (first, second)]
+                    solids = [self._scene.bodies[entry].shape for entry in (first, second)]
                     distance = _depth_of_ball(solids, (X[first], X[second]), distance)
             if distance < pair.demand + within:
-                found[self._scene.names(pair)] = (distance, pair.demand)
-        return found
+                results[self._scene.names(pair)] = (distance, pair.demand)
+        return results
 
     def _poses(self, q: Array) -> list[Array]:
         """Pose of each body in the world."""
@@ -102,25 +102,25 @@ class BruteForce:
 
 def judged(recovery: Recovery, places: RunPlaces, rng: np.random.Generator, *, moments: int = MOMENTS) -> Judged:
     """Judge the tables of a recovery by brute force, at random moments and at all joins of its phases."""
-    result, found = Judged(), recovery.judgement
-    if found is None:
+    result, judgement = Judged(), recovery.judgement
+    if judgement is None:
         raise ValueError("expected a recovery that was found")
     tables = [parse_table(recovery.tables[robot.name], robot.name) for robot in recovery.cell.robots]
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)
-    kept_from = {pair.names: at for pair, at in found.apart}
+    met_from = {pair.names: at for pair, at in judgement.apart}
     stopped = BruteForce(places.scene_while_stopped(recovery.state.lying))
-    room = max((pair.slack for pair, _ in found.apart), default=0.0) + TOLERANCE
-    largest = {pair.names: pair.begin for pair, _ in found.apart}
-    back = [BruteForce(places.scene_of_phase(phase.place)) for phase in found.phases if phase.place is not None]
-    for phase in found.phases:
+    margin = max((pair.slack for pair, _ in judgement.apart), default=0.0) + TOLERANCE
+    largest = {pair.names: pair.begin for pair, _ in judgement.apart}
+    back = [BruteForce(places.scene_of_phase(phase.place)) for phase in judgement.phases if phase.place is not None]
+    for phase in judgement.phases:
         judge = stopped if phase.place is None else back.pop(0)
         inner = rng.uniform(phase.begin, phase.end, moments)
         for at in np.sort(np.concatenate([[phase.begin, phase.end], inner])).tolist():
             here = np.array([np.interp(at, times, column) for column in q.T])
             for names, (distance, demand) in judge.near(here, 0.05).items():
-                opens = kept_from.get(names)
+                opens = met_from.get(names)
                 if phase.kind == "retract" and opens is not None and at < opens:
-                    if distance < largest[names] - room:
+                    if distance < largest[names] - margin:
                         result.faults.append(f"{names} comes nearer: {MM * distance:.3f} mm at {at:.4f} s")
                     largest[names] = max(largest[names], distance)
                     continue
@@ -159,29 +159,29 @@ def measured(cell_file: Path, folder: Path, *, stops: int, seed: int, most: floa
     """Row of the table: a cell with random stops, no more of them than so many seconds of processor time allow."""
     run, rng = run_of(cell_file, folder), np.random.default_rng(seed)
     places = RunPlaces.of(run)
-    seconds, ways, reasons = list[float](), Counter[str](), Counter[str]()
+    seconds, kinds_, reasons = list[float](), Counter[str](), Counter[str]()
     smallest, faults, first = np.inf, list[str](), time.process_time()
     for at, frozen in random_stops(run, stops, rng):
         begin = time.process_time()
         if seconds and begin - first > most:
             break
         try:
-            found = recover(run, at=at, frozen=frozen)
+            recovery = recover(run, at=at, frozen=frozen)
         except CellplanError as error:
             seconds.append(time.process_time() - begin)
             reasons[f"{type(error).__name__}: {str(error)[:160]} (at {at:.4f} {frozen})"] += 1
             continue
         seconds.append(time.process_time() - begin)
-        if not found.succeeded:
-            reasons[f"{found.reason[:400]} (at {at:.4f} {frozen})"] += 1
+        if not recovery.succeeded:
+            reasons[f"{recovery.reason[:400]} (at {at:.4f} {frozen})"] += 1
             continue
-        kinds = {phase.kind for phase in found.judgement.phases} if found.judgement else set()
-        ways["back" if "back" in kinds else "straight off"] += 1
-        result = judged(found, places, rng)
+        kinds = {phase.kind for phase in recovery.judgement.phases} if recovery.judgement else set()
+        kinds_["back" if "back" in kinds else "straight off"] += 1
+        result = judged(recovery, places, rng)
         smallest = min(smallest, result.smallest)
         faults += [f"at {at:.4f} {frozen}: {fault}" for fault in result.faults]
     lines = [
-        f"| {run.cell.name} | {len(seconds)} | {sum(ways.values())} | {ways['straight off']} | {ways['back']} | "
+        f"| {run.cell.name} | {len(seconds)} | {sum(kinds_.values())} | {kinds_['straight off']} | {kinds_['back']} | "
         f"{sum(reasons.values())} | {np.mean(seconds):.1f} | {max(seconds):.1f} | {MM * smallest:.2f} | {len(faults)} |"
     ]
     lines += [f"    fault: {fault}" for fault in faults[:20]]
@@ -202,9 +202,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "| cell | stops | found | straight off | back first | not found | mean CPU s | most CPU s | least mm | faults |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as kept:
+    with tempfile.TemporaryDirectory() as kept_folder:
         for cell_file in chosen.cells:
-            folder = (chosen.runs or Path(kept)) / cell_file.stem
+            folder = (chosen.runs or Path(kept_folder)) / cell_file.stem
             print(measured(cell_file, folder, stops=chosen.stops, seed=chosen.seed, most=chosen.seconds), flush=True)
 
 

@@ -109,19 +109,19 @@ class Judge:
         cell = self._cell
         of = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
         X_PW = inverse(part_poses(cell, self._chains, of))
-        found = []
+        results = []
         for task in self._fine.tasks:
             X_PT = X_PW @ self._chains[task.task.robot].tool_poses(of[task.task.robot])
             error = errors_on_part(X_PT, task.X_PT[samples], task.task)
-            found.append([np.linalg.norm(part, axis=1).max() for part in (error[:, :3], error[:, 3:])])
-        position, orientation = np.max(found, axis=0).tolist()
+            results.append([np.linalg.norm(part, axis=1).max() for part in (error[:, :3], error[:, 3:])])
+        position, orientation = np.max(results, axis=0).tolist()
         return position, orientation
 
 
 def thinned(job: Job, every: int, looks: int) -> Job:
     """The job at every so many samples only, each of them so many times in a row but for the first."""
-    kept = np.repeat(np.arange(0, len(job.times), every), looks)[looks - 1 :]
-    return replace(job, times=job.times[: len(kept)], X_PT=job.X_PT[kept])
+    chosen = np.repeat(np.arange(0, len(job.times), every), looks)[looks - 1 :]
+    return replace(job, times=job.times[: len(chosen)], X_PT=job.X_PT[chosen])
 
 
 def filled(q: Array, *, degree: int, parts: int = BETWEEN + 1) -> Array:

@@ -141,19 +141,19 @@ def try_robot(file: Path, package_dirs: Sequence[Path], urdf: Callable[[], str])
     """
     begin = _seconds()
     with TemporaryDirectory() as folder:
-        options = [option for each in package_dirs for option in ("--package-dir", str(each))]
+        options = [option for package_dir in package_dirs for option in ("--package-dir", str(package_dir))]
         status, text, errors = _command("robots", str(file), *options, "--json")
         if status != 0:
             return Trial(name=file.name, reason=_reason(errors), seconds=_seconds() - begin, error=np.nan)
         description = json.loads(text)["robots"][0]
         cell_file = Path(folder) / "cell.yaml"
         cell_file.write_text(_cell_text(description))
-        allowed = [option for each in (*package_dirs, file.parent) for option in ("--allow-dir", str(each))]
+        allowed = [option for entry in (*package_dirs, file.parent) for option in ("--allow-dir", str(entry))]
         status, _, errors = _command("check", str(cell_file), *allowed, "--quiet")
         if status == 2:
             return Trial(name=file.name, reason=_reason(errors), seconds=_seconds() - begin, error=np.nan)
         seconds = _seconds() - begin
-        robot = next(each for each in load_cell(cell_file, allow_dirs=(*package_dirs, file.parent)).robots)
+        robot = next(robot for robot in load_cell(cell_file, allow_dirs=(*package_dirs, file.parent)).robots)
         error = disagreement(robot, description["flange"], urdf())
         return Trial(name=file.name, reason="", seconds=seconds, error=error)
 
@@ -208,8 +208,8 @@ def _pinocchio(urdf: str) -> tuple[Any, Any, dict[str, tuple[str, float, float]]
             continue
         name, limit, mimic = joint.attrib["name"], joint.find("limit"), joint.find("mimic")
         low, high = (float((limit.attrib if limit is not None else {}).get(key, 0.0)) for key in ("lower", "upper"))
-        has_room = joint.get("type") != "continuous" and low < high and max(abs(low), abs(high)) < NO_LIMIT
-        rest[name] = min(max(0.0, low), high) if has_room else 0.0
+        is_limited = joint.get("type") != "continuous" and low < high and max(abs(low), abs(high)) < NO_LIMIT
+        rest[name] = min(max(0.0, low), high) if is_limited else 0.0
         if mimic is not None:
             ratio, offset = float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))
             mimics[name] = (mimic.attrib["joint"], ratio, offset)
@@ -263,7 +263,7 @@ def expanded(file: Path, folders: Sequence[Path]) -> str:
     """
 
     def find(package: str) -> str:
-        return str(next((each / package for each in folders if (each / package).is_dir()), file.parent.parent))
+        return str(next((folder / package for folder in folders if (folder / package).is_dir()), file.parent.parent))
 
     usual, substitution_args._eval_find = substitution_args._eval_find, find
     try:

@@ -59,13 +59,13 @@ def measure(rounds: int) -> list[Cost]:
     seconds: list[list[float]] = [[] for _ in cells]
     for number in range(rounds + 1):
         print(f"scaling: {f'round {number} of {rounds}' if number else 'warming up'}", file=sys.stderr)
-        for run, found in zip(runs, seconds, strict=True):
+        for run, second in zip(runs, seconds, strict=True):
             begin = time.process_time()
             run()
-            found.append(time.process_time() - begin)
+            second.append(time.process_time() - begin)
     return [
-        Cost(robots=len(cell.robots), joints=cell.joint_count, nodes=run(), cpu_s=statistics.median(found[1:]))
-        for cell, run, found in zip(cells, runs, seconds, strict=True)
+        Cost(robots=len(cell.robots), joints=cell.joint_count, nodes=run(), cpu_s=statistics.median(second[1:]))
+        for cell, run, second in zip(cells, runs, seconds, strict=True)
     ]
 
 

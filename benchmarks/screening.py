@@ -65,14 +65,14 @@ def measure(rounds: int) -> Figures:
     with ProcessPoolExecutor(PROCESSES, mp_context=get_context("spawn")) as pool:
         for number in range(rounds + 1):
             print(f"screening: {f'round {number} of {rounds}' if number else 'warming up'}", file=sys.stderr)
-            found, seconds = screened(batches)
+            result, seconds = screened(batches)
             batch_s.append(seconds / COUNT)
             alone_s.append(screened(singles)[1] / ALONE)
             begin = time.perf_counter()
             pool_s.append(sum(pool.map(processor_time, batches)))
             waiting_s.append(time.perf_counter() - begin)
     return Figures(
-        followed=sum(int(screening.is_followed.sum()) for screening in found),
+        followed=sum(int(screening.is_followed.sum()) for screening in result),
         batch_s=statistics.median(batch_s[1:]),
         alone_s=statistics.median(alone_s[1:]),
         per_s=PROCESSES * COUNT / statistics.median(pool_s[1:]),
@@ -115,8 +115,8 @@ def screen(candidates: Candidates) -> Screening:
 def screened(batches: Sequence[Candidates]) -> tuple[list[Screening], float]:
     """What comes of several batches, one after the other, and the processor time in [s]."""
     begin = time.process_time()
-    found = [screen(batch) for batch in batches]
-    return found, time.process_time() - begin
+    result = [screen(batch) for batch in batches]
+    return result, time.process_time() - begin
 
 
 def processor_time(candidates: Candidates) -> float:

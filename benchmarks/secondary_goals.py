@@ -56,7 +56,7 @@ def main() -> None:
             begin = time.process_time()
             motions[name, integrator] = plan_within_accuracy(task)
             times[name, integrator].append(time.process_time() - begin)
-    costs = {case: statistics.median(each) for case, each in times.items()}
+    costs = {case: statistics.median(time) for case, time in times.items()}
     print("| goal | mode | systems | processor time | × no goal, accurate | farthest joint from the accurate motion |")
     print("|---|---|---|---|---|---|")
     for (name, integrator), cost in costs.items():

@@ -29,7 +29,7 @@ LIMITS: Final[Mapping[str, Mapping[str, object]]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class Shortest:
     """Shortest cycles under some limits, and the processor time that they took in [s]."""
 
     cycles: ShortestCycles
@@ -38,29 +38,29 @@ class Found:
 
 def main() -> int:
     """Print the section; 1 if a goal is missed."""
-    found = {name: measured(values) for name, values in LIMITS.items()}
-    goals = list(goals_of({name: each.cycles for name, each in found.items()}))
-    rows = [row for name, each in found.items() for row in rows_of(name, each)]
+    result = {name: measured(values) for name, values in LIMITS.items()}
+    goals = list(goals_of({name: value.cycles for name, value in result.items()}))
+    rows = [row for name, value in result.items() for row in rows_of(name, value)]
     head = ("limits", "program", "cycle s", "what binds", "largest tool error mm", "clearance mm", "checks", "CPU s")
     lines = [f"`{CELL.name}`, 4 s as written. Measured on: {machine()}.", "", *table(head, rows)]
     print(Section(title="Shortest cycles", lines=lines, goals=goals).text())
     return 0 if all(goal.met for goal in goals) else 1
 
 
-def measured(values: Mapping[str, object]) -> Found:
+def measured(values: Mapping[str, object]) -> Shortest:
     """The shortest cycles under some limits."""
     begun = time.process_time()
     cycles = fastest(load_cell(CELL).with_values(values), points=0)
-    return Found(cycles=cycles, cpu=time.process_time() - begun)
+    return Shortest(cycles=cycles, cpu=time.process_time() - begun)
 
 
-def rows_of(name: str, found: Found) -> Iterator[tuple[str, ...]]:
+def rows_of(name: str, shortest: Shortest) -> Iterator[tuple[str, ...]]:
     """A row for each program."""
-    programs = found.cycles.programs
+    programs = shortest.cycles.programs
     for number, (law, program) in enumerate(programs.items()):
         figures = program.figures
-        errors = [each for run in program.solution.runs for each in run.report.accuracy]
-        worst = max(1e3 * max((each.between.position.largest if each.between else 0.0) for each in errors), 0.0)
+        errors = [accuracy for run in program.solution.runs for accuracy in run.report.accuracy]
+        worst = max(1e3 * max((error.between.position.largest if error.between else 0.0) for error in errors), 0.0)
         clearance = figures["min_clearance_mm"]
         yield (
             "" if number else name,
@@ -70,14 +70,14 @@ def rows_of(name: str, found: Found) -> Iterator[tuple[str, ...]]:
             f"{worst:.5f}",
             "-" if clearance is None else f"{clearance:.2f}",
             "passed" if program.solution.passed else "failed",
-            "" if number else f"{found.cpu:.0f}",
+            "" if number else f"{shortest.cpu:.0f}",
         )
 
 
-def goals_of(found: Mapping[str, ShortestCycles]) -> Iterator[Goal]:
+def goals_of(result: Mapping[str, ShortestCycles]) -> Iterator[Goal]:
     """What is to come out."""
-    laws = {name: each.by_time_laws for name, each in found.items()}
-    common = {name: each.by_common_speed for name, each in found.items()}
+    laws = {name: value.by_time_laws for name, value in result.items()}
+    common = {name: value.by_common_speed for name, value in result.items()}
     yield goal("by the time laws, acceleration unlimited: 1.40 s ± 0.03 s", laws[NO_ACCELERATION], 1.37, 1.43)
     binding = laws[NO_ACCELERATION].bindings[0]
     is_b2 = (binding.robot, binding.joint) == ("kuka", "B2")
@@ -85,10 +85,10 @@ def goals_of(found: Mapping[str, ShortestCycles]) -> Iterator[Goal]:
     yield goal("by the time laws, 0.25 s and 0.15 s: 2.76 s ± 0.05 s", laws[NO_JERK], 2.71, 2.81)
     yield goal("the same with the jerk limit", laws[WITH_JERK], 2.71, 2.81)
     yield goal("by the common speed, 0.25 s and 0.15 s: at most 1.68 s", common[NO_JERK], 0.0, 1.68)
-    for name in found:
+    for name in result:
         slower = laws[name].cycle
         yield goal(f"the common speed is not slower than the time laws: {name}", common[name], 0.0, slower)
-    programs = [program for each in found.values() for program in each.programs.values()]
+    programs = [program for value in result.values() for program in value.programs.values()]
     passed = sum(program.solution.passed for program in programs)
     text = "every program passes every check, its clearance certified"
     yield Goal(text=text, measured=f"{passed} of {len(programs)}", met=passed == len(programs))

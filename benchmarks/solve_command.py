@@ -62,17 +62,17 @@ def measured(checkouts: list[Path], command: list[str], rounds: int) -> list[lis
     return [list(runs) for runs in zip(*turns, strict=True)]
 
 
-def table(names: list[str], found: list[list[Spent]]) -> str:
+def table(names: list[str], result: list[list[Spent]]) -> str:
     """Medians as Markdown, and the ratios to the first checkout."""
     lines = ["| checkout | clock, s | processor, s | user, s | system, s |", "|---|---:|---:|---:|---:|"]
-    for name, runs in zip(names, found, strict=True):
+    for name, runs in zip(names, result, strict=True):
         columns = [[run.clock, run.processor, run.user, run.system] for run in runs]
         figures = [f"{statistics.median(values):.2f}" for values in zip(*columns, strict=True)]
         lines.append(f"| {' | '.join([name, *figures])} |")
-    for name, runs in zip(names[1:], found[1:], strict=True):
-        pairs = list(zip(runs, found[0], strict=True))
-        clock = statistics.median(own.clock / other.clock for own, other in pairs)
-        processor = statistics.median(own.processor / other.processor for own, other in pairs)
+    for name, runs in zip(names[1:], result[1:], strict=True):
+        pairs = list(zip(runs, result[0], strict=True))
+        clock = statistics.median(ours.clock / other.clock for ours, other in pairs)
+        processor = statistics.median(ours.processor / other.processor for ours, other in pairs)
         lines += [
             "",
             f"{name} / {names[0]}: clock {clock:.2f}, processor {processor:.2f} (medians of {len(pairs)} ratios).",

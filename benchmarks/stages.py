@@ -140,12 +140,12 @@ class Timing:
 
         def load_and_time(module: Any) -> None:
             load(module)
-            for way, stage in self._desired[name]:
-                *owners, last = way.split(".")
+            for dotted, stage in self._desired[name]:
+                *owners, last = dotted.split(".")
                 owner = functools.reduce(getattr, owners, module)
-                own = vars(owner)[last]
-                is_class = isinstance(own, classmethod)
-                timed = self._clock.timed(own.__func__ if is_class else own, stage)
+                members = vars(owner)[last]
+                is_class = isinstance(members, classmethod)
+                timed = self._clock.timed(members.__func__ if is_class else members, stage)
                 setattr(owner, last, classmethod(timed) if is_class else timed)
 
         spec.loader.exec_module = load_and_time  # type: ignore[method-assign]
@@ -184,7 +184,7 @@ def solve_timed(cell: str, folder: str) -> dict[str, Seconds]:
 
 def measured(cell: str, rounds: int) -> tuple[dict[str, Seconds], float]:
     """Median seconds of each stage, and of the whole command with its end."""
-    found: list[dict[str, Seconds]] = []
+    results: list[dict[str, Seconds]] = []
     whole = []
     for _ in range(rounds):
         with tempfile.TemporaryDirectory(prefix="cellplan-profile-") as folder:
@@ -199,10 +199,10 @@ def measured(cell: str, rounds: int) -> tuple[dict[str, Seconds], float]:
             whole.append(time.time() - begin)
         if run.returncode != 0:
             sys.exit(run.stderr)
-        found.append(json.loads(run.stdout.splitlines()[-1]))
+        results.append(json.loads(run.stdout.splitlines()[-1]))
     medians = {}
     for name in (STARTING, IMPORTS, *STAGES, REST, CHILDREN):
-        walls, cpus = zip(*(each.get(name, (0.0, 0.0)) for each in found), strict=True)
+        walls, cpus = zip(*(entry.get(name, (0.0, 0.0)) for entry in results), strict=True)
         medians[name] = statistics.median(walls), statistics.median(cpus)
     return medians, statistics.median(whole)
 

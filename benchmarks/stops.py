@@ -58,7 +58,7 @@ def cases(path: Path) -> Iterator[Case]:
     solution = solve(replace(bare, checks=cell.checks.changed(stop=None)))
     for run in solution.runs:
         whole = run.scene or Scene.from_cell(solution.cell)
-        scene = scene_of_run(whole, [each.task.name for each in run.schedule.tasks])
+        scene = scene_of_run(whole, [task.task.name for task in run.schedule.tasks])
         scene = replace(scene, cell=stopping(scene.cell, cell))
         yield Case(scene.cell, scene, run.schedule, run.report.q)
 
@@ -67,13 +67,15 @@ def stopping(cell: Cell, stated: Cell) -> Cell:
     """A cell with the controllers of another one; where that does not state how robots stop, they stop alike."""
     controllers = dict(stated.controllers)
     control = {robot.name: robot.control or RobotControlEntry(id=robot.name) for robot in stated.robots}
-    for each in control.values():
-        controllers.setdefault(each.id, ControllerEntry(kind="other"))
+    for value in control.values():
+        controllers.setdefault(value.id, ControllerEntry(kind="other"))
     robots = tuple(replace(robot, control=control[robot.name]) for robot in cell.robots)
     cell = replace(cell, robots=robots, controllers=controllers)
     if running_on(cell):
         return cell
-    alike = {name: each.changed(reaction_ms=1e3 * REACTION, brake_s=BRAKE) for name, each in controllers.items()}
+    alike = {
+        name: controller.changed(reaction_ms=1e3 * REACTION, brake_s=BRAKE) for name, controller in controllers.items()
+    }
     return replace(cell, controllers=alike)
 
 
@@ -122,7 +124,7 @@ class Brute:
         if (first, second) not in self._pairs:
             scene = self.case.scene
             pairs = [scene.pairs[row] for row in watched_pairs(scene, first, second).rows.tolist()]
-            self._pairs[first, second] = [(each.first, each.second) for each in pairs if each.rule is Rule.CLEARANCE]
+            self._pairs[first, second] = [(pair.first, pair.second) for pair in pairs if pair.rule is Rule.CLEARANCE]
         return self._pairs[first, second]
 
     def _pose(self, index: int, state: LinkState) -> tuple[coal.Transform3s, Array]:
@@ -152,10 +154,10 @@ class Brute:
                 return float(back)
         return 0.0
 
-    def drawn(self, robot: str, times: Mapping[str, float]) -> float:
+    def depth_of(self, robot: str, times: Mapping[str, float]) -> float:
         """How far in [m] the tool of a further holder is from its grasp, along what the grasp ties."""
         cell = self.case.cell
-        grasp = next(each for each in cell.closures if each.robot == robot)
+        grasp = next(closure for closure in cell.closures if closure.robot == robot)
         state = self._model.state(self.placed(times))
         at = (inverse(state.X_WP[None])[0] @ state.X_WT[cell.index(robot)])[:3, 3]
         tied = [axis for axis in range(3) if axis in grasp.axes]
@@ -191,11 +193,11 @@ def compared(case: Case, brute: Brute, rng: np.random.Generator) -> Difference:
     names = [robot.name for robot in cell.robots]
     stopped = names[int(rng.integers(len(names)))]
     at = float(rng.uniform(0.0, end))
-    found = one_stop(case.scene, case.schedule, case.q, robot=stopped, at=at)
-    if found is None:
+    stop = one_stop(case.scene, case.schedule, case.q, robot=stopped, at=at)
+    if stop is None:
         raise SystemExit(f"{cell.name}: no controller states how its robots go on")
     result = Difference()
-    for pair in found.distances:
+    for pair in stop.distances:
         other = next(name for name in pair.robots if name != stopped)
         last = min(at + going.get(other, 0.0), end)
         truth = min(
@@ -204,35 +206,37 @@ def compared(case: Case, brute: Brute, rng: np.random.Generator) -> Difference:
         )
         if np.isfinite(truth):
             result = result.worst(Difference(above=pair.proved - truth, below=truth - pair.distance))
-    for depth in found.depths:
-        result = result.worst(Difference(shallow=_shallow(brute, found, depth.task, (stopped, at))))
-    for grip in found.grips:
-        truth = _on_way(brute, found, grip.robot, (stopped, at), PLACES)
-        result = result.worst(Difference(grip=max(brute.drawn(grip.robot, each) for each in truth) - grip.distance))
+    for depth in stop.depths:
+        result = result.worst(Difference(shallow=_shallow(brute, stop, depth.task, (stopped, at))))
+    for grip in stop.grips:
+        truth = _on_way(brute, stop, grip.robot, (stopped, at), PLACES)
+        result = result.worst(
+            Difference(grip=max(brute.depth_of(grip.robot, entry) for entry in truth) - grip.distance)
+        )
     return result
 
 
 def _on_way(
-    brute: Brute, found: StopReport, robot: str, stop: tuple[str, float], places: int
+    brute: Brute, report: StopReport, robot: str, stop: tuple[str, float], places: int
 ) -> list[dict[str, float]]:
     """Times of all robots at some places of the way that a robot, or what carries the part, covers after a stop."""
     case, (stopped, at) = brute.case, stop
     carrier, end = case.cell.positioners[0], float(case.schedule.times[-1])
-    names = [each.name for each in case.cell.robots]
+    names = [robot.name for robot in case.cell.robots]
     if stopped not in {robot, carrier}:
         return [dict.fromkeys(names, at)]
     other = carrier if stopped == robot else robot
-    last = min(at + found.runs_on.get(other, 0.0), end)
+    last = min(at + report.runs_on.get(other, 0.0), end)
     return [{name: (t if name == other else at) for name in names} for t in np.linspace(at, last, places).tolist()]
 
 
-def _shallow(brute: Brute, found: StopReport, task: str, stop: tuple[str, float]) -> float:
+def _shallow(brute: Brute, report: StopReport, task: str, stop: tuple[str, float]) -> float:
     """By how much the depth of a task lies below that of the tool's axis in [m]; zero where the stop is of others."""
     robot = brute.case.cell.task(task).robot
     if stop[0] not in {robot, brute.case.cell.positioners[0]}:
         return 0.0
-    truth = max(brute.axis_depth(robot, times) for times in _on_way(brute, found, robot, stop, ALONG))
-    return truth - next(each.depth for each in found.depths if each.task == task)
+    truth = max(brute.axis_depth(robot, times) for times in _on_way(brute, report, robot, stop, ALONG))
+    return truth - next(depth.depth for depth in report.depths if depth.task == task)
 
 
 def main() -> None:
@@ -251,7 +255,7 @@ def main() -> None:
             while done < arguments.stops and spent < arguments.seconds:
                 worst, done = worst.worst(compared(case, brute, rng)), done + 1
                 spent = time.process_time() - begin
-            values = "".join(f"{1e3 * each:12.3f}" for each in (worst.above, worst.below, worst.shallow, worst.grip))
+            values = "".join(f"{1e3 * entry:12.3f}" for entry in (worst.above, worst.below, worst.shallow, worst.grip))
             print(f"{path + ' ' + str(place):36}{done:6}{values}{1e3 * spent / done:8.0f}", flush=True)
     print(
         "above: proved distance over brute force, to be no more than 0; below: measured distance under it, up to "

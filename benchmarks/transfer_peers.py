@@ -13,7 +13,7 @@ from ompl import base, geometric, util
 from transfers import Case, cases
 
 from cellplan.geometry.arrays import Array
-from cellplan.planning.transfer.in_turn import DRAWN
+from cellplan.planning.transfer.in_turn import SAMPLES
 from cellplan.planning.transfer.move_check import MoveCheck, Others
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.trees import STEP, JointBox, connected
@@ -50,8 +50,8 @@ class Motions(base.MotionValidator):
 def ours(check: MoveCheck, ends: tuple[Array, Array], box: JointBox, seed: int) -> Array | None:
     """A way by our trees, in seconds at top speed."""
     rng = np.random.default_rng(seed)
-    found = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=lambda _: None)
-    return None if found.way is None else found.way / box.velocity
+    result = connected(check, ends, box=box, samples=SAMPLES, rng=rng, tick=lambda _: None)
+    return None if result.path is None else result.path / box.velocity
 
 
 def by_ompl(check: MoveCheck, ends: tuple[Array, Array], box: JointBox, seed: int) -> Array | None:
@@ -77,7 +77,7 @@ def by_ompl(check: MoveCheck, ends: tuple[Array, Array], box: JointBox, seed: in
     planner.setRange(STEP)
     setup.setPlanner(planner)
     begun = check.moves
-    if not setup.solve(base.PlannerTerminationCondition(lambda: check.moves - begun > 2 * DRAWN)):
+    if not setup.solve(base.PlannerTerminationCondition(lambda: check.moves - begun > 2 * SAMPLES)):
         return None
     path = setup.getSolutionPath()
     return np.array([[path.getState(i)[k] for k in range(n)] for i in range(path.getStateCount())])
@@ -93,9 +93,9 @@ def compared(case: Case, planner: Callable[..., Array | None], seed: int) -> tup
     if check.is_free(*ends):
         return None
     check.moves, begin = 0, time.process_time()
-    way = planner(check, ends, query.box("arm"), seed)
+    path = planner(check, ends, query.box("arm"), seed)
     seconds = time.process_time() - begin
-    length = np.inf if way is None else float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
+    length = np.inf if path is None else float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     return seconds, check.moves, length
 
 
@@ -104,14 +104,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cells", type=int, default=20)
     planners = {"own": ours, "ompl": by_ompl}
-    found: dict[str, list[tuple[float, int, float]]] = {name: [] for name in planners}
+    results: dict[str, list[tuple[float, int, float]]] = {name: [] for name in planners}
     for number, case in enumerate(cases(parser.parse_args().cells, is_walled=False)):
         for name, planner in planners.items():
             figures = compared(case, planner, seed=0)
             if figures is not None:
-                found[name].append(figures)
+                results[name].append(figures)
                 print(f"{number:3d} {name:5s} {figures[0]:6.2f} s CPU {figures[1]:5d} moves, length {figures[2]:.2f} s")
-    for name, figures in found.items():
+    for name, figures in results.items():
         seconds, moves, lengths = np.array(figures).T
         print(
             f"{name}: {np.isfinite(lengths).sum()} of {len(lengths)} found, medians {np.median(seconds):.2f} s CPU, "

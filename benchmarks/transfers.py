@@ -34,7 +34,7 @@ from cellplan.scene.scene import Scene
 BUNDLED: Final = ("kuka_kr6", "abb_irb1600_8_145", "staubli_rx160", "ur5e", "ur10e", "kuka_kr16_2", "staubli_rx90l")
 OUTSIDE: Final = ("kuka_kr16_2", "kuka_kr5_arc", "abb_irb1600_8_145", "staubli_rx160")  # below ../shared/robots
 CLEARANCE: Final = 0.005  # [m]
-KEPT_OFF: Final = 0.03  # [m] that obstacles keep from what is swept on the known way
+CLEAR_OF_PATH: Final = 0.03  # [m] that obstacles keep from what is swept on the known way
 BLOCK_OFF: Final = 0.01  # [m] that the block keeps from the arm at start and goal
 BLOCKS_TRIED: Final = 400  # places of the block for one pair of start and goal
 THINGS: Final = 10  # obstacles of a cell
@@ -146,23 +146,23 @@ def finer(q: Array, move: float = FINE) -> Array:
 def free_case(model: RobotModel, rng: np.random.Generator) -> Case:
     """A cell round a known way."""
     bare = scene_with(model, ())
-    way = _known_way(bare, rng)
-    poses = bare.body_poses(finer(way, COARSE))
+    path = _known_path(bare, rng)
+    poses = bare.body_poses(finer(path, COARSE))
     engine = bare.engine
     shapes = [coal_shape(body.shape) for body in engine.bodies]
     centres = np.array([poses.R[k] @ centre + poses.p[k] for k, centre in enumerate(engine.centres)])
-    straight = way[0] + np.linspace(0.2, 0.8, 7)[:, None] * (way[-1] - way[0])
+    straight = path[0] + np.linspace(0.2, 0.8, 7)[:, None] * (path[-1] - path[0])
     tips = bare.chains["arm"].tool_poses(straight)[:, :3, 3]
     things: list[Obstacle] = []
     while len(things) < THINGS:
-        shape = _drawn_shape(rng)
+        shape = _random_shape(rng)
         at = tips[rng.integers(len(tips))] * rng.uniform(0.6, 1.0) + rng.normal(scale=0.1, size=3)
         thing = Obstacle(name=f"thing{len(things)}", shape=shape, X_WS=pose_from(rotation_exp(rng.normal(size=3)), at))
         gaps = np.linalg.norm(centres - at, axis=2) - engine.radii[:, None] - bounding_sphere(shape)[1]
-        near = np.argwhere(gaps < KEPT_OFF).tolist()
-        if all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], thing) >= KEPT_OFF for k, i in near):
+        near = np.argwhere(gaps < CLEAR_OF_PATH).tolist()
+        if all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], thing) >= CLEAR_OF_PATH for k, i in near):
             things.append(thing)
-    return Case(scene_with(model, things), way[0], way[-1])
+    return Case(scene_with(model, things), path[0], path[-1])
 
 
 def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
@@ -174,9 +174,9 @@ def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
     out = np.linalg.norm([at_zero.R[k, 0, :2] @ c + at_zero.p[k, 0, :2] for k, c in enumerate(engine.centres)], axis=1)
     link = max((k for k in range(len(shapes)) if bare.carrier(k).link == 0), key=lambda k: float(out[k]))
     while True:
-        way = _known_way(bare, rng, turn=2.0)
-        q = np.array([way[0], way[-1], way[0]])
-        q[2, 0] = 0.5 * (way[0, 0] + way[-1, 0])
+        path = _known_path(bare, rng, turn=2.0)
+        q = np.array([path[0], path[-1], path[0]])
+        q[2, 0] = 0.5 * (path[0, 0] + path[-1, 0])
         poses = bare.body_poses(q)
         centre = poses.R[link, 2] @ engine.centres[link] + poses.p[link, 2]
         for _ in range(BLOCKS_TRIED):
@@ -186,36 +186,36 @@ def walled_case(model: RobotModel, rng: np.random.Generator) -> Case:
             ends = ((k, i) for i in range(2) for k in range(len(shapes)))
             if touched and all(_distance(shapes[k], poses.R[k, i], poses.p[k, i], block) > BLOCK_OFF for k, i in ends):
                 scene = scene_with(model, [block])
-                if scene.touching(way[0]) is None and scene.touching(way[-1]) is None:  # nor is it inside a link
-                    return Case(scene, way[0], way[-1])
+                if scene.touching(path[0]) is None and scene.touching(path[-1]) is None:  # nor is it inside a link
+                    return Case(scene, path[0], path[-1])
 
 
-def _known_way(bare: Scene, rng: np.random.Generator, *, turn: float = 1.0) -> Array:
+def _known_path(bare: Scene, rng: np.random.Generator, *, turn: float = 1.0) -> Array:
     """Three via points, straight between them without contact, the first joint turning by an angle at least."""
     model = bare.cell.robots[0].model
     lower, upper = np.maximum(model.lower, -2.5), np.minimum(model.upper, 2.5)
     force = BruteForce(bare)
     while True:
-        way = rng.uniform(lower, upper, (3, len(lower)))
+        path = rng.uniform(lower, upper, (3, len(lower)))
         if (
-            abs(way[2, 0] - way[0, 0]) > turn
-            and force.contact(finer(way, 0.3)) is None
-            and (force.contact(finer(way, COARSE)) is None)
+            abs(path[2, 0] - path[0, 0]) > turn
+            and force.contact(finer(path, 0.3)) is None
+            and (force.contact(finer(path, COARSE)) is None)
         ):
-            return way
+            return path
 
 
-def _drawn_shape(rng: np.random.Generator) -> Solid:
+def _random_shape(rng: np.random.Generator) -> Solid:
     sizes = rng.uniform(0.05, 0.25, 3)
     shapes = (Box((sizes[0], sizes[1], sizes[2])), Cylinder(0.4 * sizes[0], 4.0 * sizes[1]), Sphere(0.6 * sizes[0]))
     return shapes[int(rng.integers(3))]
 
 
-def _distance(own: coal.CollisionGeometry, R: Array, p: Array, thing: Obstacle) -> float:
+def _distance(shape: coal.CollisionGeometry, R: Array, p: Array, thing: Obstacle) -> float:
     """Distance of a body and an obstacle in [m]."""
     place = coal.Transform3s(thing.X_WS[:3, :3], thing.X_WS[:3, 3])
     return coal.distance(
-        own, coal.Transform3s(R, p), coal_shape(thing.shape), place, coal.DistanceRequest(), coal.DistanceResult()
+        shape, coal.Transform3s(R, p), coal_shape(thing.shape), place, coal.DistanceRequest(), coal.DistanceResult()
     )
 
 
@@ -233,7 +233,7 @@ class Outcome:
 
     model: str
     seconds: float
-    found: PlannedTransfer | None
+    move: PlannedTransfer | None
     reason: str = ""
     contact: tuple[str, str] | None = None
 
@@ -242,11 +242,11 @@ def outcome(case: Case, *, seed: int = 0) -> Outcome:
     """Plan a case and judge what is found by brute force."""
     begin, name = time.process_time(), case.scene.cell.robots[0].model.name
     try:
-        found = plan_transfer(case.scene, case.start, case.goal, retimer=retimer_of(case.scene), seed=seed)
+        move = plan_transfer(case.scene, case.start, case.goal, retimer=retimer_of(case.scene), seed=seed)
     except TransferNotFoundError as reason:
-        return Outcome(model=name, seconds=time.process_time() - begin, found=None, reason=str(reason))
+        return Outcome(model=name, seconds=time.process_time() - begin, move=None, reason=str(reason))
     seconds = time.process_time() - begin
-    return Outcome(model=name, seconds=seconds, found=found, contact=BruteForce(case.scene).contact(finer(found.q)))
+    return Outcome(model=name, seconds=seconds, move=move, contact=BruteForce(case.scene).contact(finer(move.q)))
 
 
 def cases(count: int, *, is_walled: bool) -> Iterator[Case]:
@@ -265,16 +265,16 @@ def main() -> None:
     options = parser.parse_args()
     count = options.cells
     for is_walled in [kind == "walled" for kind in ("free", "walled") if options.kind in {None, kind}]:
-        found = contacts = 0
+        result = contacts = 0
         seconds = []
         for number, case in enumerate(cases(count, is_walled=is_walled)):
             one = outcome(case)
-            found, contacts = found + (one.found is not None), contacts + (one.contact is not None)
+            result, contacts = result + (one.move is not None), contacts + (one.contact is not None)
             seconds.append(one.seconds)
-            said = one.reason if one.found is None else f"{one.found.times[-1]:.3f} s {set(one.found.rungs.values())}"
+            said = one.reason if one.move is None else f"{one.move.times[-1]:.3f} s {set(one.move.rungs.values())}"
             print(f"{number:3d} {one.model:22s} {one.seconds:6.2f} s CPU  {said} {one.contact or ''}", flush=True)
         print(
-            f"{'walled in' if is_walled else 'free'}: {found} of {count} found, {contacts} touch by brute force, "
+            f"{'walled in' if is_walled else 'free'}: {result} of {count} found, {contacts} touch by brute force, "
             f"CPU median {np.median(seconds):.2f} s, most {max(seconds):.2f} s"
         )
 

@@ -48,8 +48,8 @@ def class_entry(name: str, cls: type) -> str:
     """Heading and docstring of a class, then its public methods and properties with their first sentence."""
     members = [
         f"- `{signature(node, is_method=True)}`: {first_line(node)}\n"
-        for own in (base for base in cls.__mro__ if base.__module__.startswith("cellplan."))
-        for node in definition(own).body
+        for base in (base for base in cls.__mro__ if base.__module__.startswith("cellplan."))
+        for node in definition(base).body
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")
     ]
     listed = ["\n**Methods and properties**\n\n", *members] if members else []

@@ -44,8 +44,8 @@ def command_reference() -> str:
     """Text of the page."""
     program: Any = typer.main.get_command(app)
     parts = [command_section(name, command) for name, command in program.commands.items()]
-    own = ["\n## Of the program itself\n", *option_table(program)]
-    return "\n".join([INTRODUCTION + contents(program), *parts, *own]) + "\n"
+    lines = ["\n## Of the program itself\n", *option_table(program)]
+    return "\n".join([INTRODUCTION + contents(program), *parts, *lines]) + "\n"
 
 
 def contents(program: Any) -> str:

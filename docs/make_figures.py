@@ -181,8 +181,8 @@ def chain(axes: Axes, links: list[Point], names: list[str], *, colour: str, offs
     """Edges of a coupling graph from link to link, with their names to one side."""
     for (x0, y0), (x1, y1), name in zip(links[:-1], links[1:], names, strict=True):
         dx, dy = x1 - x0, y1 - y0
-        room = 0.2 / (dx * dx + dy * dy) ** 0.5
-        start, end = (x0 + room * dx, y0 + room * dy), (x1 - room * dx, y1 - room * dy)
+        scale = 0.2 / (dx * dx + dy * dy) ** 0.5
+        start, end = (x0 + scale * dx, y0 + scale * dy), (x1 - scale * dx, y1 - scale * dy)
         arrow(axes, start, end, colour=colour, style=style)
         middle = ((x0 + x1) / 2 + offset[0], (y0 + y1) / 2 + offset[1])
         axes.text(*middle, name, ha="center", va="center", fontsize=9, color=colour)

@@ -188,10 +188,10 @@ def report_reference() -> str:
     names = [name for name in schema["$defs"] if name != "SummaryRecord"]
     run = schema["$defs"]["RunRecord"]["properties"]
     summary = schema["$defs"]["SummaryRecord"]
-    own = {key: field for key, field in summary["properties"].items() if run.get(key) != field}
+    fields = {key: field for key, field in summary["properties"].items() if run.get(key) != field}
     parts = [record_section(name, schema["$defs"][name]) for name in names]
     curves = [record_section(name, form) for name, form in series_schema()["$defs"].items()]
-    worst = record_section("SummaryRecord", {**summary, "properties": own})
+    worst = record_section("SummaryRecord", {**summary, "properties": fields})
     return "".join([REPORT_INTRODUCTION, *parts, worst, SERIES_INTRODUCTION, *curves, STEPS])
 
 
@@ -244,13 +244,13 @@ def reference() -> str:
 
 def sections(schema: dict[str, Any], title: str, known: set[str]) -> list[str]:
     """One section for each kind of entry, in the order in which they are first named."""
-    found: list[tuple[str, dict[str, Any]]] = [(title, schema)]
-    for _, entry in found:
+    results: list[tuple[str, dict[str, Any]]] = [(title, schema)]
+    for _, entry in results:
         for name in references(entry.get("properties", {})):
             if name not in known:
                 known.add(name)
-                found.append((entry_title(name), schema["$defs"][name]))
-    return [section(name, entry) for name, entry in found]
+                results.append((entry_title(name), schema["$defs"][name]))
+    return [section(name, entry) for name, entry in results]
 
 
 def references(node: Any) -> list[str]:
@@ -259,8 +259,8 @@ def references(node: Any) -> list[str]:
         return [name for item in node for name in references(item)]
     if not isinstance(node, dict):
         return []
-    own = [node["$ref"].rpartition("/")[2]] if "$ref" in node else []
-    return own + [name for value in node.values() for name in references(value)]
+    refs = [node["$ref"].rpartition("/")[2]] if "$ref" in node else []
+    return refs + [name for value in node.values() for name in references(value)]
 
 
 def section(title: str, entry: dict[str, Any]) -> str:

@@ -14,8 +14,8 @@ if __name__ == "__main__":  # the processes of the search import this file
         vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
         margin=10.0,
     )
-    found = search_layout(request, FOLDER, stop=Stop(trials=1))
-    print(f"{found.record['status']} after {found.record['trials']} trial, {found.record['solves']} solved")
-    for variable in found.record["variables"]:
+    result = search_layout(request, FOLDER, stop=Stop(trials=1))
+    print(f"{result.record['status']} after {result.record['trials']} trial, {result.record['solves']} solved")
+    for variable in result.record["variables"]:
         print(f"{variable['name']}: {variable['given']:g} -> {variable['best']:.1f} {variable['unit']}")
     print(f"solved again: passed {solve(load_cell(FOLDER / 'best.yaml')).passed}")

@@ -41,17 +41,17 @@ def read(frame, files):
 
 def own_rows(frame, files, name):
     """The rows of one robot, with the file and the line of what is wrong."""
-    found = []
+    programs = []
     for number, line in enumerate(files[f"{name}.rows"].splitlines(), start=1):
         if line.startswith("#"):
             continue
         try:
-            found.append([float(field) for field in line.split(" ")])
+            programs.append([float(field) for field in line.split(" ")])
         except ValueError:
             raise InputError(f"{name}.rows:{number}: expected numbers, got {line[:40]!r}") from None
-        if len(found[-1]) != 1 + len(frame.robot(name).model.joints):
-            raise InputError(f"{name}.rows:{number}: expected a time and all joints, got {len(found[-1])} numbers")
-    numbers = np.array(found)
+        if len(programs[-1]) != 1 + len(frame.robot(name).model.joints):
+            raise InputError(f"{name}.rows:{number}: expected a time and all joints, got {len(programs[-1])} numbers")
+    numbers = np.array(programs)
     return RobotRows(robot=name, times=numbers[:, 0].copy(), q=np.deg2rad(numbers[:, 1:]))
 
 

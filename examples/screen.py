@@ -20,12 +20,12 @@ for offset in offsets:
     X_WB[:2, 3] += offset
     layouts.append(replace(cell, robots=(left, replace(right, X_WB=X_WB))))
 
-found = screen(cell, Candidates.of(layouts, np.tile(start, (len(layouts), 1))))
-best = int(np.argmax(np.where(found.is_feasible, found.margins.min(axis=1), -np.inf)))
-print(f"{found.is_followed.sum()} of {len(layouts)} follow the path, {found.is_feasible.sum()} within all limits")
+result = screen(cell, Candidates.of(layouts, np.tile(start, (len(layouts), 1))))
+best = int(np.argmax(np.where(result.is_feasible, result.margins.min(axis=1), -np.inf)))
+print(f"{result.is_followed.sum()} of {len(layouts)} follow the path, {result.is_feasible.sum()} within all limits")
 x, y = 1e3 * offsets[best]
-print(f"best: base moved by ({x:.0f}, {y:.0f}) mm, smallest margin {np.rad2deg(found.margins[best].min()):.1f} deg")
+print(f"best: base moved by ({x:.0f}, {y:.0f}) mm, smallest margin {np.rad2deg(result.margins[best].min()):.1f} deg")
 
-robots = [replace(robot, start=found.start[best, cell.columns(robot.name)]) for robot in layouts[best].robots]
+robots = [replace(robot, start=result.start[best, cell.columns(robot.name)]) for robot in layouts[best].robots]
 solution = solve(replace(cell, robots=tuple(robots)))  # collisions are checked here, not by the screening
 print(f"solved and verified: {'passed' if solution.passed else 'failed'}")

@@ -50,7 +50,7 @@ def shared_solutions() -> Iterator[None]:
     """Cells that were solved before in the session are not solved again within the ``with`` statement."""
     from builders import solution_memo
 
-    with solution_memo.kept(Path(os.environ[SESSION]) / "solutions"):
+    with solution_memo.stored(Path(os.environ[SESSION]) / "solutions"):
         yield
 
 
@@ -99,14 +99,14 @@ def shared_robots() -> Path:
 
 
 @pytest.fixture(scope="module")
-def kept_solutions() -> Iterator[None]:
+def stored_solutions() -> Iterator[None]:
     """The tests of a module share solved cells with all other modules that say so."""
     with shared_solutions():
         yield
 
 
 @pytest.fixture
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Folder of a cache that only this test uses, empty at first."""
     from cellplan.cache.store import forget
 

@@ -139,8 +139,10 @@ def module_imports(path: Path) -> set[str]:
     """Modules from which a file imports names, without those that it imports for type checkers only."""
     branches = [node for node in nodes(path) if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
     for_types = {child for branch in branches for statement in branch.body for child in ast.walk(statement)}
-    found = [node for node in nodes(path) if isinstance(node, ast.ImportFrom) and node.module and node not in for_types]
-    return {node.module for node in found} | {f"{node.module}.{alias.name}" for node in found for alias in node.names}
+    result = [
+        node for node in nodes(path) if isinstance(node, ast.ImportFrom) and node.module and node not in for_types
+    ]
+    return {node.module for node in result} | {f"{node.module}.{alias.name}" for node in result for alias in node.names}
 
 
 def test_every_engine_has_one_door() -> None:
@@ -211,23 +213,23 @@ def test_every_test_asserts_something() -> None:
 
 def called_names(path: Path) -> dict[str, set[str]]:
     """What each function of a file calls, by the last part of the name; a statement ``assert`` counts as a call."""
-    found: dict[str, set[str]] = {}
+    results: dict[str, set[str]] = {}
     for node in functions(path):
-        names = found.setdefault(node.name, set())
+        names = results.setdefault(node.name, set())
         for child in ast.walk(node):
             if isinstance(child, ast.Assert):
                 names.add("assert_")
             elif isinstance(child, ast.Call):
                 names.add(child.func.attr if isinstance(child.func, ast.Attribute) else getattr(child.func, "id", ""))
-    return found
+    return results
 
 
 def asserting(calls: dict[str, set[str]]) -> set[str]:
     """Names of the functions that assert, themselves or by a function that they call."""
-    found = {name for name, called in calls.items() if any(re.match("raises$|assert_", other) for other in called)}
-    while more := {name for name, called in calls.items() if name not in found and called & found}:
-        found |= more
-    return found
+    result = {name for name, called in calls.items() if any(re.match("raises$|assert_", other) for other in called)}
+    while more := {name for name, called in calls.items() if name not in result and called & result}:
+        result |= more
+    return result
 
 
 BLOCKING = {"wait", "join", "result", "exception", "acquire", "communicate"}  # without an argument they wait for ever

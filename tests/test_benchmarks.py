@@ -49,14 +49,14 @@ def test_the_description_for_peers_puts_all_tools_where_the_planner_does(job: Jo
 
 def poses(description: str, q: dict[str, float]) -> dict[str, np.ndarray]:
     """Every link of a robot description in the world."""
-    found = {"base_link": np.eye(4)}
+    results = {"base_link": np.eye(4)}
     for joint in ElementTree.fromstring(description).findall("joint"):  # noqa: S314 - written a line ago
         origin = joint.find("origin").attrib
         X = pose(numbers(origin["xyz"]), *numbers(origin["rpy"]))
         if joint.get("type") == "revolute":
             X = X @ about(numbers(joint.find("axis").get("xyz")), q[joint.get("name")])
-        found[joint.find("child").get("link")] = found[joint.find("parent").get("link")] @ X
-    return found
+        results[joint.find("child").get("link")] = results[joint.find("parent").get("link")] @ X
+    return results
 
 
 def numbers(text: str) -> list[float]:
@@ -82,9 +82,9 @@ def test_joints_between_samples_lie_on_the_polynomial_through_the_nearest(degree
     samples, all_places = np.arange(7.0), np.arange(6 * (BETWEEN + 1) + 1) / (BETWEEN + 1)
     of = np.polynomial.Polynomial([0.3, -1.0, 0.7, 0.2][: degree + 1])
 
-    found = filled(of(samples)[:, None] * [1.0, -2.0], degree=degree)
+    result = filled(of(samples)[:, None] * [1.0, -2.0], degree=degree)
 
-    np.testing.assert_allclose(found, of(all_places)[:, None] * [1.0, -2.0], atol=1e-13)  # of values up to 100
+    np.testing.assert_allclose(result, of(all_places)[:, None] * [1.0, -2.0], atol=1e-13)  # of values up to 100
 
 
 def test_every_peer_has_its_requirements_and_every_script_is_there(repository: Path) -> None:

@@ -17,9 +17,9 @@ def test_solving_a_cell_takes_no_more_work_than_it_used_to(case: counts.Case) ->
 
 
 def test_a_count_that_grew_is_named_with_the_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = tmp_path / "counts.json"
-    kept.write_text(json.dumps({"arm": {"distance queries": 100, "contact queries": 100, "gone": 7}}))
-    monkeypatch.setattr(counts, "KEPT", kept)
+    stored = tmp_path / "counts.json"
+    stored.write_text(json.dumps({"arm": {"distance queries": 100, "contact queries": 100, "gone": 7}}))
+    monkeypatch.setattr(counts, "STORED", stored)
 
     reported = counts.grown(
         counts.Case(name="arm", step_s=0.01), {"distance queries": 115, "contact queries": 116, "sweeps": 6}

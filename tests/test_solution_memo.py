@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.solution_memo import kept, solved_anew
+from builders.solution_memo import solved_anew, stored
 from builders.stored_cells import write_cell
 
 from cellplan import load_cell, solve, write_run
@@ -18,7 +18,7 @@ Events = list[tuple[str, float]]
 @pytest.fixture
 def memo(tmp_path: Path) -> Iterator[Path]:
     """Folder of a memo of this test's own."""
-    with kept(tmp_path / "memo"):
+    with stored(tmp_path / "memo"):
         yield tmp_path / "memo"
 
 
@@ -74,7 +74,7 @@ def test_a_package_in_which_a_name_is_replaced_solves_anew(
 def test_a_name_that_stays_replaced_is_reported_where_solutions_are_to_be_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with kept(tmp_path / "memo"):
+    with stored(tmp_path / "memo"):
         monkeypatch.setattr(modes, "standing", lambda *arguments: arguments[-1])
     with pytest.raises(RuntimeError, match=r"replaced for longer than one test.*cellplan\.planning\.modes\.standing"):
-        kept(tmp_path / "memo").__enter__()
+        stored(tmp_path / "memo").__enter__()

@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def ran(arguments: list[str | Path], folder: Path, **variables: str) -> str:
     """Standard output of a program that succeeds."""
-    kept = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     run = subprocess.run(
-        arguments, check=False, cwd=folder, env=kept | variables, capture_output=True, text=True, timeout=300
+        arguments, check=False, cwd=folder, env=environment | variables, capture_output=True, text=True, timeout=300
     )
     assert run.returncode == 0, run.stdout + run.stderr
     return run.stdout

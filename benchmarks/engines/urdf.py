@@ -21,7 +21,7 @@ def joint_name(arm: int, joint: int) -> str:
 
 def joint_names(job: Job) -> list[str]:
     """Names of all joints in the order of the stacked joint vector."""
-    return [joint_name(arm, joint) for arm, each in enumerate(job.arms) for joint in range(len(each.axes_B))]
+    return [joint_name(arm, joint) for arm, entry in enumerate(job.arms) for joint in range(len(entry.axes_B))]
 
 
 def tool_name(arm: int) -> str:

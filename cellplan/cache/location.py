@@ -19,7 +19,7 @@ def cache_folder() -> Path | None:
         if folder is None:
             return None
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return folder if _is_own(folder) else None
+        return folder if _is_private(folder) else None
     except (OSError, ValueError, RuntimeError):  # no home, no leave, no such name
         return None
 
@@ -43,7 +43,7 @@ def _usual() -> Path:
     return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
 
 
-def _is_own(folder: Path) -> bool:
+def _is_private(folder: Path) -> bool:
     """Whether the folder belongs to the user, and no other user may write to it."""
     status = folder.stat()
     if not hasattr(os, "getuid"):  # another system, with other rules

@@ -50,7 +50,7 @@ class Held(NamedTuple):
     """Arrays that this process holds, and whether it made them itself: others came from the folder."""
 
     arrays: Arrays
-    is_own: bool
+    is_made_here: bool
 
 
 _recent: OrderedDict[Key, Held] = OrderedDict()
@@ -73,19 +73,19 @@ def recall(key: Key | None) -> Arrays | None:
     if key is None:
         return None
     held = _recent.get(key)
-    if held is not None and (held.is_own or is_cache_used()):
+    if held is not None and (held.is_made_here or is_cache_used()):
         _recent.move_to_end(key)
         return held.arrays
     folder = cache_folder() if is_cache_used() else None
     if folder is None:
         return None
     try:
-        packed = _read_own(_path(folder, key))
+        packed = _read_private(_path(folder, key))
         arrays = None if packed is None else _unpacked(packed)
     except Exception:  # noqa: BLE001 - whatever is wrong with an entry, it is made again
         return None
     if arrays is not None:
-        _remember(key, Held(arrays, is_own=False))
+        _remember(key, Held(arrays, is_made_here=False))
     return arrays
 
 
@@ -96,13 +96,13 @@ def keep(key: Key | None, arrays: Sequence[NDArray[np.generic]]) -> None:
     copies = tuple(np.array(array, order="C") for array in arrays)
     for array in copies:
         array.setflags(write=False)
-    _remember(key, Held(copies, is_own=True))
+    _remember(key, Held(copies, is_made_here=True))
     folder = cache_folder() if is_cache_used() else None
     packed = b"" if folder is None else _packed(copies)
     if folder is not None and len(packed) <= MAX_ENTRY:
         with suppress(OSError):
             _write(_path(folder, key), packed)
-            _make_room(folder)
+            _remove_oldest(folder)
 
 
 def forget() -> None:
@@ -117,7 +117,7 @@ def _remember(key: Key, held: Held) -> None:
         _recent.popitem(last=False)
 
 
-def _read_own(path: Path) -> bytes | None:
+def _read_private(path: Path) -> bytes | None:
     """Content of an entry; None for anything but a regular file of the user's own that only the user may write to.
 
     It is opened without following a link and without waiting for another process.
@@ -177,7 +177,7 @@ def _write(path: Path, content: bytes) -> None:
         raise
 
 
-def _make_room(folder: Path) -> None:
+def _remove_oldest(folder: Path) -> None:
     """Remove the entries that were not used for longest, until the others fit."""
     entries = []
     with os.scandir(folder) as listing:

@@ -12,7 +12,7 @@ _IS_USED: Final = ContextVar("_IS_USED", default=True)
 
 
 @contextmanager
-def nothing_kept() -> Iterator[None]:
+def without_cache() -> Iterator[None]:
     """Neither read nor write the cache folder for as long as the ``with`` statement lasts.
 
     What this process makes meanwhile, from the files themselves, is still made once only.
@@ -38,5 +38,5 @@ def _run(is_used: bool, function: Callable[..., Value], *arguments: object) -> V
     """Result of a function, with or without the cache folder."""
     if is_used:
         return function(*arguments)
-    with nothing_kept():
+    with without_cache():
         return function(*arguments)

@@ -70,7 +70,7 @@ class PairBound:
 
         Otherwise its smallest distance is that at the end of that part, which says nothing of the cell.
         """
-        return self.keeps_clearance and (self.pair.samples is None or not self.is_kept)
+        return self.keeps_clearance and (self.pair.samples is None or not self.is_met)
 
     @property
     def is_open(self) -> bool:
@@ -88,7 +88,7 @@ class PairBound:
         return max(0.0, min(self.nearest, self.lowest))
 
     @property
-    def is_kept(self) -> bool:
+    def is_met(self) -> bool:
         """Whether the demand is proved: the clearance of the pair, or that it does not touch."""
         if self.keeps_clearance:
             return not self.touches and self.proved >= self.demand
@@ -106,9 +106,9 @@ class Bound:
     pairs: tuple[PairBound, ...]  # all pairs, in the order of the scene
 
     @property
-    def is_kept(self) -> bool:
+    def is_met(self) -> bool:
         """Whether every pair is proved to keep what is demanded of it."""
-        return all(pair.is_kept for pair in self.pairs)
+        return all(pair.is_met for pair in self.pairs)
 
     @property
     def minimum(self) -> float:

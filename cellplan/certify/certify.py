@@ -40,7 +40,7 @@ def certify(
         q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
         demand: Distance in [m] that pairs with the rule ``clearance`` are to keep; that of the scene when None.
         with_minimum: Whether the smallest distances are searched for too. Otherwise the search ends with the first pair
-            that does not keep its demand, and only ``Bound.is_kept`` of the result is valid.
+            that does not keep its demand, and only ``Bound.is_met`` of the result is valid.
         with_curves: Whether the bounds of each class are then raised in every block, to be drawn; the verdict and the
             smallest distances are known before.
     """

@@ -166,8 +166,8 @@ class BoxBounds:
         placed = []
         for side in (0, 1):
             bodies, spans = self.ends[pair, side], rows[:, 2 * side : 2 * side + 2]
-            at = self._motion.way(bodies, middles[:, side])
-            ends = [self._motion.way(bodies, spans[:, end]) for end in (0, 1)]
+            at = self._motion.travel(bodies, middles[:, side])
+            ends = [self._motion.travel(bodies, spans[:, end]) for end in (0, 1)]
             reach[:, side] = np.maximum(ends[1] - at, at - ends[0])
             placed.append((bodies, *self._motion.poses(bodies, middles[:, side])))
         gap, n = self._gaps(placed, n)

@@ -65,7 +65,7 @@ class RegionBound:
     distance: float
     proved: float
     at: tuple[float, float] | None
-    is_kept: bool  # whether every pair is proved to keep its demand, and not to touch where no more is demanded
+    is_met: bool  # whether every pair is proved to keep its demand, and not to touch where no more is demanded
     demand: float = 0.0  # distance in [m] that is demanded of the two bodies
 
 
@@ -195,7 +195,7 @@ class _RegionSearch:
         if with_minimum and pairs.keeps.any():
             self._measure_first()
             self._raise(self._below_nearest, stops=False)
-        return self._result(is_kept=is_proved)
+        return self._result(is_met=is_proved)
 
     def _below_nearest(self) -> Array:
         """What is left to prove in [m] of a smallest distance, shape (P,); nothing where bodies touch."""
@@ -277,11 +277,11 @@ class _RegionSearch:
         read, readings = self._bounds.read(box.some([int(np.argmin(box.low))]), np.full(1, np.inf))
         self._note(read, 0, readings[0])
 
-    def _result(self, *, is_kept: bool) -> RegionBound:
+    def _result(self, *, is_met: bool) -> RegionBound:
         pairs, scene, boxes = self._pairs, self._motion.scene, Boxes.joined(self._boxes, self._groups)
         low = min(float(boxes.low[pairs.keeps[boxes.pair]].min(initial=np.inf)), self._given_up, self._nearest)
         pair = self._bodies
-        if pair is None and not is_kept and len(boxes):
+        if pair is None and not is_met and len(boxes):
             pair = int(boxes.pair[int(np.argmin(boxes.low - pairs.demands[boxes.pair]))])
         return RegionBound(
             first=self._region.first,
@@ -290,7 +290,7 @@ class _RegionSearch:
             distance=self._nearest,
             proved=max(0.0, low),
             at=self._at,
-            is_kept=is_kept,
+            is_met=is_met,
             demand=0.0 if pair is None else float(pairs.demands[pair]),
         )
 

@@ -52,13 +52,13 @@ class FreeMotion:
         self._robot = np.array([-1 if body.robot is None else names.index(body.robot) for body in carriers])
         self._link = np.array([body.link for body in carriers], dtype=np.intp)
         self._X_BS = np.array([body.X_BS for body in carriers]).reshape(-1, 4, 4)
-        self._ways, self._swerves = self._worked_out()
+        self._travel, self._swerves = self._worked_out()
 
-    def way(self, bodies: Indices, rows: Array) -> Array:
+    def travel(self, bodies: Indices, rows: Array) -> Array:
         """Way in [m] of some bodies from the first row to some places of their programs, shape (M,)."""
-        before = np.clip(rows.astype(np.intp), 0, self._ways.shape[1] - 2)
-        begin = self._ways[bodies, before]
-        travelled: Array = begin + (rows - before) * (self._ways[bodies, before + 1] - begin)
+        before = np.clip(rows.astype(np.intp), 0, self._travel.shape[1] - 2)
+        begin = self._travel[bodies, before]
+        travelled: Array = begin + (rows - before) * (self._travel[bodies, before + 1] - begin)
         return travelled
 
     def stray(self, bodies: Indices, first: Array, last: Array) -> Array:
@@ -105,7 +105,7 @@ class FreeMotion:
         q = np.concatenate(padded, axis=1)
         arms, poses = LeverArms(scene, q), scene.body_poses(q)
         steps, kinks = arms.steps(q), arms.kinks(q)
-        ways, swerves = (np.zeros((len(scene.engine.bodies), longest)) for _ in range(2))
+        travel, swerves = (np.zeros((len(scene.engine.bodies), longest)) for _ in range(2))
         for index, body in enumerate(scene.engine.bodies):
             chain = arms.chain(None, index)
             bend = chain.bend(steps)
@@ -113,10 +113,10 @@ class FreeMotion:
             turned = np.diff(poses.R[index], axis=0).reshape(-1, 9)
             speed = np.linalg.norm(moved, axis=1) + 0.5 * bend
             speed += body.radius * np.sqrt(0.5) * np.linalg.norm(turned, axis=1)
-            np.cumsum(np.minimum(speed, chain.reach(steps)), out=ways[index, 1:])
+            np.cumsum(np.minimum(speed, chain.reach(steps)), out=travel[index, 1:])
             bend[:-1] += chain.reach(kinks)
             np.cumsum(bend, out=swerves[index, 1:])
-        return ways, swerves
+        return travel, swerves
 
 
 def _by_robot(cell: Cell, q: Array | Mapping[str, Array]) -> dict[str, Array]:

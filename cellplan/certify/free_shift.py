@@ -225,9 +225,9 @@ def _displaced(motion: FreeMotion, times: Array, bodies: Indices, shift: float) 
     """
     begin = np.unique(np.clip(np.concatenate([times, times - shift]), times[0], times[-1]))
     rows = [np.interp(t, times, np.arange(len(times))) for t in (begin, np.minimum(begin + shift, times[-1]))]
-    ways = []
+    largest = []
     for body in bodies.tolist():
-        at_begin, at_end = (motion.way(np.full(len(end_rows), body), end_rows) for end_rows in rows)
-        way = at_end - at_begin
-        ways.append(np.maximum(way[:-1], way[1:]))
-    return float(np.minimum(*ways).max(initial=0.0))
+        at_begin, at_end = (motion.travel(np.full(len(end_rows), body), end_rows) for end_rows in rows)
+        travel = at_end - at_begin
+        largest.append(np.maximum(travel[:-1], travel[1:]))
+    return float(np.minimum(*largest).max(initial=0.0))

@@ -83,7 +83,7 @@ class Growth:
     @property
     def is_proved(self) -> bool:
         """Whether every pair keeps its demand, or only comes apart."""
-        return not self.faults and self.bound.is_kept
+        return not self.faults and self.bound.is_met
 
     @property
     def is_clear(self) -> bool:
@@ -143,7 +143,7 @@ def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Gro
     near = rows_too_near(scene, q[0])
     others = scene_of_rows(scene, [row for row in range(len(scene.pairs)) if row not in set(near)])
     bound = certify(others, q, with_minimum=with_minimum, with_curves=False)
-    return Growth.of(bound, [_Separation(scene, row, q) for row in near] if with_minimum or bound.is_kept else [])
+    return Growth.of(bound, [_Separation(scene, row, q) for row in near] if with_minimum or bound.is_met else [])
 
 
 def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collection[int]) -> Growth:
@@ -156,7 +156,7 @@ def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collec
         moved: Pairs that the motion changes; the others are not asked.
     """
     bound = certify(scene_of_rows(scene, sorted({*moved} - {*near})), q, with_minimum=False)
-    return Growth.of(bound, [_Separation(scene, row, q, is_sampled=True) for row in near] if bound.is_kept else [])
+    return Growth.of(bound, [_Separation(scene, row, q, is_sampled=True) for row in near] if bound.is_met else [])
 
 
 def signed_distances(scene: Scene, pair: ScenePair, q: Array, *, tolerance: float = SUNK_TOL) -> Array:
@@ -281,7 +281,7 @@ class _Separation:
             return bool(at.min() >= demand)
         pair = replace(self._pair, rule=Rule.CLEARANCE, demand=max(APART_TOL, demand))
         scene = replace(self._scene, pairs=(pair,))
-        return certify(scene, self._q[first : last + 1], with_minimum=False).is_kept
+        return certify(scene, self._q[first : last + 1], with_minimum=False).is_met
 
 
 def _demand(pair: ScenePair) -> float:
@@ -293,8 +293,8 @@ def _reach(scene: Scene, pair: ScenePair, q: Array) -> Array:
     """How far a point of a pair comes at most in each step, seen from the other body, in [m], shape (N - 1,)."""
     arms = LeverArms(scene, q)
     steps = arms.steps(q)
-    ways = [(None, pair.first)] if pair.solids is None else [pair.solids, pair.solids[::-1]]
-    return np.min([arms.chain(*way).reach(steps) for way in ways], axis=0)
+    sides = [(None, pair.first)] if pair.solids is None else [pair.solids, pair.solids[::-1]]
+    return np.min([arms.chain(*ends).reach(steps) for ends in sides], axis=0)
 
 
 def _shown(distance: float) -> str:

@@ -96,7 +96,7 @@ class LeverArms:
         """The joints between two of the engine's bodies; ``first`` is None for the ground."""
         chain = self._known.get((first, second))
         if chain is None:
-            down = [] if first is None else self._way(*_link(self._scene.carrier(first)))
+            down = [] if first is None else self._path_down(*_link(self._scene.carrier(first)))
             chain = self._known[first, second] = self._chain(down, second)
         return chain
 
@@ -105,15 +105,15 @@ class LeverArms:
         cell = self._scene.cell
         placed = cell.robot(robot)
         tip = (placed.X_WB @ placed.model.X_BF @ placed.tool.X_FT)[:3, 3]
-        down = [] if seen_by is None else self._way(seen_by, cell.robot(seen_by).model.flange_link)
-        return self._between(down, self._way(robot, placed.model.flange_link), _Held(tip, 0.0, tip[None], 0.0))
+        down = [] if seen_by is None else self._path_down(seen_by, cell.robot(seen_by).model.flange_link)
+        return self._between(down, self._path_down(robot, placed.model.flange_link), _Held(tip, 0.0, tip[None], 0.0))
 
     def _chain(self, down: list[int], index: int) -> Chain:
         """The joints on the way down from one link and up to another body."""
         body, seen = self._scene.carrier(index), self._scene.engine.bodies[index]
         X_WS = body.X_BS if body.robot is None else self._scene.cell.robot(body.robot).X_WB @ body.X_BS
         held = _Held(_moved(X_WS, seen.centre), seen.radius, _moved(X_WS, seen.ends), seen.girth)
-        return self._between(down, self._way(*_link(body)), held)
+        return self._between(down, self._path_down(*_link(body)), held)
 
     def _between(self, down: list[int], up: list[int], held: "_Held") -> Chain:
         """The joints on the way down from one link and up to another one, which something moves with."""
@@ -134,14 +134,14 @@ class LeverArms:
             point = foot
         return Chain(np.array(axes, dtype=np.intp), levers, self._turns[axes])
 
-    def _way(self, robot: str | None, link: int) -> list[int]:
+    def _path_down(self, robot: str | None, link: int) -> list[int]:
         """Axes from a link to the ground."""
-        way: list[int] = []
+        path: list[int] = []
         link = BASE if robot is None else link
         while link != BASE:
-            way.append(self._first[str(robot)] + link)
-            link = self._placed[way[-1]].parent
-        return way
+            path.append(self._first[str(robot)] + link)
+            link = self._placed[path[-1]].parent
+        return path
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,7 +13,7 @@ from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 
-SAME_WAY: Final = 1e-12  # [m] rounding of a distance along a straight move
+SAME_DISTANCE: Final = 1e-12  # [m] rounding of a distance along a straight move
 
 
 def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
@@ -53,16 +53,16 @@ def with_straight_move(scene: Scene, times: Array, q: Array) -> tuple[Scene, Arr
     if move is None:
         return scene, times, q
     tips = scene.chains[move.robot].tool_poses(q[:, scene.cell.columns(move.robot)])[:, :3, 3]
-    way, rows = np.linalg.norm(tips - move.p_WT, axis=1), np.arange(len(q), dtype=float)
+    distance, rows = np.linalg.norm(tips - move.p_WT, axis=1), np.arange(len(q), dtype=float)
     added = [rows]
     for edge in sorted({edge for _, *edges in move.pairs for edge in edges}):
-        before = np.flatnonzero((way[:-1] - edge) * (way[1:] - edge) < 0.0)
-        added.append(before + (way[before] - edge) / (way[before] - way[before + 1]))
+        before = np.flatnonzero((distance[:-1] - edge) * (distance[1:] - edge) < 0.0)
+        added.append(before + (distance[before] - edge) / (distance[before] - distance[before + 1]))
     at = np.unique(np.concatenate(added))
-    way = np.interp(at, rows, way)
+    distance = np.interp(at, rows, distance)
     pairs = list(scene.pairs)
     for pair, low, high in move.pairs:
-        inside = np.flatnonzero((way >= low - SAME_WAY) & (way <= high + SAME_WAY))
+        inside = np.flatnonzero((distance >= low - SAME_DISTANCE) & (distance <= high + SAME_DISTANCE))
         if len(inside) > 1:
             pairs.append(replace(pair, samples=(int(inside[0]), int(inside[-1]))))
     fine = np.stack([np.interp(at, rows, column) for column in q.T], axis=1)

@@ -121,15 +121,15 @@ class StretchSearch:
         if not len(pairs):
             return
         centres = np.array([motion.centres[index][self._edges].T for index in range(len(engine.bodies))])
-        ways = np.empty((len(engine.bodies), self._last - self._first))
+        travels = np.empty((len(engine.bodies), self._last - self._first))
         for index in range(len(engine.bodies)):
-            way = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
-            ways[index] = np.add.reduceat(way, self._edges[:-1])
-        for first in range(0, len(pairs), step := max(1, PAIR_WORK // ways.shape[1])):
+            travel = np.linalg.norm(np.diff(motion.centres[index], axis=0), axis=1) + motion.bend[index] / 3.0
+            travels[index] = np.add.reduceat(travel, self._edges[:-1])
+        for first in range(0, len(pairs), step := max(1, PAIR_WORK // travels.shape[1])):
             a, b = pairs[first : first + step].T
             x, y, z = (centres[b, axis] - centres[a, axis] for axis in range(3))
             gaps = np.sqrt(x * x + (y * y + z * z)) - (engine.radii[a] + engine.radii[b])[:, None]
-            low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - ways[a] - ways[b])
+            low = 0.5 * (gaps[:, 1:] + gaps[:, :-1] - travels[a] - travels[b])
             self._low()[self._scene.solid_rows[first : first + step]] = low
         self._low()[self._survey.is_ignored[:, self._first : self._last]] = np.inf
 

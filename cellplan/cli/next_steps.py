@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Final
 
-from cellplan.io.run.manifest import own_inputs
+from cellplan.io.run.manifest import user_files
 from cellplan.io.yaml.writer import flow_text
 from cellplan.model.cell import Cell
 from cellplan.model.check_kinds import PASSED_BY_TIME
@@ -44,7 +44,7 @@ def export_line(run: Path, cell: Path | None, allow_dirs: Sequence[Path]) -> str
 
 def view_line(run: Path, cell: Path, solved: Cell, allow_dirs: Sequence[Path]) -> str:
     """The line to type for the 3-D page of a run; with its cell file where that names files of its own."""
-    inputs = own_inputs(solved.inputs, PurePath(solved.origin.file).name)
+    inputs = user_files(solved.inputs, PurePath(solved.origin.file).name)
     named = ["--cell", str(cell), *_folders(allow_dirs)] if inputs else []
     return _line("view", str(run), *named)
 

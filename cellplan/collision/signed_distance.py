@@ -14,7 +14,7 @@ from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Solid, Sphere
 
 TOLERANCE: Final = 1e-9  # [m] of the iteration: far below what any clearance is stated to
 MOST_STEPS: Final = 500  # of one iteration
-MOST_KEPT: Final = 8  # [-] objects kept for each body
+CACHE_SIZE: Final = 8  # [-] objects kept for each body
 FARTHEST: Final = 1e3  # [m] a deeper overlap is none: where its search fails coal returns the largest number there is
 
 
@@ -43,7 +43,7 @@ class SignedDistances:
         """
         import coal  # a search needs it, a verification does not
 
-        if len(self._shapes) > MOST_KEPT * len(bodies):  # of a search that gives bodies other shapes again and again
+        if len(self._shapes) > CACHE_SIZE * len(bodies):  # of a search that gives bodies other shapes again and again
             self._shapes.clear()
             self._pairs.clear()
         request, result = coal.DistanceRequest(), coal.DistanceResult()

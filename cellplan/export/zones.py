@@ -88,8 +88,8 @@ def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
         q: Its rows in [rad] or [m], shape (N, n).
         share: Of the segments, 0 to 0.5, of all rows or of each, shape (N,).
     """
-    ways = _axis_ways(robot, q)
-    zones: Array = share * np.min(np.max(np.where(np.isfinite(ways), ways, 0.0), axis=2), axis=0)
+    travels = _axis_travels(robot, q)
+    zones: Array = share * np.min(np.max(np.where(np.isfinite(travels), travels, 0.0), axis=2), axis=0)
     return zones
 
 
@@ -103,17 +103,17 @@ def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
     """
     zones = np.stack([turns if joint.is_revolute else slides for joint in robot.model.joints], axis=1)
     with np.errstate(over="ignore"):
-        shares = np.max(zones / _axis_ways(robot, q), axis=(0, 2))
+        shares = np.max(zones / _axis_travels(robot, q), axis=(0, 2))
     shares[[0, -1]] = 0.0
     return np.minimum(shares, LARGEST_SHARE)
 
 
 def part_shares(p: Array, zones: Array) -> Array:
     """As ``tool_shares`` for straight lines between points, NaN where a point is not known, shape (N, 3)."""
-    ways = np.full((2, len(p)), np.nan)
-    ways[0, 1:] = ways[1, :-1] = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    lengths = np.full((2, len(p)), np.nan)
+    lengths[0, 1:] = lengths[1, :-1] = np.linalg.norm(np.diff(p, axis=0), axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        shares = np.where(zones > 0.0, zones / np.min(ways, axis=0), 0.0)
+        shares = np.where(zones > 0.0, zones / np.min(lengths, axis=0), 0.0)
     return np.where(np.isnan(shares), LARGEST_SHARE, np.minimum(shares, LARGEST_SHARE))
 
 
@@ -123,10 +123,10 @@ def _away(robot: Robot, q: Array, other: Array, share: Array) -> Array:
     return away
 
 
-def _axis_ways(robot: Robot, q: Array) -> Array:
+def _axis_travels(robot: Robot, q: Array) -> Array:
     """Way of each axis to and from each row in [deg] or [mm], infinite where it stands, shape (2, N, n)."""
     units = np.array([joint.display_unit.scale for joint in robot.model.joints])
     moved = np.abs(np.diff(q, axis=0))
-    ways = np.full((2, *q.shape), np.inf)
-    ways[0, 1:] = ways[1, :-1] = np.where(moved > STANDS, moved * units, np.inf)
-    return ways
+    travels = np.full((2, *q.shape), np.inf)
+    travels[0, 1:] = travels[1, :-1] = np.where(moved > STANDS, moved * units, np.inf)
+    return travels

@@ -98,7 +98,7 @@ def _capsule(points: Array, directions: Array, *, radius: float, length: float) 
 def _mesh_spans(mesh: Mesh, points: Array, directions: Array) -> Spans:
     """Crossings joined in pairs: the first of several entries in a row and the last of several exits count."""
     crossings = line_crossings(mesh, points, directions)
-    line, way, entering = crossings.line, crossings.way, crossings.is_entering
+    line, distance, entering = crossings.line, crossings.distance, crossings.is_entering
     follows = np.append(False, line[1:] == line[:-1]) if len(line) else np.zeros(0, dtype=bool)
     after_exit = np.append(True, ~entering[:-1])[: len(line)]
     before_entry = np.append(entering[1:], True)[: len(line)]
@@ -109,4 +109,4 @@ def _mesh_spans(mesh: Mesh, points: Array, directions: Array) -> Spans:
     opens, closes = switches[:-1], switches[1:]
     paired = enters[opens] & leaves[closes] & (line[opens] == line[closes])
     opens, closes = opens[paired], closes[paired]
-    return Spans(line=line[opens].astype(np.intp), enter=way[opens], leave=way[closes])
+    return Spans(line=line[opens].astype(np.intp), enter=distance[opens], leave=distance[closes])

@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, transform_points
 from cellplan.kinematics.screw_chain import screw_displacement
 from cellplan.model.cell import Cell, Grasp, Robot
-from cellplan.model.cell_errors import SHORTEST_LINK, CellErrors, Draw, RobotDraw, drawn, link_vector
+from cellplan.model.cell_errors import SHORTEST_LINK, CellErrors, Draw, RobotDraw, link_vector, sample
 from cellplan.model.robot import FollowerJoint, Joint, RobotModel
 from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry
 from cellplan.model.settings.units import Mm
@@ -58,8 +58,8 @@ def _draw_robot(robot: Robot, errors: RobotErrorsEntry, rng: np.random.Generator
     """Errors of one robot, in the order of its joints."""
     names = robot.model.joint_names
     return RobotDraw(
-        joint_offsets=np.array([drawn(errors.joint_offsets.get(name, EXACT), rng) for name in names]),
-        link_lengths=np.array([drawn(errors.link_lengths_mm.get(name, EXACT), rng) for name in names]),
+        joint_offsets=np.array([sample(errors.joint_offsets.get(name, EXACT), rng) for name in names]),
+        link_lengths=np.array([sample(errors.link_lengths_mm.get(name, EXACT), rng) for name in names]),
         X_base=_draw_pose(errors.base, rng),
         X_tool=_draw_pose(errors.tool, rng),
     )
@@ -67,7 +67,7 @@ def _draw_robot(robot: Robot, errors: RobotErrorsEntry, rng: np.random.Generator
 
 def _draw_pose(amounts: PoseErrorEntry, rng: np.random.Generator) -> Array:
     """A small pose."""
-    return pose([drawn(amount, rng) for amount in amounts.xyz_mm], [drawn(amount, rng) for amount in amounts.rpy_deg])
+    return pose([sample(amount, rng) for amount in amounts.xyz_mm], [sample(amount, rng) for amount in amounts.rpy_deg])
 
 
 def _perturbed_robot(robot: Robot, draw: RobotDraw) -> Robot:
@@ -93,7 +93,7 @@ def _with_link_lengths(model: RobotModel, lengths: Array) -> RobotModel:
             if distance < SHORTEST_LINK:
                 raise ValueError(f"robot '{model.name}': the link before joint '{axis.name}' has no length")
             shifts[index + 1] += lengths[index] / distance * along
-    return _displaced(model, pose_from(np.broadcast_to(np.eye(3), (len(shifts), 3, 3)), shifts), by_own=True)
+    return _displaced(model, pose_from(np.broadcast_to(np.eye(3), (len(shifts), 3, 3)), shifts), by_moved=True)
 
 
 def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
@@ -110,20 +110,20 @@ def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
         drive = model.drive(index)
         offset = drive.ratio * offsets[drive.joint]
         D[index + 1] = D[axis.parent + 1] @ screw_displacement(axis, np.array([offset]))[0]
-    return _displaced(model, D, by_own=False)
+    return _displaced(model, D, by_moved=False)
 
 
-def _displaced(model: RobotModel, D: Array, *, by_own: bool) -> RobotModel:
+def _displaced(model: RobotModel, D: Array, *, by_moved: bool) -> RobotModel:
     """The model after displacements of its links, shape (links + 1, 4, 4), the base first.
 
     Args:
         D: Displacements at the reference configuration, expressed in B.
-        by_own: Whether a joint's axis goes with the link that it moves, rather than with the one that carries it.
+        by_moved: Whether a joint's axis goes with the link that it moves, rather than with the one that carries it.
     """
     n = len(model.joints)
-    joints = tuple(_moved(joint, D[k + 1 if by_own else joint.parent + 1]) for k, joint in enumerate(model.joints))
+    joints = tuple(_moved(joint, D[k + 1 if by_moved else joint.parent + 1]) for k, joint in enumerate(model.joints))
     followers = tuple(
-        _moved(axis, D[n + k + 1 if by_own else axis.parent + 1]) for k, axis in enumerate(model.followers)
+        _moved(axis, D[n + k + 1 if by_moved else axis.parent + 1]) for k, axis in enumerate(model.followers)
     )
     bodies = tuple(replace(body, X_BS=D[body.link + 1] @ body.X_BS) for body in model.bodies)
     return replace(model, joints=joints, followers=followers, X_BF=D[model.flange_link + 1] @ model.X_BF, bodies=bodies)

@@ -81,7 +81,7 @@ class CombinedModel:
         self._leaders: list[int] = []
         self._ratios: list[float] = []
         self._offsets: list[float] = []
-        self._is_on_the_way: list[bool] = []
+        self._is_before_flange: list[bool] = []
         self.carries_flange = np.zeros((len(cell.robots), cell.joint_count), dtype=bool)
         self._flanges: list[tuple[_Group, int]] = []
         self._X_JT: list[Array] = []
@@ -96,7 +96,7 @@ class CombinedModel:
         self._engine_axes = np.argsort(self._links)  # of each link, the place among the engine's axes
         self._spread = np.zeros((count, cell.joint_count))
         self._spread[np.arange(count), self._leaders] = self._ratios
-        self._spread_to_flange = self._spread * np.array(self._is_on_the_way)[:, None]
+        self._spread_to_flange = self._spread * np.array(self._is_before_flange)[:, None]
         self._offset = np.array(self._offsets)
         self._is_plain = bool(np.array_equal(self._spread, np.eye(cell.joint_count)))
         self._X_WT = np.tile(np.eye(4), (len(cell.robots), 1, 1))
@@ -182,7 +182,7 @@ class CombinedModel:
         self._X_JT.append(inverse(X_joint) @ model.X_BF @ robot.tool.X_FT)
         for moved in model.links_to_flange:
             carries[columns.start + model.drive(moved).joint] = True
-        self._is_on_the_way += [moved in model.links_to_flange for moved in range(len(axes))]
+        self._is_before_flange += [moved in model.links_to_flange for moved in range(len(axes))]
 
 
 def _carriers(model: pin.Model) -> NDArray[np.bool_]:

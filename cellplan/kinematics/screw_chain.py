@@ -12,7 +12,7 @@ from cellplan.geometry.transforms import Array, pose_from, rotation_about, skew
 from cellplan.model.cell import Robot
 from cellplan.model.robot import FollowerJoint, Joint
 
-KEPT_ROWS: Final = 16_384  # [-] configurations whose displacements are kept: 15 MB for six links
+CACHED_ROWS: Final = 16_384  # [-] configurations whose displacements are kept: 15 MB for six links
 
 
 class ScrewChain:
@@ -57,7 +57,7 @@ class ScrewChain:
             D[link + 1] = _carried_on(axis, positions[link], D[axis.parent + 1])[0]
         D.setflags(write=False)
         displacements = np.moveaxis(D, 0, 1)
-        if len(q) <= KEPT_ROWS:
+        if len(q) <= CACHED_ROWS:
             self._last = q.copy(), displacements
         return displacements
 

@@ -77,7 +77,7 @@ class Draw:
     X_grasps: Mapping[str, Array]
 
 
-def drawn(amount: Amount, rng: np.random.Generator) -> float:
+def sample(amount: Amount, rng: np.random.Generator) -> float:
     """A value in [m] or [rad]; a fixed amount takes no number from the generator."""
     if not isinstance(amount, Spread):
         return amount.si

@@ -11,7 +11,7 @@ from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
 from cellplan.model.approach_retract import stand_off
-from cellplan.model.process_times import kept_rests, leaves_at, ramp_shares
+from cellplan.model.process_times import fixed_rests, leaves_at, ramp_shares
 from cellplan.model.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.time_law import advance, reached_at
 from cellplan.model.toolpath import TOOL_Z, Toolpath
@@ -77,7 +77,7 @@ class ClockedPath:
     @property
     def jumps(self) -> Array:
         """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
-        breaks = [self.corners, np.array([self.over]), np.array(kept_rests(self.task, self.corners)).ravel()]
+        breaks = [self.corners, np.array([self.over]), np.array(fixed_rests(self.task, self.corners)).ravel()]
         if self.task.approach is not None:
             breaks.append(np.array([self.task.start - self.task.approach.duration]))
         if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
@@ -101,7 +101,7 @@ class ClockedPath:
         inside = np.clip(times, low, high)
         middle = np.broadcast_to(np.asarray(0.5 * (low + high)), inside.shape)
         if self.toolpath.is_timed:
-            X_PT, V_PT_P = self.toolpath.at(self._own_times(inside, self.toolpath.duration)[1])
+            X_PT, V_PT_P = self.toolpath.at(self._times_in_cycle(inside, self.toolpath.duration)[1])
         else:
             X_PT, V_PT_P, _ = self._by_time_law(inside, self._stretches(middle), quick=self.quick)
         V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
@@ -127,7 +127,7 @@ class ClockedPath:
         """
         path = self.toolpath
         if path.is_timed:
-            cycle, t = self._own_times(times, path.duration)
+            cycle, t = self._times_in_cycle(times, path.duration)
             return *path.at(t), cycle * path.length + path.arc.lengths(t)
         return self._by_time_law(times, self._stretches(times + TIME_TOLERANCE))
 
@@ -136,7 +136,7 @@ class ClockedPath:
         stretch = np.searchsorted(self.corners, times, side="right") - 1
         return np.clip(stretch, 0, len(self.corners) - 2)
 
-    def _own_times(self, times: Array, period: float) -> tuple[Array, Array]:
+    def _times_in_cycle(self, times: Array, period: float) -> tuple[Array, Array]:
         """Cycles of a trajectory and times within them, shape (N,); it passes from one to the next smoothly."""
         starts = self.corners
         elapsed = np.clip(times - starts[0], 0.0, starts[-1] - starts[0])

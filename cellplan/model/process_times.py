@@ -24,7 +24,7 @@ def process_span(task: Task, corners: Array) -> tuple[float, float]:
     return task.start, float(corners[-1]) + task.off_delay
 
 
-def kept_rests(task: Task, corners: Array) -> Spans:
+def fixed_rests(task: Task, corners: Array) -> Spans:
     """Stretches of time in [s] that a retimed program keeps: the delays of a process, and a dwell."""
     on, off = process_span(task, corners)
     ends = (on, float(corners[0])), (float(corners[-1]), off), (off, leaves_at(task, corners))

@@ -60,7 +60,7 @@ class PairSkew:
         return MOST_SKEW if self.least is None else self.least.skew
 
     @property
-    def is_kept(self) -> bool | None:
+    def is_met(self) -> bool | None:
         """Whether what is stated is no more than what is allowed; None without a statement."""
         return None if self.stated is None else self.stated <= self.allowed
 

@@ -15,7 +15,7 @@ STILL: Final = "still.svg"
 FLOOR_PLAN: Final = "floor_plan.svg"
 
 
-class DrawnPhase(NamedTuple):
+class DepictedPhase(NamedTuple):
     """What is drawn of one phase: the cell as it is in it, its tasks and what was found."""
 
     cell: Cell
@@ -23,18 +23,18 @@ class DrawnPhase(NamedTuple):
     report: Report
 
 
-def phase_drawings(phase: DrawnPhase) -> dict[str, str]:
+def phase_drawings(phase: DepictedPhase) -> dict[str, str]:
     """The drawings of one phase, by file name."""
     return {STILL: run_still(*phase), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
 
 
-def program_drawings(cell: Cell, phases: Sequence[DrawnPhase]) -> dict[str, str]:
+def program_drawings(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, str]:
     """The drawings of a program with several phases: the picture of the one that decides, and all of its motion."""
     worst = min(phases, key=lambda phase: graver(worst_instant(phase.report, phase.cell)))
     return {STILL: run_still(*worst), FLOOR_PLAN: _floor_plan(cell, phases)}
 
 
-def _floor_plan(cell: Cell, phases: Sequence[DrawnPhase]) -> str:
+def _floor_plan(cell: Cell, phases: Sequence[DepictedPhase]) -> str:
     """The floor plan at the begin of the first phase, with what all phases sweep."""
     motions = [phase.report.q for phase in phases]
     paths = {name: points for phase in phases for name, points in schedule_paths(phase.schedule).items()}

@@ -12,7 +12,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.io.cell.load import load_cell
 from cellplan.io.run.stored import read_stored_run
-from cellplan.io.run.whole_file import refuse_unless_own, replace_own
+from cellplan.io.run.whole_file import refuse_foreign, replace_older
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.pipeline.check import check
@@ -27,7 +27,7 @@ from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
 
 DRAWING: Final = "floor plan"  # in messages
-OWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
+KNOWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
 
 
 class PlanFormat(StrEnum):
@@ -90,7 +90,7 @@ def target_of(request: FloorPlanRequest, cell: str) -> Path:
 
 def _refuse_place(request: FloorPlanRequest, cell: str) -> None:
     """Refuse a place that the drawing may not take."""
-    refuse_unless_own(target_of(request, cell), is_own=_is_floor_plan, kind=DRAWING)
+    refuse_foreign(target_of(request, cell), is_of_kind=_is_floor_plan, kind=DRAWING)
 
 
 def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = PlanFormat.SVG) -> int:
@@ -107,7 +107,7 @@ def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = Pla
     """
     kind = PlanFormat(form)
     content = (floor_plan_svg(plan) if kind is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
-    replace_own(target, content, is_own=_is_floor_plan, kind=DRAWING)
+    replace_older(target, content, is_of_kind=_is_floor_plan, kind=DRAWING)
     return len(content)
 
 
@@ -116,8 +116,8 @@ def _is_floor_plan(path: Path) -> bool:
     if not path.is_file():
         return False
     with path.open("rb") as file:
-        start = file.read(max(map(len, OWN_STARTS)))
-    return start.startswith(OWN_STARTS)
+        start = file.read(max(map(len, KNOWN_STARTS)))
+    return start.startswith(KNOWN_STARTS)
 
 
 def _of_run(request: FloorPlanRequest) -> FloorPlan:

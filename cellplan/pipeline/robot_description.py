@@ -157,8 +157,8 @@ def _joint_row(joint: dict[str, Any]) -> tuple[str, ...]:
     limits = f"{lower:g} … {upper:g} {unit}" if is_ranged else "no range" if joint["missing"] else "endless"
     kind = "continuous" if joint["is_continuous"] else joint["type"]
     endless = ", or wrap: true for no end" if kind == "continuous" and not is_ranged else ""
-    lacks = f"missing: {', '.join(joint['missing'])} ({joint['reason']}{endless})" if joint["missing"] else ""
-    return joint["name"], kind, limits, "no speed" if speed is None else f"{speed:g} {unit}/s", lacks
+    missing = f"missing: {', '.join(joint['missing'])} ({joint['reason']}{endless})" if joint["missing"] else ""
+    return joint["name"], kind, limits, "no speed" if speed is None else f"{speed:g} {unit}/s", missing
 
 
 def _mimic_row(mimic: dict[str, Any]) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> 
     for robot in cell.robots:
         if robot.path is not None and robot.name not in paths:
             raise InputError(f"{at(f'robots.{robot.name}.path')}: expected no given joint path for {what}: remove it")
-    for key in solver.beside_smallest:
+    for key in solver.nonminimal_keys:
         raise InputError(
             f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
             f"{what}"

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.checks.verify import verify as verify_tables
 from cellplan.errors import InputError
 from cellplan.io.input.findings import listed
@@ -54,7 +54,7 @@ def verify(
     for robot, joints in ((cell.robot(table.robot), table.q) for table in columns if table.robot in phase.roles):
         if off_given_path(phase, robot, program.sigma, joints) is not None:
             raise InputError(f"table of '{robot.name}': expected the joints of robots.{robot.name}.path, got others")
-    with nothing_kept():  # a proof rests on the cell itself
+    with without_cache():  # a proof rests on the cell itself
         report = verify_tables(
             demanded.scenes(cell)[place], schedule, columns, moving=phase.moving, idle=phase.idle, progress=progress
         )

@@ -9,12 +9,12 @@ import cellplan
 from cellplan.io.cell.write import render_cell
 from cellplan.io.run.folder import MANIFEST, RunFolder
 from cellplan.io.run.joint_tables import program_digest
-from cellplan.io.run.manifest import own_inputs, render_manifest
+from cellplan.io.run.manifest import render_manifest, user_files
 from cellplan.io.run.stored import CLOCK
 from cellplan.model.cell import Cell
 from cellplan.model.motion import Program
 from cellplan.model.progress import Progress, silent
-from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DrawnPhase, phase_drawings, program_drawings
+from cellplan.pipeline.cell_drawings import FLOOR_PLAN, STILL, DepictedPhase, phase_drawings, program_drawings
 from cellplan.pipeline.solution import Run, Solution
 from cellplan.report.page.links import VIEW_PAGE
 from cellplan.report.page.render import PageFiles, overview_page, report_page
@@ -81,7 +81,7 @@ def write_run(
             moved = dict.fromkeys(start for run in solution.runs for start in run.moved)
             record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers, moved=moved)
             target.write_text("report.json", as_json(record))
-            phases = [DrawnPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
+            phases = [DepictedPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
             extra = PageFiles(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
             target.write_text("report.html", overview_page(record, cell=cell, **extra))
         target.write_text("cell.yaml", render_cell(cell))
@@ -91,7 +91,7 @@ def write_run(
         target.write_text(MANIFEST, manifest)
         file = PurePath(cell.origin.file).name
         target.write_text(
-            VIEW_PAGE, unmade_view_page(cell.name, cell_file=file if own_inputs(cell.inputs, file) else "")
+            VIEW_PAGE, unmade_view_page(cell.name, cell_file=file if user_files(cell.inputs, file) else "")
         )
     return record
 
@@ -120,7 +120,7 @@ def _write_report(
     plots = pictures(run_figures(run.report, cell=cell), formats)
     for name, picture in plots.items():
         target.write_bytes(f"{place}plots/{name}", picture)
-    extra |= _write_drawings(target, place, phase_drawings(DrawnPhase(cell, run.schedule, run.report)))
+    extra |= _write_drawings(target, place, phase_drawings(DepictedPhase(cell, run.schedule, run.report)))
     page = report_page(record, run.report.checks, cell=cell, plots=plots, **extra)
     target.write_text(f"{place}report.html", page)
     return record

@@ -22,7 +22,7 @@ from cellplan.planning.tracking.motion_task import closures
 
 AT_ONCE: Final = 32  # candidates that are resolved together: enough for NumPy, and their arrays stay in the cache
 FIRST_DEGREE: Final = 12  # of the polynomials: enough for most windows at the accuracy of a screening
-ALL_WAY: Final = np.inf  # time at which a candidate is lost that does the whole job
+WHOLE_JOB: Final = np.inf  # time at which a candidate is lost that does the whole job
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -111,7 +111,7 @@ class Screening(Presented):
     @property
     def is_followed(self) -> NDArray[np.bool_]:
         """Which candidates did the whole job, shape (K,)."""
-        return self.lost_at == ALL_WAY
+        return self.lost_at == WHOLE_JOB
 
     @property
     def is_feasible(self) -> NDArray[np.bool_]:
@@ -179,7 +179,7 @@ class _Screen:
         q, arrived = settled(self._tasks, desired, placement, start.T, mobile=self._settling, accuracy=self._accuracy)
         screening = Screening.unknown(q.T.copy())
         screening.lost_at[arrived] = 0.0
-        null_space = None if self._given is None else NullSpaceMotion(drift=self._given.speeds)
+        null_space = None if self._given is None else NullSpaceMotion(drift=self._given.velocities)
         collocation = Collocation(self._tasks, self._desired_at, placement, self._precision, null_space=null_space)
 
         def record(window: Window, cells: Indices, nodes: Array, errors: Array) -> None:
@@ -192,5 +192,5 @@ class _Screen:
             screening.error[cells] = np.maximum(screening.error[cells], errors)
             screening.lost_at[cells] = window.panels[-1].end
 
-        screening.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = ALL_WAY
+        screening.lost_at[collocation.carry(self._windows, q, np.flatnonzero(arrived), record)] = WHOLE_JOB
         return screening

@@ -13,7 +13,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell
 from cellplan.model.left_out import LeftOut, LeftOutKind
 from cellplan.scene.bodies import Kind, SceneBody, is_ground
-from cellplan.scene.mounting import is_of_own_file
+from cellplan.scene.mounting import is_of_one_robot
 from cellplan.scene.pairs import Excluded, Rule, ScenePair
 
 Entry = tuple[int, int, LeftOutKind, str]  # both bodies, kind and reason
@@ -84,7 +84,7 @@ class _Standing:
 def _relaxed(bodies: Sequence[SceneBody], pairs: Sequence[ScenePair]) -> Iterator[Entry]:
     """Watched pairs with a weaker rule than clearance."""
     for pair in pairs:
-        if pair.rule is not Rule.CLEARANCE and not is_of_own_file(bodies[pair.first], bodies[pair.second]):
+        if pair.rule is not Rule.CLEARANCE and not is_of_one_robot(bodies[pair.first], bodies[pair.second]):
             yield pair.first, pair.second, KIND[pair.rule], pair.reason
 
 

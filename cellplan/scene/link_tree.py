@@ -38,12 +38,12 @@ class LinkTree:
 
     def joints_between(self, first: int, second: int) -> int:
         """Number of joints between two links that have bodies, joints that carry none left out."""
-        up_first, up_second = self._way_down(first), self._way_down(second)
+        up_first, up_second = self._path_down(first), self._path_down(second)
         return min(i + j for i, link in enumerate(up_first) for j, other in enumerate(up_second) if link == other)
 
-    def _way_down(self, link: int) -> list[int]:
+    def _path_down(self, link: int) -> list[int]:
         """The link, the ones before it, and ``NO_BODY`` last."""
-        way = [link]
-        while way[-1] != NO_BODY:
-            way.append(self.parent(way[-1]))
-        return way
+        path = [link]
+        while path[-1] != NO_BODY:
+            path.append(self.parent(path[-1]))
+        return path

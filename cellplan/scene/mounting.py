@@ -39,12 +39,12 @@ class MountedPair:
     moves: bool = False  # whether the one moves against the other, so that every configuration of a motion counts
 
 
-def is_of_own_file(a: SceneBody, b: SceneBody) -> bool:
+def is_of_one_robot(a: SceneBody, b: SceneBody) -> bool:
     """Whether both are links of one robot, placed against each other by its maker."""
     return a.kind is b.kind is Kind.LINK and a.robot == b.robot
 
 
-def stand_on_each_other(a: SceneBody, b: SceneBody) -> bool:
+def may_stand_on(a: SceneBody, b: SceneBody) -> bool:
     """Whether two bodies never move and one may stand on the other: a base or a part on something of the cell's own.
 
     The feet of two robots, and a foot and a part, keep their distance as everything else does. What is mounted on one
@@ -72,17 +72,17 @@ def works_like_a_tool(body: SceneBody, cell: Cell) -> bool:
 
 def grasp_of(a: SceneBody, b: SceneBody, cell: Cell) -> Grasp | None:
     """The grasp that two bodies belong to: the part, and a body that a holder grips with."""
-    held = _held_beside(a, b, cell)
+    held = _held_with_part(a, b, cell)
     return None if held is None or _keeps_away(*held) else held[1]
 
 
 def keeps_out_of_grip(a: SceneBody, b: SceneBody, cell: Cell) -> bool:
     """Whether two bodies are the part, and one that is rigid with the flange of a holder but is not to grip."""
-    held = _held_beside(a, b, cell)
+    held = _held_with_part(a, b, cell)
     return held is not None and _keeps_away(*held)
 
 
-def _held_beside(a: SceneBody, b: SceneBody, cell: Cell) -> tuple[SceneBody, Grasp] | None:
+def _held_with_part(a: SceneBody, b: SceneBody, cell: Cell) -> tuple[SceneBody, Grasp] | None:
     """A body that is rigid with the flange of a holder and its grasp, when the other one is the part."""
     if Kind.PART not in (a.kind, b.kind):
         return None
@@ -99,9 +99,9 @@ def _keeps_away(body: SceneBody, grasp: Grasp) -> bool:
 
 def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
     """Kind of a pair that is not watched by its mounting; None for two links of one robot's own file."""
-    if is_of_own_file(a, b):
+    if is_of_one_robot(a, b):
         return None
-    if stand_on_each_other(a, b):
+    if may_stand_on(a, b):
         return LeftOutKind.STANDING
     return LeftOutKind.GRIP if Kind.PART in (a.kind, b.kind) else LeftOutKind.MOUNTED
 
@@ -109,7 +109,7 @@ def left_out_kind(a: SceneBody, b: SceneBody) -> LeftOutKind | None:
 def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) -> MountedPair | None:
     """The depth allowed for two bodies of which one holds the part or stands on the other; None for all others."""
     first, second = ends
-    if stand_on_each_other(a, b):
+    if may_stand_on(a, b):
         return MountedPair(first=first, second=second, mount=Mount.STANDING, limit=cell.checks.standing_depth_mm.si)
     grasp = grasp_of(a, b, cell)
     if grasp is None:

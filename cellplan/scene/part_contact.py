@@ -25,7 +25,7 @@ from cellplan.scene.mounting import Mount, MountedPair, is_rigid_with_flange
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMotion
 from cellplan.scene.scene import Scene
 
-WAY_TOL: Final = 1e-4  # [m] by which the tool of a straight move may be off it: contact ends no sooner
+OFF_LINE_TOL: Final = 1e-4  # [m] by which the tool of a straight move may be off it: contact ends no sooner
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ class PartContact:
             limit = self._limit(scene, pair)
             mounted.append(limit)
             stated = limit.limit if self.place.contact_mm is None else self.place.contact_mm.si
-            near = (stated if self.is_lying else max(stated, limit.limit)) + WAY_TOL
+            near = (stated if self.is_lying else max(stated, limit.limit)) + OFF_LINE_TOL
             spans += self._away(pair, near)
             if self.is_lying and (cut := self._cut(scene, pair, limit.limit, len(scene.engine.bodies) + len(cuts))):
                 cuts += cut[1]
@@ -94,7 +94,7 @@ class PartContact:
     def _away(self, pair: ScenePair, near: float) -> Iterator[tuple[ScenePair, float, float]]:
         """The pair beyond its contact: free of contact until it can have its distance, then with the distance."""
         what = "grip" if self.is_lying else "place of the part"
-        where = f"more than {MM * (near - WAY_TOL):g} mm from the {what} ({self.key}.contact_mm)"
+        where = f"more than {MM * (near - OFF_LINE_TOL):g} mm from the {what} ({self.key}.contact_mm)"
         yield replace(pair, rule=Rule.CONTACT, where=where), near, near + pair.demand
         yield replace(pair, where=where), near + pair.demand, np.inf
 

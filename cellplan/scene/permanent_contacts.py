@@ -25,7 +25,7 @@ from cellplan.scene.mounting import (
     Mount,
     MountedPair,
     grasp_of,
-    is_of_own_file,
+    is_of_one_robot,
     keeps_out_of_grip,
     refuse_wrong_mounting,
 )
@@ -78,8 +78,8 @@ def apply_design(
         a, b = (sampled.views[holder][index] for index in (pair.first, pair.second))
         if stands_on(pair, bodies, cell=cell):
             is_decided = sampled.always_stands(pair) and _stands(design, cell, pair)
-        elif is_of_own_file(a, b):
-            is_decided = near_in_chain(pair, bodies, cell=cell) and _own_links(design, sampled, pair)
+        elif is_of_one_robot(a, b):
+            is_decided = near_in_chain(pair, bodies, cell=cell) and _near_links(design, sampled, pair)
         elif a.robot is None or a.robot != b.robot or grasp_of(a, b, cell):
             is_decided = False
         elif _is_behind_flange(a, b, cell):
@@ -189,7 +189,7 @@ def _stands(design: Design, cell: Cell, pair: ScenePair) -> bool:
     return True
 
 
-def _own_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
+def _near_links(design: Design, sampled: _Sampled, pair: ScenePair) -> bool:
     """Leave out two near links of one robot's file that always touch; the others are checked for contact only."""
     if sampled.always_touch(pair, None):
         configurations = f"the reference configuration and at {CONFIGURATION_COUNT} random ones"

@@ -53,7 +53,7 @@ class Cluster(Executor):
         self._dask = self._client.get_executor(pure=False)
         threads = sum(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S).values())
         self.count = max(2, PER_THREAD * threads)
-        self._under_way: dict[Future[Any], _Sent] = {}
+        self._running: dict[Future[Any], _Sent] = {}
         self._again: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
         self._is_over = threading.Event()
         self._watch = threading.Thread(target=self._watched, name="cellplan-cluster", daemon=True)
@@ -79,7 +79,7 @@ class Cluster(Executor):
     def _send(self, outer: Future[Any], call: Callable[[], Any]) -> None:
         """Give a job to Dask."""
         if outer.done():
-            self._under_way.pop(outer, None)
+            self._running.pop(outer, None)
             return
         connection = self._client.scheduler_comm
         try:
@@ -90,17 +90,17 @@ class Cluster(Executor):
             else:
                 self._again.put((outer, call))
             return
-        self._under_way[outer] = inner, call, connection
+        self._running[outer] = inner, call, connection
         inner.add_done_callback(partial(self._arrived, outer, call))
 
     def _arrived(self, outer: Future[Any], call: Callable[[], Any], inner: Future[Any]) -> None:
         """Pass on an answer; a job whose connection was lost is begun again, and its first answer counts."""
-        sent = self._under_way.get(outer)
+        sent = self._running.get(outer)
         if inner.cancelled():
             if sent is not None and sent[0] is inner:
                 self._again.put((outer, call))
             return
-        self._under_way.pop(outer, None)
+        self._running.pop(outer, None)
         error = inner.exception(timeout=0)
         if error is None:
             _answer(outer, inner.result(timeout=0))
@@ -132,7 +132,7 @@ class Cluster(Executor):
         """Begin again what waits for a connection, and what was sent through one that is gone."""
         while not self._again.empty():
             self._send(*self._again.get_nowait())
-        for outer, (_, call, connection) in list(self._under_way.items()):
+        for outer, (_, call, connection) in list(self._running.items()):
             if connection is not self._client.scheduler_comm:
                 self._send(outer, call)
 
@@ -149,8 +149,8 @@ class Cluster(Executor):
         """Stop the study."""
         while not self._again.empty():
             self._stop(self._again.get_nowait()[0], reason)
-        for outer in list(self._under_way):
-            self._under_way.pop(outer, None)
+        for outer in list(self._running):
+            self._running.pop(outer, None)
             self._stop(outer, reason)
 
     def _stop(self, outer: Future[Any], reason: str) -> None:

@@ -25,15 +25,15 @@ def measure() -> Numbers:
 
 def _signs() -> Numbers:
     """Distances from the start of the path for all signs of the start; and both late cases from the mirrored one."""
-    found: Numbers = {}
+    result: Numbers = {}
     for case, (first, path) in STARTS.items():
         angles = np.array([first, np.pi / 3, np.pi / 3]) * np.array(list(itertools.product((1, -1), repeat=3)))
         sums = np.cumsum(angles, axis=1)
         tips = np.stack([np.cos(sums) @ LINKS, np.sin(sums) @ LINKS], axis=1)
-        found[case] = {"distances_m": np.sort(np.linalg.norm(tips - np.array(path), axis=1))}
+        result[case] = {"distances_m": np.sort(np.linalg.norm(tips - np.array(path), axis=1))}
     for case in (2, 3):
-        found[f"case_{case}"] |= {method: _mirrored(case, method) for method in METHODS}
-    return found
+        result[f"case_{case}"] |= {method: _mirrored(case, method) for method in METHODS}
+    return result
 
 
 def _mirrored(case: int, method: str) -> Numbers:

@@ -110,13 +110,13 @@ def _circle(t: Array, *, center: Array, radius: float, period: float, turn: floa
     return pose, speed
 
 
-def _integrate(q: Array, poses: Array, speeds: Array, gain: float, dt: float, model: Model) -> Array:
+def _integrate(q: Array, poses: Array, velocities: Array, gain: float, dt: float, model: Model) -> Array:
     """Eqs. D.4 and E.15 without gain, D.11 and E.16 with it; errors x, y, angle at every sample, shape (N, 3).
 
     Without feedback N_p is that of the desired pose, with it that of the actual one, as printed.
     """
     errors = np.empty_like(poses)
-    for k, (desired, speed) in enumerate(zip(poses, speeds, strict=True)):
+    for k, (desired, speed) in enumerate(zip(poses, velocities, strict=True)):
         N_s, actual = model(q)
         errors[k] = desired - actual
         N_p = virtual(actual if gain else desired)
@@ -134,8 +134,8 @@ def _follow_alone(gain: float, dt: float = STEP) -> Array:
 
     t: Array = np.asarray(dt * np.arange(round(ALONE_S / dt) + 1))
     center = arm(START)[1] - [0.1, 0.0, 0.0]
-    poses, speeds = _circle(t, center=center, radius=0.1, period=ALONE_S, turn=np.pi / 3)
-    return _integrate(START, poses, speeds, gain, dt, model)
+    poses, velocities = _circle(t, center=center, radius=0.1, period=ALONE_S, turn=np.pi / 3)
+    return _integrate(START, poses, velocities, gain, dt, model)
 
 
 def _double_step() -> Array:
@@ -148,24 +148,27 @@ def _follow_together(gain: float) -> Array:
     q = np.array([*HELD_START, *np.deg2rad([-40.0, 75.0, -30.0])])
     t: Array = np.asarray(STEP * np.arange(round(TOGETHER_S / STEP) + 1))
     center = relative(q)[1] - [0.1, 0.0, 0.0]
-    poses, speeds = _circle(t, center=center, radius=0.1, period=TOGETHER_S, turn=np.pi / 3)
-    return _integrate(q, poses, speeds, gain, STEP, relative)
+    poses, velocities = _circle(t, center=center, radius=0.1, period=TOGETHER_S, turn=np.pi / 3)
+    return _integrate(q, poses, velocities, gain, STEP, relative)
 
 
-def _errors(found: Array) -> tuple[Array, Array]:
+def _errors(result: Array) -> tuple[Array, Array]:
     """Distance in [mm] and angle in [rad] at every sample."""
-    return 1e3 * np.linalg.norm(found[:, :2], axis=1), np.abs(found[:, 2])
+    return 1e3 * np.linalg.norm(result[:, :2], axis=1), np.abs(result[:, 2])
 
 
-def _numbers(found: tuple[Array, Array]) -> Numbers:
+def _numbers(result: tuple[Array, Array]) -> Numbers:
     """Largest and last error."""
-    return {"error_mm": found[0].max(), "end_mm": found[0][-1], "turn_below_1e_12_rad": bool(found[1].max() < 1e-12)}
+    return {"error_mm": result[0].max(), "end_mm": result[0][-1], "turn_below_1e_12_rad": bool(result[1].max() < 1e-12)}
 
 
-def _draw(*found: tuple[Array, Array]) -> None:
+def _draw(*result: tuple[Array, Array]) -> None:
     """Errors without and with feedback, one arm and two."""
     sheet = Sheet(1, 2)
-    for (free, fed), what, length in ((found[:2], "one arm, 40 s", ALONE_S), (found[2:], "two arms, 12 s", TOGETHER_S)):
+    for (free, fed), what, length in (
+        (result[:2], "one arm, 40 s", ALONE_S),
+        (result[2:], "two arms, 12 s", TOGETHER_S),
+    ):
         t = np.linspace(0.0, length, len(free[0]))
         axes = sheet.panel(f"{what}: position error", "time [s]", "[mm]")
         draw(axes, t[1:], {"without feedback": free[0][1:], "with feedback": fed[0][1:]})

@@ -123,10 +123,10 @@ def tightened(wide: Curves) -> str:
 
 def _drifts(run: Curves) -> Array:
     """Largest drift of any joint in each cycle in [deg], shape (cycles,)."""
-    found = run.report.repeatability
-    if found is None:
+    drift = run.report.repeatability
+    if drift is None:
         raise ValueError("ellipse: the run has no cycles")
-    return np.rad2deg(np.max(np.abs([drift.drift for drift in found.drifts]), axis=0))
+    return np.rad2deg(np.max(np.abs([drift.drift for drift in drift.drifts]), axis=0))
 
 
 def _of_one(run: Curves) -> Numbers:
@@ -147,13 +147,13 @@ def _draw(plain: Curves, closed: Curves, searched: Array) -> None:
     """Positions and speeds for the three, as in figures 4.6 and 4.7."""
     sheet = Sheet(3, 2)
     t, between = plain.t, plain.between
-    ways = {
+    motions = {
         "pseudo-inverse": plain.q,
         "recursive search, limits tightened at 6 s": searched,
         "pseudo-inverse, cyclic": closed.q,
     }
-    for way, q in ways.items():
-        draw_joints(sheet.panel(f"joint positions, {way}", "time [s]", "[rad]"), t, q, NAMES)
+    for method, q in motions.items():
+        draw_joints(sheet.panel(f"joint positions, {method}", "time [s]", "[rad]"), t, q, NAMES)
         speeds = np.diff(q, axis=0) / np.diff(t)[:, None]
         draw_joints(sheet.panel("joint speeds", "time [s]", "[rad/s]"), between, speeds, NAMES)
     sheet.save("nicolato_ellipse")

@@ -65,20 +65,20 @@ def _scalar() -> Numbers:
     a = GAMMA * np.sqrt(c) / (1.0 - np.sqrt(c))
     t: Array = np.asarray(dt * np.arange(200_001))
     falling = k_0 / np.sqrt(2.0 * a * t * k_0**2 + 1.0)
-    found = np.empty_like(t)
-    found[0] = (1.0 - np.sqrt(c)) / k_0
+    result = np.empty_like(t)
+    result[0] = (1.0 - np.sqrt(c)) / k_0
     for i, value in enumerate(falling[:-1]):
-        found[i + 1] = found[i] - GAMMA * (value * found[i] - 1.0) * value * dt
+        result[i + 1] = result[i] - GAMMA * (value * result[i] - 1.0) * value * dt
     sheet = Sheet(1, 2)
     axes = sheet.panel("Eq. 23: k falls to zero", "time [s]", "k")
     draw(axes, t, {"": falling})
-    draw(sheet.panel("plane of k and theta", "k", r"$\theta$"), falling, {"filter": found, "1/k": 1.0 / falling})
+    draw(sheet.panel("plane of k and theta", "k", r"$\theta$"), falling, {"filter": result, "1/k": 1.0 / falling})
     sheet.save("vargas_filter")
     return {
         "time_constant_s": steps * dt,
         "expected_s": 1.0 / (GAMMA * k * k),
-        "value_error": float(np.abs(falling * found - 1.0 + np.sqrt(c)).max()),
-        "theta_at_end": found[-1],
+        "value_error": float(np.abs(falling * result - 1.0 + np.sqrt(c)).max()),
+        "theta_at_end": result[-1],
         "closed_form_at_end": (1.0 - np.sqrt(c)) / falling[-1],
         "end_s": t[-1],
     }
@@ -87,29 +87,29 @@ def _scalar() -> Numbers:
 def _damped(damping: float, region: float) -> Numbers:
     """Case II by damped least squares with other settings, Eqs. 9 and 10."""
 
-    def speeds(J: Array, v: Array) -> Array:
+    def velocities(J: Array, v: Array) -> Array:
         product = J @ J.T
         w = np.sqrt(max(np.linalg.det(product), 0.0))
         return J.T @ np.linalg.solve(product + damping * max(1.0 - w / region, 0.0) ** 2 * np.eye(2), v)
 
-    return _case_2(speeds)
+    return _case_2(velocities)
 
 
 def _filtered(law: str, gain: float) -> Numbers:
     """Case II by a filtered inverse with another gain of the filter, Eqs. 34 to 36."""
     theta = np.zeros((3, 2))
 
-    def speeds(J: Array, v: Array) -> Array:
+    def velocities(J: Array, v: Array) -> Array:
         nonlocal theta
         u = theta @ v if law == "I" else theta @ (theta.T @ (J.T @ v))
         left, right = theta @ J - np.eye(3), J @ theta - np.eye(2)
         theta = theta - gain * STEP * (left @ J.T + J.T @ right)
         return u
 
-    return _case_2(speeds)
+    return _case_2(velocities)
 
 
-def _case_2(speeds: Callable[[Array, Array], Array]) -> Numbers:
+def _case_2(velocities: Callable[[Array, Array], Array]) -> Numbers:
     """Error and nearness to the singular point in case II (Eq. 40) by Euler's method."""
     t = STEP * np.arange(round(CASE_2_S / STEP) + 1)
     desired = np.stack([1.1 + np.sin(0.2 * t), 0.35 * np.cos(0.2 * t)], axis=1)
@@ -117,7 +117,7 @@ def _case_2(speeds: Callable[[Array, Array], Array]) -> Numbers:
     q, places = START.copy(), np.empty_like(desired)
     for k in range(len(t)):
         places[k] = pose(q)[:2]
-        q = q + STEP * speeds(jacobian(q, 2), rates[k] + K_P * (desired[k] - places[k]))
+        q = q + STEP * velocities(jacobian(q, 2), rates[k] + K_P * (desired[k] - places[k]))
     settled = t >= SETTLED
     return {
         "error_mm": 1e3 * float(np.linalg.norm(desired - places, axis=1)[settled].max()),
@@ -157,23 +157,23 @@ def _singular_starts() -> Numbers:
     goal = np.array([[4.0, 0.0], [-0.1, 0.0]])
     whole = np.array([[1.0, 0.0], [-2.0, 0.0], [0.0, 1.0]])
     duration = 10.0
-    found: Numbers = {}
+    result: Numbers = {}
     for name, theta in (("zero", np.zeros((3, 2))), ("chosen", whole)):
         for law, second in (("I", False), ("II", True)):
             end = simulate(np.zeros(3), theta, goal, feedback=np.full(2, K_P), second_law=second, duration=duration)
-            found[f"{name}_{law}_m"] = float(np.linalg.norm(goal[0] + goal[1] * duration - pose(end)[:2]))
-    return found
+            result[f"{name}_{law}_m"] = float(np.linalg.norm(goal[0] + goal[1] * duration - pose(end)[:2]))
+    return result
 
 
 def _orientation() -> Numbers:
     """Position and orientation at once, both laws: the tip moves at 0.03 m/s, the hand turns by 0.05 rad/s."""
     goal = np.stack([pose(START) + np.array([0.1, 0.0, 0.0]), np.array([0.02, -0.02, -0.05])])
-    found: Numbers = {}
+    result: Numbers = {}
     for law, second in (("I", False), ("II", True)):
         end = simulate(START, np.zeros((3, 3)), goal, feedback=np.full(3, K_P), second_law=second, duration=10.0)
         error = goal[0] + 10.0 * goal[1] - pose(end)
-        found |= {f"{law}_mm": 1e3 * float(np.linalg.norm(error[:2])), f"{law}_rad": abs(float(error[2]))}
-    return found
+        result |= {f"{law}_mm": 1e3 * float(np.linalg.norm(error[:2])), f"{law}_rad": abs(float(error[2]))}
+    return result
 
 
 def _unreachable(feedback: Array) -> Numbers:

@@ -13,15 +13,15 @@ ROBOTS = ("reis", "kuka", "abb", "staubli")
 
 def joint_numbers(reports: Mapping[int, Sequence[Report]]) -> Numbers:
     """By mode, robot and joint; of the positioner in mode 2 by task, as it works in all three runs."""
-    found: Numbers = {}
+    result: Numbers = {}
     for mode, runs in reports.items():
-        found[f"mode_{mode}"] = {
+        result[f"mode_{mode}"] = {
             robot: _of_robot(report, robot)
             for robot in ROBOTS
-            if (report := next((each for each in runs if np.any(each.qd[robot])), None)) is not None
+            if (report := next((run for run in runs if np.any(run.qd[robot])), None)) is not None
         }
-    found["positioner"] = {report.tasks[0]: _of_robot(report, "reis") for report in reports[2]}
-    return found
+    result["positioner"] = {report.tasks[0]: _of_robot(report, "reis") for report in reports[2]}
+    return result
 
 
 def _of_robot(report: Report, robot: str) -> Numbers:

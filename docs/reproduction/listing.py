@@ -225,17 +225,19 @@ HEAD = "| item | page | shows | verdict | where, or why not |\n|---|---|---|---|
 
 def listing() -> str:
     """The three tables in Markdown, with the count of every verdict."""
-    return "\n\n".join(f"### {paper}\n\n{_counts(found)}\n\n{_table(paper, found)}" for paper, found in LISTS.items())
+    return "\n\n".join(
+        f"### {paper}\n\n{_counts(entries)}\n\n{_table(paper, entries)}" for paper, entries in LISTS.items()
+    )
 
 
 def _table(paper: str, entries: Sequence[Entry]) -> str:
     """One table."""
-    return "\n".join([HEAD, *(each.text(paper) for each in entries)])
+    return "\n".join([HEAD, *(entry.text(paper) for entry in entries)])
 
 
 def _counts(entries: Sequence[Entry]) -> str:
     """How many numbered items have each verdict."""
-    verdicts = [each.verdict for each in entries for _ in each.numbers]
+    verdicts = [entry.verdict for entry in entries for _ in entry.numbers]
     counts = [f"{verdicts.count(name)} {name}" for name in _order() if name in verdicts]
     return f"Of {len(verdicts)} numbered items: {', '.join(counts)}."
 

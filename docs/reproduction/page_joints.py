@@ -49,12 +49,12 @@ def _layout_rows(first: Numbers) -> list[Row]:
     ]
     for robot, pair in (("abb", ("B3", "C3")), ("staubli", ("B4", "C4"))):
         hardest = sorted(first[robot], key=lambda name: -float(first[robot][name][ACCELERATION]))[:2]
-        found = ", ".join(f"{name} {shown(first[robot][name][ACCELERATION])}" for name in hardest)
+        result = ", ".join(f"{name} {shown(first[robot][name][ACCELERATION])}" for name in hardest)
         rows.append(
             claim(
                 f"{robot.upper()} in mode 1: joints whose speed changes most abruptly",
                 " and ".join(pair),
-                f"{found} deg/s²",
+                f"{result} deg/s²",
                 holds=set(hardest) == set(pair),
                 difference="none" if set(hardest) == set(pair) else "other joints",
             )
@@ -182,11 +182,11 @@ def _less(what: str, less: Numbers, more: Numbers, key: str, names: Sequence[str
     """A claim that something is smaller in every joint of a robot, in the order of the line."""
     used = list(less) if names is None else names
     smaller = [name for name in used if less[name][key] < more[name][key]]
-    found = ", ".join(f"{name} {shown(less[name][key])} and {shown(more[name][key])}" for name in used)
+    result = ", ".join(f"{name} {shown(less[name][key])} and {shown(more[name][key])}" for name in used)
     return claim(
         what,
         "smaller in the first",
-        f"{found} {UNITS[key]}",
+        f"{result} {UNITS[key]}",
         holds=len(smaller) == len(used),
         difference="none" if len(smaller) == len(used) else f"holds for {', '.join(smaller) or 'no joint'}",
     )
@@ -200,8 +200,8 @@ def _farther_at_one_end(first: Numbers, third: Numbers) -> bool:
 
 def _one_ended(first: Numbers, third: Numbers, names: Sequence[str]) -> str:
     """For which joints that holds."""
-    found = [name for name in names if _farther_at_one_end(first[name], third[name])]
-    return "none" if len(found) == len(names) else f"holds for {', '.join(found) or 'no joint'}"
+    result = [name for name in names if _farther_at_one_end(first[name], third[name])]
+    return "none" if len(result) == len(names) else f"holds for {', '.join(result) or 'no joint'}"
 
 
 def _passed(joint: Numbers) -> str:

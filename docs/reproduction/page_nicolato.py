@@ -5,7 +5,7 @@ from reproduction.verdicts import CHOSEN, CIRCULAR, NOT, Row, alone, circular, c
 
 ONSET = 2.85  # [s]
 STEP = 0.01  # [s] of the circle
-FOUND = 4.5e-8  # [m] printed error of the search
+PRINTED = 4.5e-8  # [m] printed error of the search
 LARGE = 1e-3  # [m] an error that is large beside a tolerance of 1e-7 m
 SEARCHED = 1e-5  # [m] tolerance of section 4.2
 CLOSED = 0.001  # [deg] drift of a joint that comes back
@@ -19,7 +19,7 @@ def circle_rows(numbers: Numbers) -> list[Row]:
     search, dls, upwards = numbers["search"], numbers["dls"], numbers["upwards"]
     onset = dls["damped_from_s"]
     return [
-        circular("search: largest error", search["error_m"], FOUND, "m"),
+        circular("search: largest error", search["error_m"], PRINTED, "m"),
         *_smooth_rows("through the singular point", search, numbers["printed"]),
         Row(
             what="DLS: damping sets in (the plane of the circle was chosen for it)",

@@ -3,7 +3,7 @@
 from reproduction.runs import Numbers
 from reproduction.verdicts import CHOSEN, CIRCULAR, NOT, Row, alone, claim, shown
 
-FOUND = 2e-9  # [m] of a search with a tolerance of 1e-9 m
+PRINTED = 2e-9  # [m] of a search with a tolerance of 1e-9 m
 PLOTTED = 1.0  # [deg] from one cycle to the next: less than a plot of measured joints shows
 PIXEL = 1.0  # [px] printed error at the end
 NAMES = ("first", "second", "third")
@@ -19,7 +19,7 @@ def planar_rows(numbers: Numbers) -> list[Row]:
             published="reached with no error",
             ours=f"{shown(point['error_m'])} m after {point['rounds']:g} rounds",
             difference="the order of the joints was chosen for it",
-            verdict=CHOSEN if point["error_m"] < FOUND else NOT,
+            verdict=CHOSEN if point["error_m"] < PRINTED else NOT,
         ),
         alone(
             "the same with the joints in the order 1, 2, 3",
@@ -30,7 +30,7 @@ def planar_rows(numbers: Numbers) -> list[Row]:
             published="reached with no error",
             ours=f"{shown(weighted['error_m'])} m after {weighted['rounds']:g} rounds",
             difference="as above",
-            verdict=CHOSEN if weighted["error_m"] < FOUND else NOT,
+            verdict=CHOSEN if weighted["error_m"] < PRINTED else NOT,
         ),
         claim(
             "the same: joints 2 and 3",

@@ -59,8 +59,8 @@ def _component_rows(components: Numbers) -> list[Row]:
         alone(
             f"mode {mode[-1]}: largest component of position and of orientation",
             "; ".join(
-                f"{task} {shown(found['position_mm'])} mm and {shown(found['orientation_deg'])} deg"
-                for task, found in tasks.items()
+                f"{task} {shown(entry['position_mm'])} mm and {shown(entry['orientation_deg'])} deg"
+                for task, entry in tasks.items()
             ),
         )
         for mode, tasks in components.items()

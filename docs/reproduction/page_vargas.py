@@ -165,11 +165,11 @@ def _setting_rows(numbers: Numbers) -> list[Row]:
         claim(
             f"DLS in case II with half of {name}",
             "comes nearer to the singular point",
-            f"{found['nearest_mm']:.4g} mm instead of {printed['nearest_mm']:.4g} mm, error {shown(found['error_mm'])} "
+            f"{item['nearest_mm']:.4g} mm instead of {printed['nearest_mm']:.4g} mm, error {shown(item['error_mm'])} "
             f"instead of {shown(printed['error_mm'])} mm",
-            holds=found["nearest_mm"] < printed["nearest_mm"],
+            holds=item["nearest_mm"] < printed["nearest_mm"],
         )
-        for name, found in (("lambda_0", damping["lambda0_halved"]), ("w_0", damping["w0_halved"]))
+        for name, item in (("lambda_0", damping["lambda0_halved"]), ("w_0", damping["w0_halved"]))
     ]
     errors = ", ".join(f"{shown(gain[of]['I']['error_mm'])} and {shown(gain[of]['II']['error_mm'])}" for of in gain)
     return [

@@ -71,8 +71,8 @@ def pages_of(paper: str, where: str) -> list[int]:
 
 def with_pages(paper: str, where: str) -> str:
     """A place in a paper followed by its pages; equations alone have none."""
-    found = pages_of(paper, where)
-    return f"{where}, p. {', '.join(str(page) for page in found)}" if found else where
+    result = pages_of(paper, where)
+    return f"{where}, p. {', '.join(str(page) for page in result)}" if result else where
 
 
 def _numbers(text: str) -> Iterator[str]:

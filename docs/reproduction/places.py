@@ -44,7 +44,7 @@ def _places() -> Iterator[Cell]:
         X_WB = robot.X_WB.copy()
         X_WB[:3, 3] += shift
         moved = replace(robot, X_WB=X_WB @ pose(rpy=(0.0, 0.0, turn)), start=None)
-        yield replace(cell, robots=tuple(moved if each is robot else each for each in cell.robots))
+        yield replace(cell, robots=tuple(moved if entry is robot else entry for entry in cell.robots))
 
 
 def _report(cell: Cell) -> Report | None:

@@ -120,15 +120,15 @@ def _circles() -> Numbers:
     t: Array = np.asarray(SAMPLE_S * np.arange(round(length / SAMPLE_S) + 1))
     angles = 2.0 * np.pi * t / period
     goals = center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    found = np.zeros((len(t), 3))
+    result = np.zeros((len(t), 3))
     for k, goal in enumerate(goals):
-        found[k], _ = search(found[max(k - 1, 0)], goal, order=ORDER)
-    errors = np.linalg.norm([tip(q) for q in found] - goals, axis=1)
+        result[k], _ = search(result[max(k - 1, 0)], goal, order=ORDER)
+    errors = np.linalg.norm([tip(q) for q in result] - goals, axis=1)
     cycle = round(period / SAMPLE_S)
-    drift = np.rad2deg(np.abs(found[cycle:] - found[:-cycle])).max(axis=1)
+    drift = np.rad2deg(np.abs(result[cycle:] - result[:-cycle])).max(axis=1)
     sheet = Sheet(1, 2)
     axes = sheet.panel("circles by search: joints", "time [s]", "[deg]")
-    draw_joints(axes, t, np.rad2deg(found), (r"$\theta_1$", r"$\theta_2$", r"$\theta_3$"))
+    draw_joints(axes, t, np.rad2deg(result), (r"$\theta_1$", r"$\theta_2$", r"$\theta_3$"))
     draw(sheet.panel("change from one cycle to the next", "time [s]", "[deg]"), t[cycle:], {"": drift})
     sheet.save("nicolato_circles")
     return {

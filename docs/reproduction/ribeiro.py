@@ -24,7 +24,7 @@ def measure_modes() -> Numbers:
     _draw_components(reports)
     _draw_positioner(reports[1][0])
     _draw_worn(reports[3][0])
-    numbers: Numbers = {f"mode_{mode}": _of_mode(found) for mode, found in reports.items()}
+    numbers: Numbers = {f"mode_{mode}": _of_mode(report) for mode, report in reports.items()}
     uses = {use.joint: use for use in reports[3][0].joints if use.robot == "staubli"}
     numbers["worn"] = {
         name: {
@@ -49,7 +49,7 @@ def measure_first_layout() -> Numbers:
     uses = {use.joint: use for use in report.joints}
     b2, c4 = uses["B2"], uses["C4"]
     highest = int(np.argmax(report.q["kuka"][:, 1]))
-    (floor,) = (each for kind, each in report.clearance.minima.items() if str(kind) == "environment")
+    (floor,) = (value for kind, value in report.clearance.minima.items() if str(kind) == "environment")
     _draw_layout(report)
     return {
         "b2_deg": math.degrees(b2.max),
@@ -110,13 +110,15 @@ def _of_mode(reports: Sequence[Report]) -> Numbers:
         "turn_deg": math.degrees(
             max(
                 float(np.linalg.norm(task.orientation_error, axis=1).max())
-                for each in reports
-                for task in each.accuracy
+                for report in reports
+                for task in report.accuracy
             )
         ),
-        "margin_deg": math.degrees(min(use.margin for each in reports for use in each.joints)),
-        "speed_share": max(use.peak_velocity / use.velocity_limit for each in reports for use in each.joints),
-        "collision_free": all(each.passed for report in reports for each in report.checks if each.name == "collision"),
+        "margin_deg": math.degrees(min(use.margin for report in reports for use in report.joints)),
+        "speed_share": max(use.peak_velocity / use.velocity_limit for report in reports for use in report.joints),
+        "collision_free": all(
+            check.passed for report in reports for check in report.checks if check.name == "collision"
+        ),
         "travel_deg": {robot: max(_travel(report, robot) for report in reports) for robot in robots},
         "speed_deg_s": {robot: max(_speed(report, robot) for report in reports) for robot in robots},
         "share": {robot: max(report.motion_share[robot][0] for report in reports) for robot in robots},
@@ -125,12 +127,15 @@ def _of_mode(reports: Sequence[Report]) -> Numbers:
 
 def _errors(report: Report) -> dict[str, float]:
     """Largest position error of each task in [mm]."""
-    return {each.task: 1e3 * float(np.linalg.norm(each.position_error, axis=1).max()) for each in report.accuracy}
+    return {
+        accuracy.task: 1e3 * float(np.linalg.norm(accuracy.position_error, axis=1).max())
+        for accuracy in report.accuracy
+    }
 
 
 def _of_joints(reports: Sequence[Report], robot: str) -> Numbers:
     """Range and largest speed of each joint of a robot in the run in which it works."""
-    report = next(each for each in reports if np.any(each.qd[robot]))
+    report = next(report for report in reports if np.any(report.qd[robot]))
     return {
         use.joint: {"range_deg": math.degrees(use.max - use.min), "speed_deg_s": math.degrees(use.peak_velocity)}
         for use in report.joints
@@ -156,8 +161,10 @@ def _joints(report: Report, robot: str) -> list[str]:
 def _draw_errors(reports: Mapping[int, Sequence[Report]]) -> None:
     """Total position error of each task in each mode, as in figures 37 to 39, 51 to 53 and 69 to 71."""
     sheet = Sheet(3, 3)
-    for mode, found in reports.items():
-        curves = {each.task: (report.times, each.position_error) for report in found for each in report.accuracy}
+    for mode, report in reports.items():
+        curves = {
+            accuracy.task: (report.times, accuracy.position_error) for report in report for accuracy in report.accuracy
+        }
         for task, robot in TASKS.items():
             times, error = curves[task]
             axes = sheet.panel(f"mode {mode} ({MODES[mode]}): {task}, {robot.upper()}", "time [s]", "[mm]")
@@ -169,12 +176,12 @@ def _components(reports: Mapping[int, Sequence[Report]]) -> Numbers:
     """Largest component of the position and of the orientation error of each task, in modes 1 and 2."""
     return {
         f"mode_{mode}": {
-            each.task: {
-                "position_mm": 1e3 * np.abs(each.position_error).max(),
-                "orientation_deg": np.rad2deg(np.abs(each.orientation_error).max()),
+            accuracy.task: {
+                "position_mm": 1e3 * np.abs(accuracy.position_error).max(),
+                "orientation_deg": np.rad2deg(np.abs(accuracy.orientation_error).max()),
             }
             for report in reports[mode]
-            for each in report.accuracy
+            for accuracy in report.accuracy
         }
         for mode in (1, 2)
     }
@@ -185,13 +192,13 @@ def _draw_components(reports: Mapping[int, Sequence[Report]]) -> None:
     sheet = Sheet(3, 4)
     for task in TASKS:
         for mode in (1, 2):
-            report = next(each for each in reports[mode] if task in each.tasks)
-            (found,) = [each for each in report.accuracy if each.task == task]
+            report = next(report for report in reports[mode] if task in report.tasks)
+            (result,) = [accuracy for accuracy in report.accuracy if accuracy.task == task]
             title = f"mode {mode}: {task}"
             axes = sheet.panel(f"{title}, position", "time [s]", "[mm]")
-            draw(axes, report.times, dict(zip("xyz", 1e3 * found.position_error.T, strict=True)))
+            draw(axes, report.times, dict(zip("xyz", 1e3 * result.position_error.T, strict=True)))
             axes = sheet.panel(f"{title}, orientation", "time [s]", "[deg]")
-            draw(axes, report.times, dict(zip("xyz", np.rad2deg(found.orientation_error.T), strict=True)))
+            draw(axes, report.times, dict(zip("xyz", np.rad2deg(result.orientation_error.T), strict=True)))
     sheet.save("ribeiro_components")
 
 

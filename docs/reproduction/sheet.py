@@ -21,7 +21,7 @@ GREY = "#8a8a8a"
 MOST_POINTS = 1500  # of a curve: more than a screen shows
 LEGEND_ROOM = 0.17  # [-] of the height of a plot
 PANEL = (4.3, 3.0)  # [inch] width and height of one plot
-DRAWN = re.compile(r' (?:d|x|y)="[^"]*"')  # attributes of an SVG that hold coordinates
+COORDINATES = re.compile(r' (?:d|x|y)="[^"]*"')  # attributes of an SVG that hold coordinates
 COORDINATE = re.compile(r"-?\d+\.\d+")
 
 mpl.use("svg")
@@ -76,7 +76,7 @@ def shortened(drawing: str) -> str:
     def short(number: re.Match[str]) -> str:
         return f"{round(float(number[0]), 2) + 0.0:.2f}".rstrip("0").rstrip(".")
 
-    return DRAWN.sub(lambda attribute: COORDINATE.sub(short, attribute[0]), drawing)
+    return COORDINATES.sub(lambda attribute: COORDINATE.sub(short, attribute[0]), drawing)
 
 
 def draw(axes: Axes, x: Array, curves: Mapping[str, Array], **words: Any) -> None:
@@ -115,7 +115,7 @@ def extremes(y: Array) -> NDArray[np.intp]:
         return np.arange(len(y))
     stretches = np.array_split(np.arange(len(y)), MOST_POINTS // 2)
     filled = np.nan_to_num(y)
-    found = {0, len(y) - 1}
+    results = {0, len(y) - 1}
     for stretch in stretches:
-        found |= {int(stretch[np.argmin(filled[stretch])]), int(stretch[np.argmax(filled[stretch])])}
-    return np.array(sorted(found))
+        results |= {int(stretch[np.argmin(filled[stretch])]), int(stretch[np.argmax(filled[stretch])])}
+    return np.array(sorted(results))

@@ -84,7 +84,7 @@ def source_of(sources: dict[str, dict[str, Source]], table: str, row: Row) -> So
 
 def value(numbers: Numbers, path: str) -> float:
     """One number of the record of measurements."""
-    found: Any = numbers
+    result: Any = numbers
     for name in path.split("."):
-        found = found[int(name)] if isinstance(found, list) else found[name]
-    return float(found)
+        result = result[int(name)] if isinstance(result, list) else result[name]
+    return float(result)

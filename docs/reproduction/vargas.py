@@ -20,11 +20,11 @@ ZOOMS = {2: ((0.05, 0.23), (-0.15, 0.15)), 3: ((-0.4, 0.3), (-0.4, 0.3))}  # [m]
 
 def measure(case: int) -> Numbers:
     """Solve one case by all methods, draw it and say what comes out."""
-    found = {method: curves(paper_cell(f"vargas_case_{case}", method=method)) for method in METHODS}
-    _draw(case, found)
-    numbers: Numbers = {method: _of_one(run) for method, run in found.items()}
-    settled = found["damped_least_squares"].after(SETTLED)
-    places = np.stack([run.actual[settled] for run in found.values()])
+    result = {method: curves(paper_cell(f"vargas_case_{case}", method=method)) for method in METHODS}
+    _draw(case, result)
+    numbers: Numbers = {method: _of_one(run) for method, run in result.items()}
+    settled = result["damped_least_squares"].after(SETTLED)
+    places = np.stack([run.actual[settled] for run in result.values()])
     numbers["apart_mm"] = 1e3 * max(
         float(np.linalg.norm(a - b, axis=1).max()) for i, a in enumerate(places) for b in places[i + 1 :]
     )
@@ -65,11 +65,11 @@ def nearest(places: Array) -> float:
     return float(np.linalg.norm(places[:, :2], axis=1).min())
 
 
-def _draw(case: int, found: dict[str, Curves]) -> None:
+def _draw(case: int, result: dict[str, Curves]) -> None:
     """Paths, error norm, conditioning and joint speeds, as in figures 5 to 15."""
     sheet = Sheet(3, 2) if case > 1 else Sheet(2, 2)
-    first = found["damped_least_squares"]
-    named: dict[str, Curves] = {METHODS[method]: run for method, run in found.items()}
+    first = result["damped_least_squares"]
+    named: dict[str, Curves] = {METHODS[method]: run for method, run in result.items()}
     numeral = "I" * case
     path_curve(
         sheet.panel(f"case {numeral}: paths", "x [m]", "y [m]"),
@@ -91,6 +91,6 @@ def _draw(case: int, found: dict[str, Curves]) -> None:
         fastest = {name: np.asarray(np.abs(run.qd).max(axis=1)) for name, run in named.items()}
         draw(sheet.panel(f"case {numeral}: fastest joint", "time [s]", "speed [rad/s]"), first.between, fastest)
     axes = sheet.panel(f"case {numeral}: joint speeds, filtered inverse II", "time [s]", "speed [rad/s]")
-    second = found["filtered_inverse_ii"]
+    second = result["filtered_inverse_ii"]
     draw_joints(axes, second.between, second.qd, NAMES)
     sheet.save(f"vargas_case_{case}")

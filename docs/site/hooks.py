@@ -69,7 +69,7 @@ def on_page_markdown(markdown: str, *, page: Page, **_: object) -> str:
 def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
     """Write formulas as MathML, which browsers draw without a script; let messages and long names be broken."""
 
-    def drawn(match: re.Match[str]) -> str:
+    def figure(match: re.Match[str]) -> str:
         display = "block" if match["tag"] == "div" else "inline"
         try:
             formula = convert(html.unescape(match["tex"]).strip(), display=display)
@@ -80,7 +80,7 @@ def on_page_content(html_text: str, *, page: Page, **_: object) -> str:
         return f'<span class="formula">{formula}</span>' if display == "block" else formula
 
     broken = LONG_NAME.sub(lambda match: SEAM.sub("<wbr>", match[0]), MESSAGE.sub('<div class="message ', html_text))
-    return FORMULA.sub(drawn, broken)
+    return FORMULA.sub(figure, broken)
 
 
 def navigation(index: Path) -> list[dict[str, Any]]:

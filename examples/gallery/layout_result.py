@@ -20,15 +20,15 @@ if __name__ == "__main__":  # the processes of the search import this file
         vary=("right.base={x_mm: [1500, 2300], y_mm: [0, 600]}",),
         margin=10.0,
     )
-    found = search_layout(request, FOLDER, stop=Stop(trials=1))
-    print(found)
+    result = search_layout(request, FOLDER, stop=Stop(trials=1))
+    print(result)
 
     # %%
-    variables = found.to_frame("variables")
+    variables = result.to_frame("variables")
     variables["moved"] = variables["best"] - variables["given"]
     print(variables[["name", "unit", "given", "best", "moved"]].round(1).to_string(index=False))
 
     # %%
-    top = found.to_frame("top")
+    top = result.to_frame("top")
     print(top[["trial", "status", "cycle_s", "margin_deg", "clearance_mm"]].round(2).to_string(index=False))
     print(f"solved again: passed {solve(load_cell(FOLDER / 'best.yaml')).passed}")

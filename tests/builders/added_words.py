@@ -10,8 +10,8 @@ def words_in_a_picture(rng, copy):
     """A picture, in its file and on the page alike, that says or does more than the one that is drawn."""
     page = copy.run / "report.html"
     text = page.read_text(encoding="utf-8")
-    drawn = {path: path.read_text(encoding="utf-8") for path in sorted((copy.run / "plots").glob("*.svg"))}
-    picture, drawing = pick(rng, [(path, drawing) for path, drawing in drawn.items() if inline_svg(drawing) in text])
+    pictures = {path: path.read_text(encoding="utf-8") for path in sorted((copy.run / "plots").glob("*.svg"))}
+    picture, drawing = pick(rng, [(path, drawing) for path, drawing in pictures.items() if inline_svg(drawing) in text])
     old, new = pick(
         rng,
         (

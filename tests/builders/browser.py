@@ -31,7 +31,7 @@ TO_BROWSER, FROM_BROWSER = 3, 4  # file descriptors that Chromium reads and writ
 READY = (
     "new Promise((go) => { const look = () => document.body?.dataset.ready === 'true' ? go(1) : setTimeout(look, 20);"
 )
-DRAWN = "const drawn = () => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));"
+NEXT_FRAME = "const drawn = () => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));"
 
 
 class Browser:
@@ -101,10 +101,10 @@ class Browser:
 
     def run(self, script: str) -> Any:
         """What the body of an async function in the page returns; errors in it fail the test."""
-        text = f"(async () => {{ {DRAWN} {script} }})()"
-        found = self.command("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
-        assert "exceptionDetails" not in found, found["exceptionDetails"]
-        return found["result"].get("value")
+        text = f"(async () => {{ {NEXT_FRAME} {script} }})()"
+        reply = self.command("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in reply, reply["exceptionDetails"]
+        return reply["result"].get("value")
 
     def picture(self) -> Any:
         """The window as a picture, shape (height, width, 3), from 0 to 1."""

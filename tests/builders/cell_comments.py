@@ -13,15 +13,15 @@ def offered_choices(text: str) -> list[str]:
 
 def with_choice(text: str, line: str) -> str:
     """The cell with a commented line in force, in place of the line with the same key in the same mapping."""
-    found = CHOICE.match(line)
-    assert found is not None
+    match = CHOICE.match(line)
+    assert match is not None
     lines = text.splitlines()
     index = lines.index(line)
-    lines[index] = found["indent"] + found["line"]
-    start = re.compile(rf"{found['indent']}{found['key']}:")
+    lines[index] = match["indent"] + match["line"]
+    start = re.compile(rf"{match['indent']}{match['key']}:")
     for step in (-1, 1):
         place = index + step
-        while 0 <= place < len(lines) and lines[place].startswith(found["indent"]):
+        while 0 <= place < len(lines) and lines[place].startswith(match["indent"]):
             if start.match(lines[place]):
                 del lines[place]
                 return "\n".join(lines) + "\n"

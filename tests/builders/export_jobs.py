@@ -31,7 +31,8 @@ def zero_of(count: int, *, coupling: float = 1.0) -> ControllerZero:
 def drawn_limits(model: RobotModel, rng: np.random.Generator) -> RobotModel:
     """The model with limits that no short decimal meets."""
     joints = tuple(
-        replace(each, lower=-float(rng.uniform(1.0, 2.9)), upper=float(rng.uniform(1.0, 2.9))) for each in model.joints
+        replace(joint, lower=-float(rng.uniform(1.0, 2.9)), upper=float(rng.uniform(1.0, 2.9)))
+        for joint in model.joints
     )
     return replace(model, joints=joints)
 
@@ -40,8 +41,8 @@ def rail_model() -> RobotModel:
     """The arm on a rail along x: the rail is its first joint."""
     arm = arm_model()
     rail = joint("rail", -1, axis=(1.0, 0.0, 0.0), slides=True)
-    joints = (rail, *(replace(each, parent=each.parent + 1) for each in arm.joints))
-    bodies = tuple(replace(each, link=each.link + 1) for each in arm.bodies)
+    joints = (rail, *(replace(joint, parent=joint.parent + 1) for joint in arm.joints))
+    bodies = tuple(replace(body, link=body.link + 1) for body in arm.bodies)
     return replace(arm, name="elbow on a rail", joints=joints, bodies=bodies, flange_link=6)
 
 
@@ -74,11 +75,11 @@ def signals(names: Sequence[str]) -> dict[str, HandshakeEntry]:
 def cell_of(*robots: Robot, kind: KindName) -> Cell:
     """A cell whose robots have controllers of one kind, and handshake signals where there are several robots."""
     if len(robots) > 1:
-        own = signals([robot.name for robot in robots])
+        handshakes = signals([robot.name for robot in robots])
         robots = tuple(
             robot
             if robot.control is None or robot.control.handshake is not None
-            else replace(robot, control=robot.control.model_copy(update={"handshake": own[robot.name]}))
+            else replace(robot, control=robot.control.model_copy(update={"handshake": handshakes[robot.name]}))
             for robot in robots
         )
     names = dict.fromkeys(robot.control.id for robot in robots if robot.control is not None)
@@ -129,14 +130,14 @@ def job_of(
     cell: Cell, *programs: ProgramRows, promise: Promise = Promise.SEQUENCE_ONLY, **changes: object
 ) -> ExportJob:
     """A job of programs for all robots of a cell; changes are of the job, ``split`` and ``robots`` of its frame."""
-    own = {key: changes.pop(key) for key in ("split", "robots") if key in changes}
+    options = {key: changes.pop(key) for key in ("split", "robots") if key in changes}
     frame = ExportFrame(
         cell=cell,
         robots=tuple(robot.name for robot in cell.robots),
         programs=tuple(program.name for program in programs),
         promise=promise,
     )
-    job = ExportJob(frame=replace(frame, **own), programs=programs, notes=(f"promise: {promise}",))  # type: ignore[arg-type]
+    job = ExportJob(frame=replace(frame, **options), programs=programs, notes=(f"promise: {promise}",))  # type: ignore[arg-type]
     return replace(job, **changes)  # type: ignore[arg-type]
 
 

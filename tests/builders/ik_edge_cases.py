@@ -33,7 +33,7 @@ class Situation:
 
 def planar(
     start: Sequence[float],
-    way: Sequence[float],
+    twist: Sequence[float],
     *,
     axes: Sequence[int] = (0, 1),
     links: Sequence[float] = LINKS,
@@ -42,19 +42,19 @@ def planar(
     joint: Callable[[Joint], Joint] = lambda joint: joint,
     **solver: object,
 ) -> Situation:
-    """A planar arm whose tip goes straight from its start, by ``way`` in [m], and turns by ``turn``."""
+    """A planar arm whose tip goes straight from its start, by ``twist`` in [m], and turns by ``turn``."""
     model = dh_arm([(length, 0.0, 0.0) for length in links])
-    model = replace(model, joints=tuple(joint(each) for each in model.joints))
+    model = replace(model, joints=tuple(joint(entry) for entry in model.joints))
     cell = arm_cell(model, method="weighted_pseudo_inverse", axes=axes)
-    return straight(cell, start, [*way, 0.0, 0.0, turn], step=step, **solver)
+    return straight(cell, start, [*twist, 0.0, 0.0, turn], step=step, **solver)
 
 
 def puma(
-    start: Sequence[float], way: Sequence[float], *, axes: Sequence[int] = range(6), **solver: object
+    start: Sequence[float], twist: Sequence[float], *, axes: Sequence[int] = range(6), **solver: object
 ) -> Situation:
-    """An arm of six joints with a spherical wrist; ``way`` is a displacement in [m] and a rotation vector in [rad]."""
+    """An arm of six joints with a spherical wrist; ``twist``: displacement in [m] and rotation vector in [rad]."""
     cell = arm_cell(dh_arm(PUMA), method="weighted_pseudo_inverse", axes=tuple(axes))
-    return straight(cell, start, way, step=STEP, **solver)
+    return straight(cell, start, twist, step=STEP, **solver)
 
 
 def pair(*, joints: int = 6, moving: Sequence[str] = ("holder", "op0"), weights: object = None) -> Situation:
@@ -66,7 +66,7 @@ def pair(*, joints: int = 6, moving: Sequence[str] = ("holder", "op0"), weights:
     return replace(straight(cell, start, [0.01, 0.005, 0.0, 0.0, 0.02, 0.0], step=STEP), moving=tuple(moving))
 
 
-def straight(cell: Cell, start: Sequence[float], way: Sequence[float], *, step: float, **solver: object) -> Situation:
+def straight(cell: Cell, start: Sequence[float], twist: Sequence[float], *, step: float, **solver: object) -> Situation:
     """All tools along the same screw in the part, from where they are at the start, at constant speed."""
     q = np.array(start, dtype=float)
     times = np.arange(STEPS + 1) * step
@@ -74,12 +74,12 @@ def straight(cell: Cell, start: Sequence[float], way: Sequence[float], *, step: 
     tasks = []
     for task in cell.tasks:
         X_0 = tool_on_part(cell, task.robot, q[None])[0]
-        R = np.stack([rotation_exp(s * np.asarray(way[3:])) for s in share]) @ X_0[:3, :3]
+        R = np.stack([rotation_exp(s * np.asarray(twist[3:])) for s in share]) @ X_0[:3, :3]
         tasks.append(
             TaskSchedule(
                 task=task,
-                X_PT=pose_from(R, X_0[:3, 3] + share[:, None] * np.asarray(way[:3])),
-                V_PT_P=np.tile(np.asarray(way) / times[-1], (len(times), 1)),
+                X_PT=pose_from(R, X_0[:3, 3] + share[:, None] * np.asarray(twist[:3])),
+                V_PT_P=np.tile(np.asarray(twist) / times[-1], (len(times), 1)),
                 travelled=times,
                 length=1.0,
                 end=float(times[-1]),

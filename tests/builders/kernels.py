@@ -70,8 +70,8 @@ def probed(variables: Mapping[str, str]) -> tuple[list[str], list[str]]:
         text=True,
         timeout=LIMIT_S,
     )
-    found, taken = json.loads(done.stdout)
-    return found, taken
+    kernel, taken = json.loads(done.stdout)
+    return kernel, taken
 
 
 def hindrance(kernel: str) -> str | None:
@@ -81,14 +81,16 @@ def hindrance(kernel: str) -> str | None:
         RuntimeError: The process that was to tell has failed for another reason.
     """
     try:
-        found, taken = probed(environment(kernel))
+        result, taken = probed(environment(kernel))
     except subprocess.CalledProcessError as error:
         if error.returncode > 0:  # no signal of the processor: the environment lacks something
             raise RuntimeError(f"cannot ask for the kernel {kernel}: {error.stderr.strip().splitlines()[-1]}") from None
         return f"the processor cannot: signal {-error.returncode}"
     if kernel == BASELINE:
         return f"NumPy still takes {', '.join(taken)}" if taken else None
-    return None if found == [kernel] else f"OpenBLAS reports {', '.join(found) or 'nothing: NumPy has another library'}"
+    return (
+        None if result == [kernel] else f"OpenBLAS reports {', '.join(result) or 'nothing: NumPy has another library'}"
+    )
 
 
 def require_expected() -> None:

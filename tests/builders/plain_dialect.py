@@ -40,7 +40,7 @@ def job_of(run: VerifiedRun, programs: Sequence[ProgramRows], *, promise: Promis
 
 def read_back(job: ExportJob, *, decimals: int, with_times: bool = True) -> tuple[ProgramRows, ...]:
     """What a reader finds: rows rounded to decimals of a degree or millimetre, times to a microsecond."""
-    found = []
+    programs = []
     for program in job.programs:
         robots = {}
         for name, rows in program.robots.items():
@@ -48,5 +48,5 @@ def read_back(job: ExportJob, *, decimals: int, with_times: bool = True) -> tupl
             q = from_numbers(robot, to_numbers(robot, rows.q, decimals=decimals))
             times = np.round(rows.times, 6) if with_times and rows.times is not None else None
             robots[name] = replace(rows, q=q, times=times)
-        found.append(replace(program, robots=robots))
-    return tuple(found)
+        programs.append(replace(program, robots=robots))
+    return tuple(programs)

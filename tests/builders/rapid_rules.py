@@ -12,34 +12,34 @@ class Moves(NamedTuple):
     """Moves of a program in their order, and where those are that run together with others."""
 
     places: list[int]
-    found: list[re.Match[str]]
+    matches: list[re.Match[str]]
     on: int
     off: int
 
     @property
     def inside(self) -> list[re.Match[str]]:
-        return [found for place, found in zip(self.places, self.found, strict=True) if self.on < place < self.off]
+        return [match for place, match in zip(self.places, self.matches, strict=True) if self.on < place < self.off]
 
     @property
     def outside(self) -> list[re.Match[str]]:
-        return [found for place, found in zip(self.places, self.found, strict=True) if not self.on < place < self.off]
+        return [match for place, match in zip(self.places, self.matches, strict=True) if not self.on < place < self.off]
 
     def before(self, line: int) -> re.Match[str] | None:
-        earlier = [found for place, found in zip(self.places, self.found, strict=True) if place < line]
+        earlier = [match for place, match in zip(self.places, self.matches, strict=True) if place < line]
         return earlier[-1] if earlier else None
 
 
 def text_of(files: Mapping[str, str], module: str) -> list[str]:
     """Lines of a robot's program, its pages in their places."""
-    found: list[str] = []
+    words: list[str] = []
     for line in files[f"{module}.mod"].split("\r\n"):
         if page := re.fullmatch(r"    (page_(\d+));", line):
             other = files[f"{module}_{page[2]}.mod"].split("\r\n")
             start = other.index(f"  PROC {page[1]}()")
-            found += other[start + 1 : other.index("  ENDPROC")]
+            words += other[start + 1 : other.index("  ENDPROC")]
         else:
-            found.append(line)
-    return found
+            words.append(line)
+    return words
 
 
 def rules_broken(files: Mapping[str, str], tasks: Mapping[str, str]) -> list[str]:
@@ -52,9 +52,9 @@ def rules_broken(files: Mapping[str, str], tasks: Mapping[str, str]) -> list[str
         if len(on) != 1 or len(off) != 1 or not on[0] < off[0]:
             return [f"{module}: On and Off"]
         places = [k for k, line in enumerate(lines) if MOVE.match(line)]
-        moves = Moves(places, [found for k in places if (found := MOVE.match(lines[k]))], on[0], off[0])
+        moves = Moves(places, [move for k in places if (move := MOVE.match(lines[k]))], on[0], off[0])
         broken += [f"{module}: {what}" for what in [*moves_broken(moves), *references_broken(lines, moves)]]
-        moves_of.add(tuple((found[3], found[5]) for found in moves.inside))
+        moves_of.add(tuple((move[3], move[5]) for move in moves.inside))
         listed = re.search(r"PERS tasks \w+\{(\d+)\} := (\[\[.*\]\]);", "\n".join(lines))
         lists.add(listed[2] if listed else "")
         if listed is None or f'"{task}"' not in listed[2] or listed[2].count('"') != 2 * int(listed[1]):
@@ -66,14 +66,14 @@ def rules_broken(files: Mapping[str, str], tasks: Mapping[str, str]) -> list[str
 
 def moves_broken(moves: Moves) -> list[str]:
     """Rules for the moves of one task."""
-    numbers = [found[3] for found in moves.inside]
+    numbers = [move[3] for move in moves.inside]
     stops = [moves.before(moves.on), moves.before(moves.off)]
     rules = {
         "a move without ID between On and Off": None in numbers,
-        "an ID outside": any(found[3] is not None for found in moves.outside),
+        "an ID outside": any(move[3] is not None for move in moves.outside),
         "no stop point before On or Off": any(stop is None or stop[6] != "fine" for stop in stops),
         "an ID twice": len(set(numbers)) != len(numbers),
-        "a move without its duration": any(found[5] is None or float(found[5]) <= 0.0 for found in moves.inside),
+        "a move without its duration": any(move[5] is None or float(move[5]) <= 0.0 for move in moves.inside),
     }
     return [rule for rule, is_broken in rules.items() if is_broken]
 
@@ -82,7 +82,7 @@ def references_broken(lines: list[str], moves: Moves) -> list[str]:
     """Names that are used and not declared."""
     text = "\n".join(lines)
     declared = set(re.findall(r"^  (?:VAR|PERS|CONST) \w+ (\w+)", text, re.MULTILINE))
-    used = {name for found in moves.found for name in (found[4], found[6], found[7]) if name}
+    used = {name for move in moves.matches for name in (move[4], move[6], move[7]) if name}
     used |= set(re.findall(r"\w+", lines[moves.on])) | set(re.findall(r"\w+", lines[moves.off]))
     used |= set(re.findall(r"\\WObj:=(\w+)", text))
     missing = used - declared - LANGUAGE - {"SyncMoveOn", "SyncMoveOff"}

@@ -92,9 +92,9 @@ def sign(copy: Copy) -> None:
     texts = {name: copy.table(name).read_text(encoding="utf-8") for name in record["joints"]}
     now = {"cell": record["inputs"]["small.yaml"], "program": program_digest(texts)}
     for name, text in texts.items():
-        own = re.sub("# cell digest: sha256 .*", f"# cell digest: sha256 {now['cell']}", text)
-        own = re.sub("# program digest: sha256 .*", f"# program digest: sha256 {now['program']}", own)
-        copy.table(name).write_text(own, encoding="utf-8")
+        signed = re.sub("# cell digest: sha256 .*", f"# cell digest: sha256 {now['cell']}", text)
+        signed = re.sub("# program digest: sha256 .*", f"# program digest: sha256 {now['program']}", signed)
+        copy.table(name).write_text(signed, encoding="utf-8")
     clock = copy.table("clock")
     text = re.sub("# program digest: sha256 .*", f"# program digest: sha256 {now['program']}", clock.read_text())
     clock.write_text(text, encoding="utf-8")

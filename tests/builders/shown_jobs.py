@@ -55,7 +55,7 @@ def arm_and_positioner() -> ExportJob:
     cell = multimove_cell({"weld": _named("arm"), "table": positioner_model()})
     torch = Tool(X_FT=pose((0.0, 0.0, 0.15)), bodies=(), mass=1.5)
     cell = replace(
-        cell, robots=tuple(replace(each, tool=torch) if each.name == "weld" else each for each in cell.robots)
+        cell, robots=tuple(replace(robot, tool=torch) if robot.name == "weld" else robot for robot in cell.robots)
     )
     times = np.arange(4) * STEP
     rows = {"weld": _rows("weld", ARMS["weld"], times=times), "table": _rows("table", TABLE, times=times)}
@@ -106,7 +106,7 @@ def servoed_arm() -> ExportJob:
 def _named(name: str) -> RobotModel:
     """An arm whose joints are called as on a controller."""
     arm = arm_model()
-    return replace(arm, name=name, joints=tuple(replace(each, name=each.name.upper()) for each in arm.joints))
+    return replace(arm, name=name, joints=tuple(replace(joint, name=joint.name.upper()) for joint in arm.joints))
 
 
 def _rows(robot: str, q: object, *, times: Array, **others: object) -> RobotRows:

@@ -66,7 +66,7 @@ _state = _State()
 
 
 @contextmanager
-def kept(folder: Path) -> Iterator[None]:
+def stored(folder: Path) -> Iterator[None]:
     """Keep solutions in a folder, and take them from there, while the ``with`` statement lasts."""
     folder.mkdir(parents=True, exist_ok=True)
     if not _state.names:
@@ -92,9 +92,9 @@ def solved_anew() -> Iterator[None]:
 
 def _install() -> None:
     """Import the whole package, put the memo into ``solve`` and remember what every name stands for."""
-    for found in pkgutil.walk_packages(cellplan.__path__, "cellplan."):
-        if not found.name.endswith("__main__"):
-            importlib.import_module(found.name)
+    for result in pkgutil.walk_packages(cellplan.__path__, "cellplan."):
+        if not result.name.endswith("__main__"):
+            importlib.import_module(result.name)
     module = importlib.import_module("cellplan.pipeline.solve")
     module.solve_motion, module.certified = _motion(module.solve_motion), _clearance(module.certified)
     _state.names = _package_names()

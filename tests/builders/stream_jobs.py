@@ -60,8 +60,8 @@ def smooth_program(
     rng, robots = np.random.default_rng(seed), {}
     stops = (REST, *rests, end - REST)
     for robot in cell.robots:
-        own = cycle[robot.name] if isinstance(cycle, dict) else cycle
-        times = np.arange(round(end / own) + 1) * own
+        rows = cycle[robot.name] if isinstance(cycle, dict) else cycle
+        times = np.arange(round(end / rows) + 1) * rows
         robots[robot.name] = smooth_rows(robot, times, stops=stops, rng=rng)
     return ProgramRows(name=name, robots=robots)
 
@@ -83,15 +83,15 @@ def cell_for(kind: KindName, *, seed: int = 0, cycle: float = 0.004, decimals: i
 
 def with_latency(cell: Cell, latency_ms: float | None) -> Cell:
     """The cell with one latency of all controllers."""
-    own = {name: controller.changed(latency_ms=latency_ms) for name, controller in cell.controllers.items()}
-    return replace(cell, controllers=own)
+    controllers = {name: controller.changed(latency_ms=latency_ms) for name, controller in cell.controllers.items()}
+    return replace(cell, controllers=controllers)
 
 
 def timed_job(kind: KindName = "kuka", *, seed: int = 0, **changes: object) -> ExportJob:
     """A timed job of the three robots of ``cell_for``; changes are of the program first, then of the job."""
-    own = {key: changes.pop(key) for key in ("cycle", "end", "rests", "name") if key in changes}
+    options = {key: changes.pop(key) for key in ("cycle", "end", "rests", "name") if key in changes}
     cell = cell_for(kind, seed=seed)
-    return job_of(cell, smooth_program(cell, seed=seed, **own), promise=Promise.TIMED, **changes)
+    return job_of(cell, smooth_program(cell, seed=seed, **options), promise=Promise.TIMED, **changes)
 
 
 def ur_cell(*, robots: int = 1, seed: int = 0, cycle: float = 0.008, decimals: int | None = None) -> Cell:
@@ -115,11 +115,11 @@ def round_trip(dialect: Dialect, job: ExportJob) -> tuple[dict[str, str], tuple[
 
 def largest_error(job: ExportJob, read: Sequence[ProgramRows], robot: str) -> Array:
     """Largest difference of each joint in [rad] or [m] between a job and what was read, shape (n,)."""
-    own = [
+    errors = [
         np.abs(mine.robots[robot].q - other.robots[robot].q).max(axis=0)
         for mine, other in zip(job.programs, read, strict=True)
     ]
-    return np.max(own, axis=0)
+    return np.max(errors, axis=0)
 
 
 def is_within_limits(robot: Robot, q: Array) -> bool:

@@ -65,8 +65,8 @@ def _edited_number(text: str, rng: np.random.Generator, change: Callable[[str], 
     if place is None:
         return None
     line = _lines(text)[place]
-    found = list(NUMBER.finditer(line))
-    chosen = found[int(rng.integers(len(found)))]
+    matches = list(NUMBER.finditer(line))
+    chosen = matches[int(rng.integers(len(matches)))]
     return _edit(text, place, line[: chosen.start()] + change(chosen.group()) + line[chosen.end() :])
 
 
@@ -144,8 +144,8 @@ def rename_a_reference(text: str, rng: np.random.Generator) -> str | None:
     if place is None:
         return None
     line = _lines(text)[place]
-    found = list(WORD.finditer(line))
-    chosen = found[int(rng.integers(len(found)))]
+    matches = list(WORD.finditer(line))
+    chosen = matches[int(rng.integers(len(matches)))]
     return _edit(text, place, f"{line[: chosen.end()]}zq{line[chosen.end() :]}")
 
 
@@ -159,8 +159,8 @@ def change_a_count(text: str, rng: np.random.Generator) -> str | None:
     if place is None:
         return None
     line = _lines(text)[place]
-    found = list(COUNT.finditer(line))
-    chosen = found[int(rng.integers(len(found)))]
+    matches = list(COUNT.finditer(line))
+    chosen = matches[int(rng.integers(len(matches)))]
     return _edit(text, place, line[: chosen.start()] + str(int(chosen.group()) + 1) + line[chosen.end() :])
 
 
@@ -176,8 +176,8 @@ def swap_numbers(text: str, rng: np.random.Generator) -> str | None:
     if place is None:
         return None
     line = _lines(text)[place]
-    found = list(NUMBER.finditer(line))
-    a, b = next((a, b) for a, b in pairwise(found) if a.group() != b.group())
+    matches = list(NUMBER.finditer(line))
+    a, b = next((a, b) for a, b in pairwise(matches) if a.group() != b.group())
     return _edit(text, place, line[: a.start()] + b.group() + line[a.end() : b.start()] + a.group() + line[b.end() :])
 
 

@@ -94,7 +94,7 @@ def shipped(name: str) -> Cell:
     return load_cell(SHIPPED / f"{name}.yaml")
 
 
-def found_start(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Array:
+def solved_start(scene: Scene, toolpaths: Mapping[str, Toolpath]) -> Array:
     """Stacked start configuration of the whole cell, its paths put on the clock."""
     return choose_start(scene, clock_paths(scene.cell, toolpaths.values())).start
 
@@ -117,9 +117,9 @@ def largest_error(case: Case, path: CollocatedPath, times: Array) -> float:
     place = np.clip(np.searchsorted(breaks, times, side="right"), 1, len(breaks) - 1)
     within = (breaks[place - 1], breaks[place])
     seen = seen_poses(case.cell, path.at(times))
-    desired = [each.at(times, within)[0] for each in case.schedule.paths]
+    desired = [path.at(times, within)[0] for path in case.schedule.paths]
     desired += [np.broadcast_to(grasp.X_PT, (len(times), 4, 4)) for grasp in closures(case.cell, case.moving)]
-    names = [each.task.name for each in case.schedule.paths]
+    names = [path.task.name for path in case.schedule.paths]
     judged = [task for task in relations(case.cell) if isinstance(task, Grasp) or task.name in names]
     worst = 0.0
     for index, (task, poses) in enumerate(zip(judged, desired, strict=True)):

@@ -63,12 +63,12 @@ class Toy:
             nodes=nodes[:count],
             values=np.full(count, value),
             demands=np.full(count, DEMAND),
-            is_own=np.zeros(count, dtype=bool),
+            within_robot=np.zeros(count, dtype=bool),
             detail=None,
         )
 
-    def distance_derivatives(self, point: Point, found: Distances, by_joints: PointDerivatives) -> Array:
-        return np.tile([-2.0 * point.x[0], 1.0], (len(found.pairs), 1))
+    def distance_derivatives(self, point: Point, distances: Distances, by_joints: PointDerivatives) -> Array:
+        return np.tile([-2.0 * point.x[0], 1.0], (len(distances.pairs), 1))
 
     def arms(self, point: Point) -> "Toy.Arms":
         """One arm whose least singular value is half of x1 at all times."""

@@ -13,9 +13,9 @@ from cellplan.geometry.transforms import Array, rotation_about
 
 def data_of(page: str) -> dict[str, Any]:
     """The record that a page carries."""
-    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, flags=re.DOTALL)
-    assert found is not None
-    return json.loads(found[1])
+    data = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, flags=re.DOTALL)
+    assert data is not None
+    return json.loads(data[1])
 
 
 def rows_of(motion: dict[str, Any]) -> tuple[Array, Array]:

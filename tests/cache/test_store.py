@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.cache import as_here, keep, key_of, nothing_kept, recall, store
+from cellplan.cache import as_here, keep, key_of, recall, store, without_cache
 from cellplan.cache.store import forget
 from cellplan.guard import Guard, in_child, isolated_call
 
 ARRAYS = (np.arange(12.0).reshape(4, 3), np.array([[0, 1, 2]]), np.array(True))
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("cache_folder")
 
 
 def only_entry(folder: Path) -> Path:
@@ -22,9 +22,9 @@ def only_entry(folder: Path) -> Path:
     return path
 
 
-def assert_same(found: tuple[np.ndarray, ...] | None) -> None:
-    assert found is not None
-    for one, other in zip(found, ARRAYS, strict=True):
+def assert_same(arrays: tuple[np.ndarray, ...] | None) -> None:
+    assert arrays is not None
+    for one, other in zip(arrays, ARRAYS, strict=True):
         assert (one.dtype, one.shape) == (other.dtype, other.shape)
         assert np.array_equal(one, other)
         assert not one.flags.writeable
@@ -46,10 +46,10 @@ def test_odd_numbers_come_back_bit_for_bit() -> None:
     keep(key_of("thing", b"odd"), (odd,))
     forget()
 
-    found = recall(key_of("thing", b"odd"))
+    recalled = recall(key_of("thing", b"odd"))
 
-    assert found is not None
-    assert found[0].tobytes() == odd.tobytes()
+    assert recalled is not None
+    assert recalled[0].tobytes() == odd.tobytes()
 
 
 @pytest.mark.parametrize("contents", [(b"b", b"a"), (b"ab",), (b"", b"ab"), (b"a", b"b", b"")])
@@ -58,10 +58,10 @@ def test_other_contents_have_other_keys(contents: tuple[bytes, ...]) -> None:
     assert key_of("thing", b"a", b"b") != key_of("other", b"a", b"b")
 
 
-def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(own_cache: Path) -> None:
+def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(cache_folder: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    path = only_entry(own_cache)
+    path = only_entry(cache_folder)
     whole = path.read_bytes()
     injuries = [b"", whole[:-1], whole[: len(whole) // 2], whole + b"x", b"\0" * len(whole)]
     injuries += [whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in range(0, len(whole), 7)]
@@ -76,12 +76,12 @@ def test_every_damage_to_an_entry_makes_it_useless_and_nothing_else(own_cache: P
     assert_same(recall(key))
 
 
-def test_objects_are_neither_kept_nor_brought_to_life(own_cache: Path) -> None:
+def test_objects_are_neither_kept_nor_brought_to_life(cache_folder: Path) -> None:
     """An array of objects would be a pickle, which can run anything; a right digest does not make it welcome."""
     key = key_of("thing", b"content")
     keep(key, (np.array([{"a": 1}], dtype=object),))
     assert recall(key) is None
-    assert not own_cache.exists() or not list(own_cache.iterdir())
+    assert not cache_folder.exists() or not list(cache_folder.iterdir())
 
     import hashlib
     import io
@@ -89,43 +89,43 @@ def test_objects_are_neither_kept_nor_brought_to_life(own_cache: Path) -> None:
     body = io.BytesIO()
     np.lib.format.write_array(body, np.array([{"a": 1}], dtype=object), allow_pickle=True)
     keep(key, ARRAYS)
-    only_entry(own_cache).write_bytes(store.FORMAT + hashlib.sha256(body.getvalue()).digest() + body.getvalue())
+    only_entry(cache_folder).write_bytes(store.FORMAT + hashlib.sha256(body.getvalue()).digest() + body.getvalue())
     forget()
     assert recall(key) is None
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs files that its user may not read")
-def test_an_entry_that_cannot_be_read_is_none(own_cache: Path) -> None:
+def test_an_entry_that_cannot_be_read_is_none(cache_folder: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    only_entry(own_cache).chmod(0)
+    only_entry(cache_folder).chmod(0)
     forget()
 
     assert recall(key) is None
 
 
-def test_an_entry_that_is_a_folder_is_none(own_cache: Path) -> None:
+def test_an_entry_that_is_a_folder_is_none(cache_folder: Path) -> None:
     key = key_of("thing", b"content")
     keep(key, ARRAYS)
-    path = only_entry(own_cache)
+    path = only_entry(cache_folder)
     path.unlink()
     path.mkdir()
     forget()
 
     assert recall(key) is None
     keep(key, ARRAYS)
-    assert [path.suffix for path in own_cache.iterdir()] == [".entry"]
+    assert [path.suffix for path in cache_folder.iterdir()] == [".entry"]
 
 
 def test_the_folder_stays_within_its_bounds_and_loses_what_was_not_used_for_longest(
-    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+    cache_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(store, "MAX_FOLDER", 5500)
     keys = [key_of("thing", bytes([number])) for number in range(4)]
     for age, key in enumerate(keys[:3]):
         keep(key, (np.full(200, float(age)),))  # 1.6 kB and a head
     for age, key in enumerate(keys[:3]):
-        os.utime(own_cache / f"thing-{key.digest}.entry", (1000.0 + age, 1000.0 + age))
+        os.utime(cache_folder / f"thing-{key.digest}.entry", (1000.0 + age, 1000.0 + age))
     forget()
     recall(keys[0])  # the oldest, but of use just now
 
@@ -135,11 +135,11 @@ def test_the_folder_stays_within_its_bounds_and_loses_what_was_not_used_for_long
     assert [recall(key) is not None for key in keys] == [True, False, True, True]
 
 
-def test_what_is_too_large_is_not_written(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_large_is_not_written(cache_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "MAX_ENTRY", 100)
     keep(key_of("thing", b"content"), ARRAYS)
 
-    assert not own_cache.exists() or not list(own_cache.iterdir())
+    assert not cache_folder.exists() or not list(cache_folder.iterdir())
 
 
 def test_a_process_holds_no_more_than_its_share(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +152,7 @@ def test_a_process_holds_no_more_than_its_share(monkeypatch: pytest.MonkeyPatch)
     assert [recall(key_of("thing", name)) is None for name in (b"1", b"2", b"3")] == [True, True, True]
 
 
-def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(own_cache: Path) -> None:
+def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(cache_folder: Path) -> None:
     code = (
         "import numpy as np; from cellplan.cache import *; from cellplan.cache.store import forget\n"
         "for n in range(200):\n"
@@ -162,7 +162,7 @@ def test_two_processes_that_write_the_same_entry_do_not_disturb_each_other(own_c
     processes = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
 
     assert [process.wait() for process in processes] == [0, 0]
-    assert sorted(path.suffix for path in own_cache.iterdir()) == [".entry"] * 5
+    assert sorted(path.suffix for path in cache_folder.iterdir()) == [".entry"] * 5
 
 
 def kept_entry(folder: Path) -> Path:
@@ -171,24 +171,24 @@ def kept_entry(folder: Path) -> Path:
     return only_entry(folder)
 
 
-def test_a_pipe_in_the_place_of_an_entry_is_not_waited_for(own_cache: Path) -> None:
-    path = kept_entry(own_cache)
+def test_a_pipe_in_the_place_of_an_entry_is_not_waited_for(cache_folder: Path) -> None:
+    path = kept_entry(cache_folder)
     path.unlink()
     os.mkfifo(path)
 
     assert recall(key_of("thing", b"content")) is None
 
 
-def test_a_link_in_the_place_of_an_entry_is_not_followed(own_cache: Path, tmp_path: Path) -> None:
-    path = kept_entry(own_cache)
+def test_a_link_in_the_place_of_an_entry_is_not_followed(cache_folder: Path, tmp_path: Path) -> None:
+    path = kept_entry(cache_folder)
     path.rename(tmp_path / "elsewhere")
     path.symlink_to(tmp_path / "elsewhere")
 
     assert recall(key_of("thing", b"content")) is None
 
 
-def test_an_entry_that_others_may_write_is_not_used(own_cache: Path) -> None:
-    path = kept_entry(own_cache)
+def test_an_entry_that_others_may_write_is_not_used(cache_folder: Path) -> None:
+    path = kept_entry(cache_folder)
     path.chmod(0o666)
     assert recall(key_of("thing", b"content")) is None
 
@@ -197,30 +197,30 @@ def test_an_entry_that_others_may_write_is_not_used(own_cache: Path) -> None:
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only the superuser can give a file away")
-def test_an_entry_of_somebody_else_is_not_used(own_cache: Path) -> None:
-    os.chown(kept_entry(own_cache), 4711, -1)
+def test_an_entry_of_somebody_else_is_not_used(cache_folder: Path) -> None:
+    os.chown(kept_entry(cache_folder), 4711, -1)
 
     assert recall(key_of("thing", b"content")) is None
 
 
-def test_without_the_cache_only_what_this_process_made_is_used(own_cache: Path) -> None:
-    kept_entry(own_cache)
+def test_without_the_cache_only_what_this_process_made_is_used(cache_folder: Path) -> None:
+    kept_entry(cache_folder)
     assert_same(recall(key_of("thing", b"content")))  # held from now on, but it came from the folder
 
-    with nothing_kept():
+    with without_cache():
         assert recall(key_of("thing", b"content")) is None
         keep(key_of("thing", b"other"), ARRAYS)
         assert_same(recall(key_of("thing", b"other")))
 
     assert_same(recall(key_of("thing", b"content")))
-    assert len(list(own_cache.iterdir())) == 1
+    assert len(list(cache_folder.iterdir())) == 1
 
 
-def test_a_child_process_does_without_the_cache_where_its_parent_does(own_cache: Path) -> None:
+def test_a_child_process_does_without_the_cache_where_its_parent_does(cache_folder: Path) -> None:
     guard = Guard(file="thing", worker="the worker")
-    kept_entry(own_cache)
+    kept_entry(cache_folder)
     isolated_call._end_child()  # the next one knows this cache
 
-    with nothing_kept():
+    with without_cache():
         assert in_child(as_here(recall), key_of("thing", b"content"), guard=guard) is None
     assert in_child(as_here(recall), key_of("thing", b"content"), guard=guard) is not None

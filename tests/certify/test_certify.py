@@ -48,12 +48,12 @@ def test_the_minimum_of_two_passing_balls_is_the_gap_between_them() -> None:
     assert STEP * pair.at == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize(("demand", "is_kept"), [(0.0, True), (GAP - EXACT, True), (GAP + 1e-6, False), (0.2, False)])
+@pytest.mark.parametrize(("demand", "is_met"), [(0.0, True), (GAP - EXACT, True), (GAP + 1e-6, False), (0.2, False)])
 @pytest.mark.parametrize("with_minimum", [True, False])
-def test_a_demand_is_kept_up_to_the_gap(demand: float, is_kept: bool, with_minimum: bool) -> None:
+def test_a_demand_is_kept_up_to_the_gap(demand: float, is_met: bool, with_minimum: bool) -> None:
     scene, q = passing_ball()
 
-    assert certify(scene, q, demand, with_minimum=with_minimum).is_kept is is_kept
+    assert certify(scene, q, demand, with_minimum=with_minimum).is_met is is_met
 
 
 @pytest.mark.parametrize("with_minimum", [True, False])
@@ -62,7 +62,7 @@ def test_bodies_that_touch_keep_no_demand(with_minimum: bool) -> None:
 
     bound = certify(scene, q, 0.0, with_minimum=with_minimum)
 
-    assert not bound.is_kept
+    assert not bound.is_met
     assert bound.minimum == 0.0
 
 
@@ -76,7 +76,7 @@ def test_the_verdict_alone_is_that_of_the_whole_search_with_fewer_queries(seed: 
 
     for demand in (0.5 * bound.minimum, 2.0 * bound.minimum + 0.01):
         scene = Scene.from_cell(cell)
-        verdict = certify(scene, q, demand, with_minimum=False).is_kept
+        verdict = certify(scene, q, demand, with_minimum=False).is_met
         assert verdict is (is_free and demand <= bound.minimum)
         assert scene.engine.queries.distances < whole.engine.queries.distances
 
@@ -87,7 +87,7 @@ def test_nothing_is_claimed_of_blocks_after_the_verdict(monkeypatch: pytest.Monk
 
     bound = certify(scene, q, 0.2, with_minimum=False)
 
-    assert not bound.is_kept
+    assert not bound.is_met
     assert np.all(np.isneginf(bound.low[:, -1]))
     assert np.all(np.isfinite(bound.low[:, 0]))
 

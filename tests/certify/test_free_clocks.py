@@ -30,8 +30,8 @@ def passing(demand: float = 0.01) -> tuple[Scene, Array]:
         placed("two", ball, base=pose((0.0, 2.0 * RADIUS + GAP, 0.0))),
         checks=ChecksEntry(clearance_mm=1e3 * demand, contact_zone_mm=0.0),
     )
-    way = 0.04 * np.arange(41)
-    return Scene.from_cell(cell), np.column_stack([way, way + 0.8])
+    positions = 0.04 * np.arange(41)
+    return Scene.from_cell(cell), np.column_stack([positions, positions + 0.8])
 
 
 def bound_of(scene: Scene, q: Array, rectangles: Array, *, with_minimum: bool = True) -> RegionBound:
@@ -47,14 +47,14 @@ def balls_apart(ahead: float) -> float:
 def test_two_balls_are_nearest_where_they_pass_if_any_places_may_meet() -> None:
     scene, q = passing()
 
-    found = bound_of(scene, q, np.array([[0.0, 40.0, 0.0, 40.0]]))
+    bound = bound_of(scene, q, np.array([[0.0, 40.0, 0.0, 40.0]]))
 
-    assert GAP - MINIMUM_TOL <= found.proved <= found.distance + 1e-12
-    assert GAP - EXACT <= found.distance <= GAP + MINIMUM_TOL
-    assert found.bodies == ("one/block", "two/block")
-    assert found.at is not None
-    assert found.at[0] == pytest.approx(found.at[1] + 20.0, abs=1.0)  # 0.8 m are 20 steps
-    assert found.is_kept
+    assert GAP - MINIMUM_TOL <= bound.proved <= bound.distance + 1e-12
+    assert GAP - EXACT <= bound.distance <= GAP + MINIMUM_TOL
+    assert bound.bodies == ("one/block", "two/block")
+    assert bound.at is not None
+    assert bound.at[0] == pytest.approx(bound.at[1] + 20.0, abs=1.0)  # 0.8 m are 20 steps
+    assert bound.is_met
 
 
 @pytest.mark.parametrize("late", [0.0, 0.2, 0.7])
@@ -62,22 +62,22 @@ def test_balls_of_constant_speed_come_as_near_as_the_skew_brings_them(late: floa
     scene, q = passing()
     times = STEP * np.arange(len(q))
 
-    found = bound_of(scene, q, band(times, -late, late))
+    bound = bound_of(scene, q, band(times, -late, late))
 
     ahead = 0.8 - 0.8 * late  # [m] at 0.8 m/s
     widest = max(2.0 * late / 8.0, times[-1] / 2000.0)  # [s] by which a rectangle reaches beyond the band
-    assert balls_apart(ahead - 0.8 * widest) - MINIMUM_TOL <= found.proved <= balls_apart(ahead) + EXACT
+    assert balls_apart(ahead - 0.8 * widest) - MINIMUM_TOL <= bound.proved <= balls_apart(ahead) + EXACT
 
 
-@pytest.mark.parametrize(("demand", "is_kept"), [(GAP - 2 * EXACT, True), (GAP + 1e-5, False)])
+@pytest.mark.parametrize(("demand", "is_met"), [(GAP - 2 * EXACT, True), (GAP + 1e-5, False)])
 @pytest.mark.parametrize("with_minimum", [True, False])
-def test_a_demand_is_kept_up_to_the_gap(demand: float, is_kept: bool, with_minimum: bool) -> None:
+def test_a_demand_is_kept_up_to_the_gap(demand: float, is_met: bool, with_minimum: bool) -> None:
     scene, q = passing(demand)
 
-    found = bound_of(scene, q, np.array([[0.0, 40.0, 0.0, 40.0]]), with_minimum=with_minimum)
+    bound = bound_of(scene, q, np.array([[0.0, 40.0, 0.0, 40.0]]), with_minimum=with_minimum)
 
-    assert found.is_kept is is_kept
-    assert (found.bodies is not None) or is_kept
+    assert bound.is_met is is_met
+    assert (bound.bodies is not None) or is_met
 
 
 def test_only_the_rectangles_of_a_region_count() -> None:
@@ -86,23 +86,23 @@ def test_only_the_rectangles_of_a_region_count() -> None:
     near = np.array([[22.0, 24.0, 2.0, 4.0]])
     far = np.array([[0.0, 8.0, 0.5, 8.5], [30.25, 40.0, 30.0, 40.0]])
 
-    assert not bound_of(scene, q, near).is_kept
-    assert bound_of(scene, q, far).is_kept
-    assert not bound_of(scene, q, np.concatenate([far, near])).is_kept
+    assert not bound_of(scene, q, near).is_met
+    assert bound_of(scene, q, far).is_met
+    assert not bound_of(scene, q, np.concatenate([far, near])).is_met
 
 
 def test_rows_of_robots_may_differ_in_number() -> None:
     scene, q = passing()
     rows = {"one": q[:, :1], "two": q[::8, 1:]}
 
-    found = certify_regions(
+    bound = certify_regions(
         scene, rows, [ClockRegion(first="two", second="one", rectangles=np.array([[0, 5, 0, 40]]))], with_minimum=True
     )[0]
 
-    assert GAP - MINIMUM_TOL <= found.proved <= GAP
-    assert found.bodies == ("one/block", "two/block")
-    assert found.at is not None
-    assert 8.0 * found.at[0] == pytest.approx(found.at[1] - 20.0, abs=1.0)
+    assert GAP - MINIMUM_TOL <= bound.proved <= GAP
+    assert bound.bodies == ("one/block", "two/block")
+    assert bound.at is not None
+    assert 8.0 * bound.at[0] == pytest.approx(bound.at[1] - 20.0, abs=1.0)
 
 
 def test_the_part_moves_with_its_first_holder() -> None:
@@ -115,10 +115,10 @@ def test_the_part_moves_with_its_first_holder() -> None:
     )
     q = np.array([[0.0, 0.0], [0.2, 0.0]])
 
-    found = bound_of(Scene.from_cell(cell), q, np.array([[0.0, 1.0, 0.0, 1.0]]))
+    bound = bound_of(Scene.from_cell(cell), q, np.array([[0.0, 1.0, 0.0, 1.0]]))
 
-    assert found.bodies == ("two/block", "part")
-    assert found.proved == pytest.approx(0.5 - 0.31, abs=MINIMUM_TOL)
+    assert bound.bodies == ("two/block", "part")
+    assert bound.proved == pytest.approx(0.5 - 0.31, abs=MINIMUM_TOL)
 
 
 def swings() -> tuple[Scene, Array]:
@@ -143,10 +143,10 @@ def swings() -> tuple[Scene, Array]:
 def test_two_planar_arms_meet_where_both_reach_out_to_each_other() -> None:
     scene, q = swings()
 
-    found = bound_of(scene, q, np.array([[0.0, 25.0, 0.0, 25.0]]))
+    bound = bound_of(scene, q, np.array([[0.0, 25.0, 0.0, 25.0]]))
 
-    assert 0.2 - MINIMUM_TOL <= found.proved <= 0.2
-    assert found.at == pytest.approx((12.5, 12.5), abs=1.5)
+    assert 0.2 - MINIMUM_TOL <= bound.proved <= 0.2
+    assert bound.at == pytest.approx((12.5, 12.5), abs=1.5)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -157,14 +157,14 @@ def test_no_place_of_a_random_program_is_nearer_than_what_is_proved(seed: int) -
     for first, second in list(combinations([robot.name for robot in scene.cell.robots], 2))[seed : seed + 1]:
         corners = np.sort(rng.uniform(0.0, 5.0, size=(2, 2, 2)), axis=2).reshape(2, 4)
         region = ClockRegion(first=first, second=second, rectangles=corners)
-        found = certify_regions(scene, q, [region], with_minimum=True)[0]
+        bound = certify_regions(scene, q, [region], with_minimum=True)[0]
         brute = smallest(scene, q, region, count=5)
-        assert found.proved <= brute
-        assert found.is_kept is (found.distance > 0.0)
-        assert found.is_kept or found.bodies is not None
-        assert brute > 0.0 or not found.is_kept
-        assert found.distance - found.proved <= MINIMUM_TOL + EXACT
-        assert found.distance <= brute + MINIMUM_TOL + EXACT
+        assert bound.proved <= brute
+        assert bound.is_met is (bound.distance > 0.0)
+        assert bound.is_met or bound.bodies is not None
+        assert brute > 0.0 or not bound.is_met
+        assert bound.distance - bound.proved <= MINIMUM_TOL + EXACT
+        assert bound.distance <= brute + MINIMUM_TOL + EXACT
 
 
 def smallest(scene: Scene, q: Array, region: ClockRegion, *, count: int) -> float:
@@ -202,7 +202,7 @@ def test_no_point_of_a_body_is_displaced_by_more_than_its_way(seed: int) -> None
         (R_a, p_a), (R_b, p_b) = motion.poses(bodies, a), motion.poses(bodies, b)
         moved = (vertices @ np.swapaxes(R_b - R_a, 1, 2)) + (p_b - p_a)[:, None]
         farthest = np.linalg.norm(moved, axis=2).max(axis=1)
-        assert np.all(farthest <= motion.way(bodies, b) - motion.way(bodies, a) + 1e-9)
+        assert np.all(farthest <= motion.travel(bodies, b) - motion.travel(bodies, a) + 1e-9)
 
 
 @pytest.mark.parametrize(("low", "high"), [(-0.1, 0.1), (0.0, 0.3), (-0.5, -0.5), (1.0, 5.0)])
@@ -229,7 +229,7 @@ def test_a_band_beyond_the_program_is_empty() -> None:
     empty = band(STEP * np.arange(41), 3.0, 4.0)
 
     assert empty.shape == (0, 4)
-    assert bound_of(scene, q, empty).is_kept
+    assert bound_of(scene, q, empty).is_met
 
 
 @pytest.mark.parametrize(

@@ -42,10 +42,10 @@ def test_balls_of_one_speed_may_be_shifted_until_they_are_as_near_as_is_demanded
     left = np.sqrt((2.0 * RADIUS + demand) ** 2 - (2.0 * RADIUS + GAP) ** 2)  # [m] one may be ahead of the other
     allowed = (AHEAD - left) / SPEED
 
-    found = shift_of(demand, most=0.6)
+    shift = shift_of(demand, most=0.6)
 
-    assert allowed * (1.0 - SHIFT_SHARE) - SHIFT_TOL - 1e-3 <= found.shift <= allowed + 1e-4  # readings: 0.05 mm
-    assert found.bodies == ("one/block", "two/block")
+    assert allowed * (1.0 - SHIFT_SHARE) - SHIFT_TOL - 1e-3 <= shift.shift <= allowed + 1e-4  # readings: 0.05 mm
+    assert shift.bodies == ("one/block", "two/block")
 
 
 def test_nothing_limits_the_shift_of_what_never_comes_near() -> None:
@@ -63,20 +63,20 @@ def test_a_band_of_the_proved_shift_is_proved_as_a_region_too(seed: int) -> None
     times = 0.1 * np.arange(6)
     first, second = (robot.name for robot in scene.cell.robots[:2])
 
-    found = free_shift(FreeMotion(scene, q), times, first, second, most=0.4)
-    inside = ClockRegion(first=first, second=second, rectangles=band(times, -0.85 * found.shift, 0.85 * found.shift))
+    shift = free_shift(FreeMotion(scene, q), times, first, second, most=0.4)
+    inside = ClockRegion(first=first, second=second, rectangles=band(times, -0.85 * shift.shift, 0.85 * shift.shift))
 
-    assert found.shift == 0.0 or certify_regions(scene, q, [inside])[0].is_kept
-    assert (found.bodies is None) is (found.shift == 0.4)
+    assert shift.shift == 0.0 or certify_regions(scene, q, [inside])[0].is_met
+    assert (shift.bodies is None) is (shift.shift == 0.4)
 
 
 def test_a_robot_that_stands_still_allows_any_shift_of_what_passes_it() -> None:
     scene, q = passing(0.5 * GAP)
     q[:, 1] = 0.8
 
-    found = free_shift(FreeMotion(scene, q), TIMES, "one", "two", most=0.2)
+    shift = free_shift(FreeMotion(scene, q), TIMES, "one", "two", most=0.2)
 
-    assert found == ShiftBound(shift=0.2)
+    assert shift == ShiftBound(shift=0.2)
 
 
 def test_the_distance_on_one_clock_allows_a_shift_before_any_box_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,11 +85,11 @@ def test_the_distance_on_one_clock_allows_a_shift_before_any_box_is_read(monkeyp
     demand = 0.1
     apart = np.hypot(AHEAD, 2.0 * RADIUS + GAP) - 2.0 * RADIUS
 
-    found = shift_of(demand, most=0.6)
+    shift = shift_of(demand, most=0.6)
 
-    assert found.shift == pytest.approx((apart - demand) / SPEED, abs=2e-3)  # 1 mm of distance is left unproved
-    assert found.shift <= (apart - demand) / SPEED
-    assert found.bodies == ("one/block", "two/block")
+    assert shift.shift == pytest.approx((apart - demand) / SPEED, abs=2e-3)  # 1 mm of distance is left unproved
+    assert shift.shift <= (apart - demand) / SPEED
+    assert shift.bodies == ("one/block", "two/block")
 
 
 @pytest.mark.parametrize("demand", [0.06, 0.1])
@@ -103,7 +103,7 @@ def test_proving_the_distance_on_one_clock_first_leads_to_the_same_shift(
 
 
 def test_what_is_too_near_without_a_shift_is_found_there() -> None:
-    found = shift_of(AHEAD, most=0.2)
+    shift = shift_of(AHEAD, most=0.2)
 
-    assert found.at is not None
-    assert found.at[0] == found.at[1]
+    assert shift.at is not None
+    assert shift.at[0] == shift.at[1]

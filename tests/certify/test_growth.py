@@ -23,8 +23,8 @@ def scene() -> Scene:
 
 def apart(*distances: float) -> Array:
     """Rows in which the second disc is so far from the first, each distance signed, in [m]."""
-    way = np.interp(np.linspace(0, len(distances) - 1, 40), np.arange(len(distances)), distances)
-    return np.column_stack([np.zeros((40, 2)), RADII + way, np.zeros(40)])
+    gaps = np.interp(np.linspace(0, len(distances) - 1, 40), np.arange(len(distances)), distances)
+    return np.column_stack([np.zeros((40, 2)), RADII + gaps, np.zeros(40)])
 
 
 @pytest.mark.parametrize("begin", [-0.03, -1e-4, 0.001, 0.004])
@@ -43,10 +43,10 @@ def test_discs_that_part_are_proved_and_their_distances_are_the_closed_form(scen
 
 
 @pytest.mark.parametrize(
-    "way", [(-0.02, -0.025, 0.05), (-0.001, -0.002, 0.05), (0.003, 0.002, 0.05), (0.002, 0.05, 0.002)]
+    "gaps", [(-0.02, -0.025, 0.05), (-0.001, -0.002, 0.05), (0.003, 0.002, 0.05), (0.002, 0.05, 0.002)]
 )
-def test_discs_that_come_nearer_on_the_way_are_a_fault(scene: Scene, way: tuple[float, ...]) -> None:
-    growth = certify_growth(scene, apart(*way))
+def test_discs_that_come_nearer_on_the_way_are_a_fault(scene: Scene, gaps: tuple[float, ...]) -> None:
+    growth = certify_growth(scene, apart(*gaps))
 
     assert not growth.is_proved
     assert growth.faults[0][0] == ("a/disc", "b/disc")
@@ -61,17 +61,17 @@ def test_discs_that_part_by_too_little_are_proved_but_not_clear(scene: Scene) ->
 
 
 def test_a_pair_that_begins_with_its_demand_has_to_keep_it(scene: Scene) -> None:
-    kept, lost = certify_growth(scene, apart(0.02, 0.006)), certify_growth(scene, apart(0.02, 0.004))
+    free, lost = certify_growth(scene, apart(0.02, 0.006)), certify_growth(scene, apart(0.02, 0.004))
 
-    assert (kept.is_clear, kept.apart) == (True, ())
+    assert (free.is_clear, free.apart) == (True, ())
     assert not lost.is_proved
 
 
 def test_a_search_finds_what_the_proof_finds(scene: Scene) -> None:
-    for way in [(-0.02, 0.05), (0.001, 0.05), (-0.02, -0.025, 0.05)]:
-        near = rows_too_near(scene, apart(*way)[0])
-        found = sampled_growth(scene, apart(*way), near=near, moved=range(len(scene.pairs)))
-        assert found.is_clear == certify_growth(scene, apart(*way)).is_clear
+    for gaps in [(-0.02, 0.05), (0.001, 0.05), (-0.02, -0.025, 0.05)]:
+        near = rows_too_near(scene, apart(*gaps)[0])
+        growth = sampled_growth(scene, apart(*gaps), near=near, moved=range(len(scene.pairs)))
+        assert growth.is_clear == certify_growth(scene, apart(*gaps)).is_clear
 
 
 def test_the_pairs_that_are_too_near_are_those_below_the_demand(scene: Scene) -> None:
@@ -89,13 +89,13 @@ def test_a_ball_inside_a_closed_mesh_is_as_deep_as_its_way_out() -> None:
     block = tessellate(Box((0.2, 0.2, 0.2)))
     cell = make_cell(placed("probe", slide_model(Sphere(0.005))), part=fixed_part(block, np.eye(4)))
     scene = scene_at_stop(Scene.from_cell(cell))
-    way = np.linspace(0.0, 0.2, 40)[:, None]
+    shifts = np.linspace(0.0, 0.2, 40)[:, None]
 
-    (near,) = rows_too_near(scene, way[0])
-    growth = certify_growth(scene, way)
+    (near,) = rows_too_near(scene, shifts[0])
+    growth = certify_growth(scene, shifts)
 
-    distances = signed_distances(scene, scene.pairs[near], way)
-    np.testing.assert_allclose(distances, way[:, 0] - 0.105, atol=2e-4)
+    distances = signed_distances(scene, scene.pairs[near], shifts)
+    np.testing.assert_allclose(distances, shifts[:, 0] - 0.105, atol=2e-4)
     assert growth.is_clear
     assert growth.apart[0].begin == pytest.approx(-0.105, abs=2e-4)
-    assert not certify_growth(scene, way[:20][::-1]).is_proved
+    assert not certify_growth(scene, shifts[:20][::-1]).is_proved

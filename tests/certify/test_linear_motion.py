@@ -138,10 +138,10 @@ def test_a_robot_is_seen_from_its_own_link_without_the_joints_before_it() -> Non
     motion = StraightMotion.of_cell(scene, LeverArms(scene, q), q)
     index = {body.name: place for place, body in enumerate(scene.bodies)}
 
-    own = motion.bends((index["op0/b1"], index["op0/b4"]))
+    bends = motion.bends((index["op0/b1"], index["op0/b4"]))
     other = motion.bends((index["op0/b1"], index["op1/b4"]))
 
-    assert own.reach.max() == own.second.max() == 0.0
+    assert bends.reach.max() == bends.second.max() == 0.0
     assert other.reach.min() > 0.0
 
 

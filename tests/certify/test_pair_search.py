@@ -41,8 +41,8 @@ def needle_and_wire(rng: np.random.Generator) -> Cell:
     while abs(np.linalg.det([flight, along_needle, along_wire])) < 0.7:
         flight, along_needle, along_wire = unit(rng), unit(rng), unit(rng)
     met = flight * STEP * rng.uniform(5.0, SAMPLES - 6.0) + along_needle * rng.uniform(-0.02, 0.02)
-    beside = np.cross(along_needle, along_wire)
-    met = met + 0.8 * (NEEDLE + WIRE) * rng.uniform(-1.0, 1.0) * beside / np.linalg.norm(beside)
+    normal = np.cross(along_needle, along_wire)
+    met = met + 0.8 * (NEEDLE + WIRE) * rng.uniform(-1.0, 1.0) * normal / np.linalg.norm(normal)
     needle = turned(slide_model(Capsule(NEEDLE, 0.08), axis=tuple(flight)), axis_frame(np.zeros(3), along_needle))
     wire = thing("wire", Capsule(WIRE, 0.1), axis_frame(met + along_wire * rng.uniform(-0.03, 0.03), along_wire))
     return make_cell(
@@ -59,9 +59,9 @@ def search(
     scene: Scene, q: Array, pair: tuple[int, int], cutoff: float = APART_TOL, max_cuts: int = MAX_CUTS
 ) -> SolidSearch:
     motion = StraightMotion.of_cell(scene, LeverArms(scene, q), q)
-    found = SolidSearch(scene.engine, pair, motion, state=PairState(max_cuts=max_cuts))
-    found.run(cutoff)
-    return found
+    result = SolidSearch(scene.engine, pair, motion, state=PairState(max_cuts=max_cuts))
+    result.run(cutoff)
+    return result
 
 
 def test_a_needle_that_flies_through_a_wire_between_samples_is_always_found() -> None:
@@ -76,10 +76,10 @@ def test_a_needle_that_flies_through_a_wire_between_samples_is_always_found() ->
         touched = [measure(scene.engine, pair, poses, sample=k).touches for k in range(SAMPLES)]
         missed_by_sampling += not any(touched)
 
-        found = search(scene, q, pair).state
+        state = search(scene, q, pair).state
 
-        assert found.touches
-        there = scene.body_poses(np.array([[STEP * found.touches[0]]]))
+        assert state.touches
+        there = scene.body_poses(np.array([[STEP * state.touches[0]]]))
         assert measure(scene.engine, pair, there, sample=0).touches
     assert missed_by_sampling > PLACEMENTS // 10
 
@@ -91,12 +91,12 @@ def test_a_needle_that_passes_a_wire_is_certified_with_the_distance_it_keeps() -
     scene = Scene.from_cell(make_cell(placed("needle", needle), things=(wire,)))
     index = {body.name: place for place, body in enumerate(scene.bodies)}
 
-    found = search(scene, STEP * np.arange(SAMPLES)[:, None], (index["needle/block"], index["wire"]), np.inf)
+    match = search(scene, STEP * np.arange(SAMPLES)[:, None], (index["needle/block"], index["wire"]), np.inf)
 
-    assert not found.state.touches
-    assert not found.state.unproved
-    assert gap - 1e-4 < found.low.min() <= gap + 1e-9
-    assert found.low.min() > 0.0
+    assert not match.state.touches
+    assert not match.state.unproved
+    assert gap - 1e-4 < match.low.min() <= gap + 1e-9
+    assert match.low.min() > 0.0
 
 
 def test_a_body_that_dives_into_a_closed_mesh_touches_until_it_comes_out() -> None:
@@ -121,10 +121,10 @@ def test_a_leap_into_or_over_a_closed_mesh_is_a_contact(leap: float) -> None:
     index = {body.name: place for place, body in enumerate(scene.bodies)}
     q = np.array([[-leap], [0.0 if leap < 1.0 else leap], [0.0 if leap < 1.0 else leap]])
 
-    found = search(scene, q, (index["ball/block"], index["shell"])).state
+    state = search(scene, q, (index["ball/block"], index["shell"])).state
 
-    assert found.touches
-    assert min(found.touches) == pytest.approx((leap - 0.12) / (leap if leap < 1.0 else 2 * leap), abs=0.15)
+    assert state.touches
+    assert min(state.touches) == pytest.approx((leap - 0.12) / (leap if leap < 1.0 else 2 * leap), abs=0.15)
 
 
 def test_a_pair_without_end_of_open_steps_is_given_up_and_not_called_free() -> None:
@@ -135,6 +135,6 @@ def test_a_pair_without_end_of_open_steps_is_given_up_and_not_called_free() -> N
     index = {body.name: place for place, body in enumerate(scene.bodies)}
 
     q = np.linspace(0.0, 0.1, 60)[:, None]
-    found = search(scene, q, (index["low/block"], index["high"]), max_cuts=100).state
+    state = search(scene, q, (index["low/block"], index["high"]), max_cuts=100).state
 
-    assert found.unproved or found.touches
+    assert state.unproved or state.touches

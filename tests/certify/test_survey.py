@@ -23,11 +23,11 @@ def wandering(scene: Scene, samples: int) -> Array:
 
 def cutoff_by_definition(known: Array, scene: Scene, row: int) -> float:
     """The last of the closest of all other pairs, or the nearest of the class, whichever is farther."""
-    kept = np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs])
+    watched = np.array([pair.rule is Rule.CLEARANCE for pair in scene.pairs])
     kinds = np.array([pair.clearance_class for pair in scene.pairs])
-    if not kept[row]:
+    if not watched[row]:
         return APART_TOL
-    others = np.sort(known[kept & (np.arange(len(known)) != row)])
+    others = np.sort(known[watched & (np.arange(len(known)) != row)])
     last = others[CLOSEST_COUNT - 1] if len(others) >= CLOSEST_COUNT else np.inf
     return max(APART_TOL, max(known[kinds == kinds[row]].min(), last) - SEARCH_TOL)
 
@@ -47,8 +47,8 @@ def test_cutoffs_are_those_of_the_definition_whatever_is_found() -> None:
             known[row] = 0.0
         elif scene.pairs[row].rule is Rule.CLEARANCE:
             known[row] = seen.states[row].distance
-        cutoffs = [seen.cutoff(each) for each in range(len(scene.pairs))]
-        assert cutoffs == [cutoff_by_definition(known, scene, each) for each in range(len(scene.pairs))]
+        cutoffs = [seen.cutoff(row) for row in range(len(scene.pairs))]
+        assert cutoffs == [cutoff_by_definition(known, scene, row) for row in range(len(scene.pairs))]
         assert seen.largest_cutoff() >= max(cutoffs)
 
 

@@ -15,7 +15,7 @@ import pytest
 from cellplan.cli.main import run
 from cellplan.pipeline.gate.equal_text import first_difference
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 GOLDEN = Path(__file__).parent / "golden"
 COMMANDS = (

@@ -80,7 +80,7 @@ def test_a_full_disk_is_reported_in_one_line() -> None:
 
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGINT, *(pytest.param(each, marks=pytest.mark.slow) for each in (signal.SIGTERM, signal.SIGHUP))],
+    [signal.SIGINT, *(pytest.param(number, marks=pytest.mark.slow) for number in (signal.SIGTERM, signal.SIGHUP))],
     ids=lambda number: number.name,
 )
 def test_an_interrupt_ends_with_130_and_leaves_nothing(cells: Path, tmp_path: Path, number: signal.Signals) -> None:
@@ -131,9 +131,9 @@ def processor_time(process: int) -> float:
 def holds_within(seconds: float, condition: Callable[[], bool]) -> bool:
     """Whether a condition comes true before a time limit."""
     deadline, again = time.monotonic() + seconds, threading.Event()
-    while not (found := condition()) and time.monotonic() < deadline:
+    while not (holds := condition()) and time.monotonic() < deadline:
         again.wait(0.1)
-    return found
+    return holds
 
 
 def children(process: int) -> list[int]:

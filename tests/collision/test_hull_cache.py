@@ -14,7 +14,7 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.cache import keep_mesh
 from cellplan.geometry.shapes import Mesh
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("cache_folder")
 
 
 def cloud(points: np.ndarray, source: str = "cloud") -> Mesh:
@@ -30,15 +30,15 @@ def assert_same(one: Mesh, other: Mesh) -> None:
         assert (first.dtype, first.shape, first.strides) == (second.dtype, second.shape, second.strides)
 
 
-def test_a_kept_hull_is_the_one_that_was_found(own_cache: Path) -> None:
-    found = hull_of(cloud(POINTS))
+def test_a_kept_hull_is_the_one_that_was_found(cache_folder: Path) -> None:
+    hull = hull_of(cloud(POINTS))
     forget()
     again = hull_of(cloud(POINTS, "another name"))
 
-    assert len(list(own_cache.iterdir())) == 1
+    assert len(list(cache_folder.iterdir())) == 1
     assert again.source == "another name"
-    assert_same(found, again)
-    assert_same(found, convex_hull(cloud(POINTS)))
+    assert_same(hull, again)
+    assert_same(hull, convex_hull(cloud(POINTS)))
 
 
 def test_a_kept_surface_that_is_open_is_no_hull() -> None:
@@ -53,13 +53,13 @@ def test_other_points_have_another_hull() -> None:
     assert_same(hull_of(cloud(2.0 * POINTS)), convex_hull(cloud(2.0 * POINTS)))
 
 
-def test_a_flat_mesh_is_refused_each_time(own_cache: Path) -> None:
+def test_a_flat_mesh_is_refused_each_time(cache_folder: Path) -> None:
     flat = POINTS * np.array([1.0, 1.0, 0.0])
 
     for _ in range(2):
         with pytest.raises(InputError, match="expected a body with a volume, got a flat one"):
             hull_of(cloud(flat))
-    assert not own_cache.exists() or not list(own_cache.iterdir())
+    assert not cache_folder.exists() or not list(cache_folder.iterdir())
 
 
 @pytest.mark.parametrize("move", [0.0, 0.5], ids=["too small", "moved"])
@@ -81,13 +81,13 @@ def test_a_kept_surface_with_a_dent_is_no_hull() -> None:
     assert_same(hull_of(cloud(POINTS)), hull)
 
 
-def test_a_hull_that_a_helper_has_kept_is_the_same(own_cache: Path) -> None:
+def test_a_hull_that_a_helper_has_kept_is_the_same(cache_folder: Path) -> None:
     mesh = cloud(POINTS)
-    lacking = without_hull([mesh])
-    keep_hulls(lacking)
+    missing = without_hull([mesh])
+    keep_hulls(missing)
     forget()
 
-    assert lacking == [mesh]
+    assert missing == [mesh]
     assert without_hull([mesh]) == []
-    assert len(list(own_cache.iterdir())) == 1
+    assert len(list(cache_folder.iterdir())) == 1
     assert_same(hull_of(mesh), convex_hull(mesh))

@@ -79,8 +79,8 @@ def test_heaps_of_almost_equal_points_have_a_hull(seed: int, closeness: float) -
 
     directions = rng.normal(size=(200, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    room = 1e-7 * np.ptp(cloud.vertices, axis=0).max()  # what a hull may be short of
-    assert np.all(support(hull, directions) >= support(cloud, directions) - room)
+    tolerance = 1e-7 * np.ptp(cloud.vertices, axis=0).max()  # what a hull may be short of
+    assert np.all(support(hull, directions) >= support(cloud, directions) - tolerance)
 
 
 @given(st.lists(st.tuples(*[st.integers(0, 3)] * 3), min_size=4, max_size=30), st.booleans())

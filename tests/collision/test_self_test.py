@@ -9,13 +9,13 @@ from cellplan.errors import ExitStatus, SelfTestError
 
 
 def test_the_engine_of_this_machine_passes(monkeypatch: pytest.MonkeyPatch) -> None:
-    found: list[tuple[str, bool]] = []
-    monkeypatch.setattr(self_test, "_expect", lambda holds, statement: found.append((statement, holds)))
+    verdicts: list[tuple[str, bool]] = []
+    monkeypatch.setattr(self_test, "_expect", lambda holds, statement: verdicts.append((statement, holds)))
 
     prove_engine.__wrapped__()
 
-    assert len(found) == len(self_test.HITS) + len(self_test.DISTANCES) + 4
-    assert [statement for statement, holds in found if not holds] == []
+    assert len(verdicts) == len(self_test.HITS) + len(self_test.DISTANCES) + 4
+    assert [statement for statement, holds in verdicts if not holds] == []
 
 
 def test_an_engine_that_always_says_free_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -30,13 +30,13 @@ def test_an_engine_that_always_says_free_is_found_out(monkeypatch: pytest.Monkey
 
 
 def test_an_engine_whose_distances_are_wild_is_not_believed_but_still_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    truth, asked = fcl.distance, []
+    truth, calls = fcl.distance, []
 
     def too_large(first, second, request, result):
-        asked.append(request.enable_nearest_points)
+        calls.append(request.enable_nearest_points)
         return truth(first, second, request, result) + (0.1 if request.enable_nearest_points else 0.0)
 
     monkeypatch.setattr(fcl, "distance", too_large)
 
     assert prove_engine.__wrapped__() is None  # the surfaces are asked when the proof falls short of the proposal
-    assert True in asked
+    assert True in calls

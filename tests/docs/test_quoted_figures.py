@@ -46,10 +46,10 @@ def test_the_comparison_quotes_the_benchmarks() -> None:
     ],
 )
 def test_the_page_of_time_laws_states_their_peaks(law: TimeLaw, rate: float, acceleration: float) -> None:
-    way = advance(law, TAU)
+    shares = advance(law, TAU)
 
-    assert np.gradient(way.share, TAU).max() == pytest.approx(rate, rel=1e-4)  # differences, not the formula
-    assert np.abs(np.gradient(way.rate, TAU)[2:-2]).max() == pytest.approx(acceleration, rel=1e-3)
+    assert np.gradient(shares.share, TAU).max() == pytest.approx(rate, rel=1e-4)  # differences, not the formula
+    assert np.abs(np.gradient(shares.rate, TAU)[2:-2]).max() == pytest.approx(acceleration, rel=1e-3)
     assert peak_rate(law) == pytest.approx(rate)
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cellplan import load_cell, solve
 from cellplan.pipeline.solution import Run, Solution
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -57,8 +57,8 @@ def script() -> Iterator[ModuleType]:
 def recorded(table: str, quantity: str) -> dict[str, Any]:
     """One line of the record."""
     lines = json.loads(LINES.read_text(encoding="utf-8"))
-    (found,) = [line for line in lines if line["table"] == table and line["quantity"] == quantity]
-    return dict(found)
+    (result,) = [line for line in lines if line["table"] == table and line["quantity"] == quantity]
+    return dict(result)
 
 
 def joint_table(solution: Solution, robot: str = "arm") -> tuple[Array, Array]:
@@ -228,9 +228,9 @@ def test_singular_values_of_the_arm_on_the_circle(script: ModuleType) -> None:
         for e in np.eye(3)
     ]
     smallest = np.linalg.svd(np.stack(moved, axis=2), compute_uv=False)[:, -1]
-    found = sys.modules["reproduction.choices"].smallest_singular(*dh_poses(THREE_LINKS, q)[:, :3, 3].T)
+    result = sys.modules["reproduction.choices"].smallest_singular(*dh_poses(THREE_LINKS, q)[:, :3, 3].T)
 
-    assert found == pytest.approx(smallest, abs=1e-7)
+    assert result == pytest.approx(smallest, abs=1e-7)
 
 
 def test_choices_that_were_made_agree_with_the_program(script: ModuleType) -> None:
@@ -261,9 +261,9 @@ def test_figures_and_tables_follow_each_other_from_page_to_page(script: ModuleTy
     """A slip in the list of pages would put an item before one with a smaller number, or have too few of them."""
     for paper, kinds in sys.modules["reproduction.pages"].PAGES.items():
         for kind in ITEMS[paper]:
-            found = list(kinds[kind].values())
+            result = list(kinds[kind].values())
             assert set(kinds[kind]) == ITEMS[paper][kind]
-            assert found == sorted(found), (paper, kind)
+            assert result == sorted(result), (paper, kind)
 
 
 @pytest.mark.parametrize(
@@ -284,7 +284,7 @@ def test_every_named_place_belongs_to_a_line(script: ModuleType) -> None:
     lines = json.loads(LINES.read_text(encoding="utf-8"))
     places = sys.modules["reproduction.places_in_papers"].PLACES
 
-    named = {(table, what) for table, found in places.items() for what in found}
+    named = {(table, what) for table, place in places.items() for what in place}
     assert named <= {(line["table"], line["quantity"]) for line in lines}
 
 
@@ -307,17 +307,17 @@ ITEMS = {
 @pytest.mark.parametrize("paper", ITEMS)
 def test_every_figure_and_table_is_listed_once(script: ModuleType, paper: str) -> None:
     entries = sys.modules["reproduction.listing"].LISTS[paper]
-    found = [(entry.kind, number) for entry in entries for number in entry.numbers]
+    result = [(entry.kind, number) for entry in entries for number in entry.numbers]
 
-    assert len(found) == len(set(found))
-    assert set(found) == {(kind, number) for kind, numbers in ITEMS[paper].items() for number in numbers}
+    assert len(result) == len(set(result))
+    assert set(result) == {(kind, number) for kind, numbers in ITEMS[paper].items() for number in numbers}
 
 
 def test_every_listed_item_has_a_verdict_and_a_reason(script: ModuleType) -> None:
     listing = sys.modules["reproduction.listing"]
     verdicts = {"reproduced", "differs", "chosen", "circular", "used", "not attempted"}
 
-    for paper, entry in [(paper, entry) for paper, found in listing.LISTS.items() for entry in found]:
+    for paper, entry in [(paper, entry) for paper, value in listing.LISTS.items() for entry in value]:
         assert entry.verdict in verdicts
         assert entry.where
         assert entry.text(paper) in script.PAGE.read_text(encoding="utf-8")

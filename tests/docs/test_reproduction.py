@@ -14,7 +14,7 @@ import pytest
 
 from cellplan import load_cell, solve
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAPERS = ROOT / "cells" / "papers"
@@ -101,28 +101,28 @@ def test_damped_least_squares_damps_from_the_published_instant(script: ModuleTyp
 
 @pytest.mark.slow
 def test_search_follows_the_line_on_which_damped_least_squares_fails(script: ModuleType, unwritten: Path) -> None:
-    found = script.CASES["nicolato_line"]()
+    record = script.CASES["nicolato_line"]()
 
-    assert found["search"]["error_m"] < 1e-7
-    assert found["dls"]["error_m"] > 0.01
+    assert record["search"]["error_m"] < 1e-7
+    assert record["dls"]["error_m"] > 0.01
 
 
 @pytest.mark.slow
 def test_limits_of_the_fourth_joint_are_held(script: ModuleType, unwritten: Path) -> None:
-    found = script.CASES["nicolato_limits"]()
+    record = script.CASES["nicolato_limits"]()
 
-    low, high = found["position"]["q4_rad"]
+    low, high = record["position"]["q4_rad"]
     assert 0.60 - 1e-12 <= low < high <= 0.85 + 1e-12  # the limit in deg has 15 digits
-    assert found["speed"]["q4_rad_s"] <= 0.5 + 1e-9  # tables have twelve decimals of a degree and steps of 1 ms
-    assert max(found["position"]["error_m"], found["speed"]["error_m"]) < 1e-5
+    assert record["speed"]["q4_rad_s"] <= 0.5 + 1e-9  # tables have twelve decimals of a degree and steps of 1 ms
+    assert max(record["position"]["error_m"], record["speed"]["error_m"]) < 1e-5
 
 
 @pytest.mark.slow
 def test_a_pose_is_followed_and_ends_at_the_published_configuration(script: ModuleType, unwritten: Path) -> None:
-    found = script.CASES["nicolato_pose"]()
+    record = script.CASES["nicolato_pose"]()
 
-    assert found["cost"] < 1e-8
-    assert found["end_deg"] == pytest.approx([60, 60, 45, 135, 45, 120], abs=1e-4)
+    assert record["cost"] < 1e-8
+    assert record["end_deg"] == pytest.approx([60, 60, 45, 135, 45, 120], abs=1e-4)
 
 
 @pytest.mark.slow
@@ -158,11 +158,11 @@ def test_the_shipped_limits_are_those_of_the_procedure(script: ModuleType) -> No
     ellipse = sys.modules["reproduction.ellipse"]
     wide, _ = ellipse.wide_stage()
     (robot,) = load_cell(PAPERS / "nicolato_ellipse_tightened.yaml").robots
-    room = math.radians(1e-3)  # limits and start are written to 1e-4 deg
+    tolerance = math.radians(1e-3)  # limits and start are written to 1e-4 deg
 
-    assert np.abs(robot.model.lower - wide.q.min(axis=0)).max() < room
-    assert np.abs(robot.model.upper - wide.q.max(axis=0)).max() < room
-    assert np.abs(robot.start - wide.q[-1]).max() < room
+    assert np.abs(robot.model.lower - wide.q.min(axis=0)).max() < tolerance
+    assert np.abs(robot.model.upper - wide.q.max(axis=0)).max() < tolerance
+    assert np.abs(robot.start - wide.q[-1]).max() < tolerance
     shipped, made = (PAPERS / "nicolato_ellipse_tightened.yaml").read_text(encoding="utf-8"), ellipse.tightened(wide)
     assert re.sub(r"[-\d.]+", "#", made) == re.sub(r"[-\d.]+", "#", shipped)
 

@@ -30,7 +30,7 @@ LINK = re.compile(r"\]\((?P<target>[^)#\s:]*)(?:#(?P<anchor>[^)\s]+))?\)")
 ROW = re.compile(r"^- \[[^\]]+\]\(([^)#]+)\)", re.MULTILINE)
 FENCE = re.compile(r"^(`{3,})\w*\n.*?^\1$", re.MULTILINE | re.DOTALL)
 LOADED = re.compile(r"<(?:script|link|img|iframe)\b[^>]*?\b(?:src|href)=[\"']?([^\"' >]+)|url\(([^)]+)\)|@import")
-DRAWN = "await new Promise((go) => setTimeout(go, 300));"
+NEXT_FRAME = "await new Promise((go) => setTimeout(go, 300));"
 
 
 def anchors(page: Path) -> set[str]:
@@ -108,7 +108,9 @@ def show(browser: Browser, page: Path, size: tuple[int, int], theme: str) -> Non
         "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
     )
     browser.command("Page.navigate", url=f"file://{page}")
-    browser.run("while (document.readyState !== 'complete') await new Promise((go) => setTimeout(go, 20));" + DRAWN)
+    browser.run(
+        "while (document.readyState !== 'complete') await new Promise((go) => setTimeout(go, 20));" + NEXT_FRAME
+    )
 
 
 @pytest.mark.slow
@@ -132,8 +134,8 @@ def test_the_site_loads_nothing_from_the_network_and_shows_all_formulas(site: Pa
     loaded = [
         (path.name, target)
         for path, text in (pages | styles).items()
-        for found in LOADED.findall(text)
-        if (target := "".join(found)).strip("'\"").startswith(("http:", "https:", "//"))
+        for address in LOADED.findall(text)
+        if (target := "".join(address)).strip("'\"").startswith(("http:", "https:", "//"))
     ]
 
     assert loaded == []
@@ -215,7 +217,7 @@ def test_pages_open_from_disk_without_errors_and_fit_the_window(
 def test_the_search_works_from_disk(site: Path, browser: Browser) -> None:
     show(browser, site / "index.html", (1280, 900), "light")
 
-    found = browser.run(
+    hits = browser.run(
         """
         const field = document.querySelector("[data-md-component=search-query]");
         field.focus();
@@ -231,5 +233,5 @@ def test_the_search_works_from_disk(site: Path, browser: Browser) -> None:
         """
     )
 
-    assert any("concepts/cooperation.html" in link for link in found)
+    assert any("concepts/cooperation.html" in link for link in hits)
     assert browser.console == []

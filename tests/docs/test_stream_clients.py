@@ -83,8 +83,10 @@ def test_the_client_of_rsi_answers_each_packet_with_the_row_of_its_cycle(rows: n
     answers = exchange(port, [packet(rows[0], 1000 + 4 * k) for k in range(cycles)], client)
 
     assert client.wait(LIMIT_S) == 0
-    assert [int(re.search(r"<IPOC>(\d+)</IPOC>", each)[1]) for each in answers] == [1000 + 4 * k for k in range(cycles)]
-    sent = np.array([[float(value) for value in re.findall(r'A\d="([^"]+)"', each)] for each in answers])
+    assert [int(re.search(r"<IPOC>(\d+)</IPOC>", answer)[1]) for answer in answers] == [
+        1000 + 4 * k for k in range(cycles)
+    ]
+    sent = np.array([[float(value) for value in re.findall(r'A\d="([^"]+)"', answer)] for answer in answers])
     held = np.vstack([rows, np.repeat(rows[-1:], HELD, axis=0)])
     np.testing.assert_allclose(sent, held - rows[0], atol=2e-6)  # corrections from the start, six decimals
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from builders.commands import run_command
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
@@ -32,15 +32,15 @@ NAMED = [
 def texts(folder: str) -> list[str]:
     """All texts of the modules in a folder, each as a whole; a zero byte stands for what is computed."""
     place = ROOT / folder
-    found: list[str] = []
+    lines: list[str] = []
     for path in [place] if place.is_file() else sorted(place.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.JoinedStr):
                 parts = [part.value if isinstance(part, ast.Constant) else "\0" for part in node.values]
-                found.append("".join(map(str, parts)))
+                lines.append("".join(map(str, parts)))
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                found.append(node.value)
-    return found
+                lines.append(node.value)
+    return lines
 
 
 def test_every_block_of_the_page_is_an_entry_and_there_are_many() -> None:

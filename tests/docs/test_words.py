@@ -55,10 +55,10 @@ def hits(path: Path, text: str) -> list[str]:
 
 
 def test_no_private_word_is_used() -> None:
-    found = [hit for path in sources() for hit in hits(path, path.read_text(encoding="utf-8"))]
-    found += [hit for path in sorted((ROOT / "cells").rglob("*.yaml")) for hit in hits(path, comments(path))]
+    result = [hit for path in sources() for hit in hits(path, path.read_text(encoding="utf-8"))]
+    result += [hit for path in sorted((ROOT / "cells").rglob("*.yaml")) for hit in hits(path, comments(path))]
 
-    assert found == []
+    assert result == []
 
 
 def test_the_glossary_lists_every_private_word_with_its_replacement() -> None:
@@ -69,7 +69,7 @@ def test_the_glossary_lists_every_private_word_with_its_replacement() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "words"),
     [
         ("what nobody\nwants", ["nobody"]),
         ("is looked\n   at", ["looked\n   at"]),
@@ -80,5 +80,5 @@ def test_the_glossary_lists_every_private_word_with_its_replacement() -> None:
         ("Who wants to know how far it is", ["Who wants to know"]),
     ],
 )
-def test_words_are_found_as_whole_words_with_the_named_exceptions(text: str, found: list[str]) -> None:
-    assert [match[0] for match in NAMED.finditer(text)] == found
+def test_words_are_found_as_whole_words_with_the_named_exceptions(text: str, words: list[str]) -> None:
+    assert [match[0] for match in NAMED.finditer(text)] == words

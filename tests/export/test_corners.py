@@ -28,8 +28,8 @@ def rows_of(name: str, **changes: object) -> RobotRows:
 
 def stops_of(*robots: RobotRows, promise: Promise = Promise.SEQUENCE_ONLY) -> list[list[int]]:
     """Rows of each robot that may not be rounded."""
-    found = may_round(ProgramRows(name=None, robots={rows.robot: rows for rows in robots}), promise)
-    return [np.flatnonzero(~free).tolist() for free in found.values()]
+    rounds = may_round(ProgramRows(name=None, robots={rows.robot: rows for rows in robots}), promise)
+    return [np.flatnonzero(~free).tolist() for free in rounds.values()]
 
 
 def process(begin: int, end: int) -> np.ndarray:
@@ -110,9 +110,9 @@ def test_the_share_of_a_zone_is_that_from_which_it_was_made(seed: int, blend: fl
     robot, q = job.frame.robot(NAMES[0]), job.programs[0].robots[NAMES[0]].q
     shares = np.full(len(q), blend)
 
-    found = tool_shares(robot, q, tool_zones(robot, q, shares))
+    read_shares = tool_shares(robot, q, tool_zones(robot, q, shares))
 
-    np.testing.assert_allclose(found[1:-1], blend, atol=1e-6)
+    np.testing.assert_allclose(read_shares[1:-1], blend, atol=1e-6)
     larger = tool_shares(robot, q, 1.2 * tool_zones(robot, q, shares))
     assert np.all(larger[1:-1] >= min(1.1 * blend, 0.5))
 
@@ -120,14 +120,14 @@ def test_the_share_of_a_zone_is_that_from_which_it_was_made(seed: int, blend: fl
 def test_an_axis_without_a_tool_is_rounded_by_its_zone_over_its_way() -> None:
     job = small_steps(seed=1)
     robot, q = job.frame.robot(NAMES[2]), job.programs[0].robots[NAMES[2]].q
-    ways = np.degrees(np.abs(np.diff(q, axis=0)))
-    least = np.minimum(ways[:-1].max(axis=1), ways[1:].max(axis=1))
+    travels = np.degrees(np.abs(np.diff(q, axis=0)))
+    least = np.minimum(travels[:-1].max(axis=1), travels[1:].max(axis=1))
 
     zones = axis_zones(robot, q, 0.2)
     shares = axis_shares(robot, q, zones, zones)
 
     np.testing.assert_allclose(zones[1:-1], 0.2 * least, rtol=1e-12)
-    smallest = np.minimum(ways[:-1], ways[1:]).min(axis=1)
+    smallest = np.minimum(travels[:-1], travels[1:]).min(axis=1)
     np.testing.assert_allclose(shares[1:-1], np.minimum(zones[1:-1] / smallest, 0.5), rtol=1e-12)
 
 
@@ -137,7 +137,7 @@ def test_a_reader_finds_the_share_of_each_row_in_its_zone(seed: int, decimals: i
     """The scale of zones has ten sizes to the decade: no share is larger than it may be, or less than 0.79 of it."""
     job = small_steps(seed=seed)
     cell = job.frame.cell
-    robots = tuple(replace(each, control=each.control.changed(decimals=decimals)) for each in cell.robots)
+    robots = tuple(replace(robot, control=robot.control.changed(decimals=decimals)) for robot in cell.robots)
     job = replace(job, frame=replace(job.frame, cell=replace(cell, robots=robots)))
 
     read = read_back(RAPID, job)[0].robots
@@ -175,7 +175,7 @@ def test_a_larger_zone_is_read_as_a_larger_share() -> None:
 
     wide = {**files, f"{NAMES[0]}.mod": text.replace(f",{name},", ",z200,")}
 
-    before, after = (RAPID.read(job.frame, each)[0].robots[NAMES[0]].rounding for each in (files, wide))
+    before, after = (RAPID.read(job.frame, entry)[0].robots[NAMES[0]].rounding for entry in (files, wide))
     assert np.all(after[before != after] == 0.5)
     assert np.any(before != after)
 

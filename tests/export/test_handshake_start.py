@@ -33,12 +33,12 @@ def events(form: str, robot: str, files: Mapping[str, str]) -> list[tuple[str, b
     pages = [path for path in files if re.fullmatch(rf"(?:{robot}/)?{robot}_[0-9]{{3}}\.(?:src|mod|pgx)", path)]
     text += "".join(files[path] for path in sorted(pages))
     motion, output, wait = EVENTS[form]
-    found = []
+    marks = []
     for match in re.finditer(rf"^\s*(?:(?P<m>{motion})|(?P<o>{output})|(?P<w>{wait}))", text, re.M):
         kind = "m" if match["m"] else "o" if match["o"] else "w"
-        words = [each for each in match.groups() if each is not None]
-        found.append((kind, (len(words) > 1) == (kind == "o")))
-    return found
+        words = [entry for entry in match.groups() if entry is not None]
+        marks.append((kind, (len(words) > 1) == (kind == "o")))
+    return marks
 
 
 @pytest.mark.parametrize("split", [None, 8])
@@ -55,7 +55,7 @@ def test_a_program_that_is_started_again_waits_again(form: str, split: int | Non
         outputs, place, moved = dict.fromkeys(programs, True), dict.fromkeys(programs, 0), dict.fromkeys(programs, 0)
         turns = [*NAMES[:2], *(NAMES[int(turn)] for turn in rng.random(3000) < rng.random(3000))]
         for name in turns:
-            other = next(each for each in programs if each != name)
+            other = next(program for program in programs if program != name)
             if place[name] == len(programs[name]):
                 continue
             kind, state = programs[name][place[name]]

@@ -50,16 +50,16 @@ def test_any_reader_finds_times_positions_and_flags() -> None:
     job = timed_job(seed=2, end=0.6)
     text = render_json(job)["program.json"]
 
-    found = json.loads(text)
+    record = json.loads(text)
 
-    assert (found["schema"], found["program"], found["promise"], found["time_unit"]) == (
+    assert (record["schema"], record["program"], record["promise"], record["time_unit"]) == (
         "cellplan.program/1",
         None,
         "timed",
         "s",
     )
-    assert found["rows"] == len(found["times"]) == 151
-    for entry in found["robots"]:
+    assert record["rows"] == len(record["times"]) == 151
+    for entry in record["robots"]:
         rows, robot = job.programs[0].robots[entry["name"]], job.frame.robot(entry["name"])
         units = np.array([UNIT[joint["unit"]] for joint in entry["joints"]])
         q = np.array(entry["positions"]) * units
@@ -73,16 +73,19 @@ def test_any_reader_finds_times_positions_and_flags() -> None:
             assert joint["controller"]["sign"] == zero.sign[place]
             assert joint["controller"]["zero"] * units[place] == pytest.approx(zero.zero[place], abs=1e-11)
             names = [other["name"] for other in entry["joints"]]
-            own = {names[other]: zero.coupling[place, other] for other in np.flatnonzero(zero.coupling[place])}
-            assert joint["controller"]["coupling"] == own
+            couplings = {names[other]: zero.coupling[place, other] for other in np.flatnonzero(zero.coupling[place])}
+            assert joint["controller"]["coupling"] == couplings
 
 
 def test_numbers_are_plain_decimals() -> None:
     text = render_json(timed_job(seed=1, end=0.5))["program.json"]
 
-    found = json.loads(text, parse_float=str)
+    record = json.loads(text, parse_float=str)
 
-    numbers = [*found["times"], *(number for robot in found["robots"] for row in robot["positions"] for number in row)]
+    numbers = [
+        *record["times"],
+        *(number for robot in record["robots"] for row in robot["positions"] for number in row),
+    ]
     assert all(re.fullmatch(r"-?(0|[1-9][0-9]*)\.[0-9]{9}", number) for number in numbers)
     assert not any(re.fullmatch(r"-0\.0+", number) for number in numbers)
 

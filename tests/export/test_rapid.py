@@ -37,7 +37,7 @@ NUDGED = 3.0 * np.deg2rad(2.0 * HALF_UNIT)  # a joint near its limit, and one th
 def with_decimals(job: ExportJob, decimals: int) -> ExportJob:
     """The job with other decimals of every robot."""
     cell = job.frame.cell
-    robots = tuple(replace(each, control=each.control.changed(decimals=decimals)) for each in cell.robots)
+    robots = tuple(replace(robot, control=robot.control.changed(decimals=decimals)) for robot in cell.robots)
     return replace(job, frame=replace(job.frame, cell=replace(cell, robots=robots)))
 
 
@@ -114,9 +114,9 @@ def test_an_external_axis_is_in_millimetres_and_missing_ones_are_marked() -> Non
 
     text = RAPID.render(job)[f"{NAMES[0]}.mod"]
 
-    found = re.findall(r"\],\[([^\]]*)\]\]", "".join(line for line in text.splitlines() if "Move" in line))
-    assert [each.split(",")[1:] for each in found] == [["9E9"] * 5] * 3
-    np.testing.assert_allclose([float(each.split(",")[0]) for each in found], rail, atol=0.6e-4)
+    matches = re.findall(r"\],\[([^\]]*)\]\]", "".join(line for line in text.splitlines() if "Move" in line))
+    assert [entry.split(",")[1:] for entry in matches] == [["9E9"] * 5] * 3
+    np.testing.assert_allclose([float(entry.split(",")[0]) for entry in matches], rail, atol=0.6e-4)
 
 
 def test_a_positioner_moves_its_external_axes_only() -> None:
@@ -168,7 +168,7 @@ def test_durations_add_up_to_the_times_of_the_rows() -> None:
 
     text = "".join(RAPID.render(job).values())
 
-    total = sum(float(found) for found in re.findall(r"\\T:=([\d.]+)", text))
+    total = sum(float(match) for match in re.findall(r"\\T:=([\d.]+)", text))
     assert abs(total - times[-1]) < 1e-6
 
 
@@ -281,7 +281,7 @@ def refusal(job: ExportJob) -> str:
 def changed_cell(job: ExportJob, **controls: dict[str, object]) -> ExportJob:
     """The job with other settings of the controls of robots."""
     robots = tuple(
-        replace(each, control=each.control.changed(**controls.get(each.name, {}))) for each in job.frame.cell.robots
+        replace(robot, control=robot.control.changed(**controls.get(robot.name, {}))) for robot in job.frame.cell.robots
     )
     return replace(job, frame=replace(job.frame, cell=replace(job.frame.cell, robots=robots)))
 
@@ -352,9 +352,9 @@ def test_rows_need_times_that_rise() -> None:
 
 @pytest.mark.parametrize("signal", ["12", "do 1", "a" * 33, "1do", "MoveL", "do;"])
 def test_signals_must_be_names(signal: str) -> None:
-    own = named_signals(NAMES[:2])[NAMES[0]]
+    signal_ = named_signals(NAMES[:2])[NAMES[0]]
 
-    text = refusal(changed_cell(sequence_job(), alpha={"handshake": own.model_copy(update={"output": signal})}))
+    text = refusal(changed_cell(sequence_job(), alpha={"handshake": signal_.model_copy(update={"output": signal})}))
 
     assert text == (
         "robots.alpha.controller.handshake.output: expected the name of a signal of at most 32 letters, digits and _, "
@@ -363,9 +363,9 @@ def test_signals_must_be_names(signal: str) -> None:
 
 
 def test_an_input_that_is_no_name_is_refused_by_its_key() -> None:
-    own = named_signals(NAMES[:2])[NAMES[0]]
+    signal = named_signals(NAMES[:2])[NAMES[0]]
 
-    other = own.model_copy(update={"inputs": {NAMES[1]: "3"}})
+    other = signal.model_copy(update={"inputs": {NAMES[1]: "3"}})
     text = refusal(changed_cell(sequence_job(), alpha={"handshake": other}))
 
     assert text.startswith(f"robots.alpha.controller.handshake.inputs.{NAMES[1]}: expected the name of a signal ")
@@ -373,7 +373,7 @@ def test_an_input_that_is_no_name_is_refused_by_its_key() -> None:
 
 def test_a_robot_of_many_axes_is_refused() -> None:
     model = arm_model()
-    table = replace(model, joints=tuple(replace(each, name=f"x{k}") for k in range(3) for each in model.joints))
+    table = replace(model, joints=tuple(replace(joint, name=f"x{k}") for k in range(3) for joint in model.joints))
     cell = cell_of(controlled(NAMES[0], drawn_limits(table, np.random.default_rng(0))), kind=ABB)
 
     text = refusal(job_of(cell, random_program(cell)))

@@ -53,15 +53,15 @@ def test_there_are_many_kinds() -> None:
 def test_a_broken_set_is_refused_at_its_line(kind: str) -> None:
     name, path, pattern, change, where, words = BROKEN[kind]
     files = dict(files_of(name))
-    found = re.search(pattern, files[path])
-    assert found is not None
+    match = re.search(pattern, files[path])
+    assert match is not None
     files[path] = re.sub(pattern, change, files[path], count=1)
 
     text = refused(name, files)
 
     assert words in text
     if isinstance(where, int):
-        assert text.startswith(f"{path}:{line_of(files_of(name)[path], found.start()) + where}: "), text
+        assert text.startswith(f"{path}:{line_of(files_of(name)[path], match.start()) + where}: "), text
     elif isinstance(where, str):
         at = re.search(where, files[path])
         assert at is not None

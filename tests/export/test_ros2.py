@@ -43,10 +43,10 @@ def on_times(job: ExportJob, times: np.ndarray) -> ExportJob:
     for name, rows in program.robots.items():
         assert rows.times is not None
         assert rows.qd is not None
-        own = np.zeros_like(rows.q)
+        velocities = np.zeros_like(rows.q)
         h, s = np.diff(times)[:, None], np.diff(rows.q, axis=0) / np.diff(times)[:, None]
-        own[1:-1] = (h[:-1] * s[1:] + h[1:] * s[:-1]) / (h[:-1] + h[1:])
-        robots[name] = replace(rows, times=times, qd=own)
+        velocities[1:-1] = (h[:-1] * s[1:] + h[1:] * s[:-1]) / (h[:-1] + h[1:])
+        robots[name] = replace(rows, times=times, qd=velocities)
     return replace(job, programs=(ProgramRows(name=program.name, robots=robots),))
 
 
@@ -198,8 +198,8 @@ def test_a_robot_that_moves_at_its_last_row_is_refused() -> None:
     assert rows.qd is not None
     half = len(rows) // 2
     cut = {
-        name: RobotRows(robot=name, q=own.q[:half], qd=own.qd[:half], times=own.times[:half])  # type: ignore[index]
-        for name, own in job.programs[0].robots.items()
+        name: RobotRows(robot=name, q=rows.q[:half], qd=rows.qd[:half], times=rows.times[:half])  # type: ignore[index]
+        for name, rows in job.programs[0].robots.items()
     }
 
     with pytest.raises(InputError, match="robot 'alpha': expected rest at its last row"):
@@ -245,7 +245,7 @@ def test_one_wrong_speed_is_refused_with_its_line() -> None:
 @pytest.mark.parametrize("decimals", [0, 5, 7])
 def test_decimals_of_programs_do_not_count_in_a_trajectory(decimals: int) -> None:
     cell, plain = (cell_for("ros", decimals=stated) for stated in (decimals, None))
-    jobs = [job_of(each, smooth_program(each), promise=Promise.TIMED) for each in (cell, plain)]
+    jobs = [job_of(entry, smooth_program(entry), promise=Promise.TIMED) for entry in (cell, plain)]
 
     files, (read,) = round_trip(ROS2, jobs[0])
 

@@ -186,7 +186,7 @@ def test_a_fanuc_needs_its_counting_of_axis_3() -> None:
 @pytest.mark.parametrize("decimals", [0, 4, 8])
 def test_decimals_of_programs_do_not_count_in_a_stream(decimals: int) -> None:
     cell, plain = (cell_for("kuka", decimals=stated) for stated in (decimals, None))
-    jobs = [job_of(each, smooth_program(each, end=0.5), promise=Promise.TIMED) for each in (cell, plain)]
+    jobs = [job_of(entry, smooth_program(entry, end=0.5), promise=Promise.TIMED) for entry in (cell, plain)]
 
     files, (read,) = round_trip(STREAM, jobs[0])
 

@@ -25,8 +25,8 @@ JOINTS = re.compile(r"\[([^\]]*)\]")
 
 
 def timed(*, seed: int = 0, cycle: float = 0.008, cell: Cell | None = None, **changes: object) -> ExportJob:
-    own = ur_cell(seed=seed, cycle=cycle) if cell is None else cell
-    return job_of(own, smooth_program(own, seed=seed, cycle=cycle, end=0.8), promise=Promise.TIMED, **changes)
+    source = ur_cell(seed=seed, cycle=cycle) if cell is None else cell
+    return job_of(source, smooth_program(source, seed=seed, cycle=cycle, end=0.8), promise=Promise.TIMED, **changes)
 
 
 def sequence(
@@ -37,10 +37,10 @@ def sequence(
     cell: Cell | None = None,
     **changes: object,
 ) -> ExportJob:
-    own = ur_cell(robots=robots, seed=seed) if cell is None else cell
-    program = smooth_program(own, seed=seed, cycle=0.1, end=1.6)
-    rows = {name: replace(each, marks=marks) for name, each in program.robots.items()}
-    return job_of(own, ProgramRows(name=None, robots=rows), promise=Promise.SEQUENCE_ONLY, **changes)
+    source = ur_cell(robots=robots, seed=seed) if cell is None else cell
+    program = smooth_program(source, seed=seed, cycle=0.1, end=1.6)
+    rows = {name: replace(robot, marks=marks) for name, robot in program.robots.items()}
+    return job_of(source, ProgramRows(name=None, robots=rows), promise=Promise.SEQUENCE_ONLY, **changes)
 
 
 def joints_in(text: str) -> np.ndarray:
@@ -289,7 +289,7 @@ def test_a_larger_radius_is_read_as_a_larger_share() -> None:
 
     wide = {path: re.sub(r"r=[\d.]+", "r=9.0000", text) for path, text in files.items()}
 
-    before, after = (URSCRIPT.read(job.frame, each)[0].robots["alpha"].rounding for each in (files, wide))
+    before, after = (URSCRIPT.read(job.frame, entry)[0].robots["alpha"].rounding for entry in (files, wide))
     radii = blend_radii(job.frame.robot("alpha"), job.programs[0].robots["alpha"], 0.25)
     np.testing.assert_array_equal(before > 0.0, radii > 0.0)
     assert np.all(before <= 0.25)

@@ -18,7 +18,7 @@ def sequence() -> ExportJob:
     """Two arms that meet at three rows; rows before and after the last one are blended."""
     cell = ur_cell(robots=2)
     program = smooth_program(cell, cycle=0.1, end=1.6)
-    rows = {name: replace(each, marks=(0, 4, 10)) for name, each in program.robots.items()}
+    rows = {name: replace(robot, marks=(0, 4, 10)) for name, robot in program.robots.items()}
     return job_of(cell, ProgramRows(name=None, robots=rows), promise=Promise.SEQUENCE_ONLY, blend=0.5, robots=("beta",))
 
 
@@ -228,9 +228,9 @@ def test_positions_beyond_two_turns_are_refused_with_their_line() -> None:
     lines = TEXTS["timed"].splitlines()
     number = lines[line - 1].partition("[")[2].partition(",")[0]
 
-    found, message = refused_at("timed", changed("timed", line, number, "12.566370615"))
+    result, message = refused_at("timed", changed("timed", line, number, "12.566370615"))
 
-    assert found == line
+    assert result == line
     assert message == " expected joint a1 within two turns, got 12.566371 rad"
 
 

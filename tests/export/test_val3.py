@@ -184,7 +184,7 @@ def test_a_larger_distance_is_read_as_a_larger_share(wide: str) -> None:
     data = re.sub(rf'(blend="joint".*{wide}=")[\d.]+', r"\g<1>9000", files["alpha/alpha.dtx"])
 
     before, after = (
-        VAL3.read(job.frame, each)[0].robots["alpha"].rounding for each in (files, {**files, "alpha/alpha.dtx": data})
+        VAL3.read(job.frame, entry)[0].robots["alpha"].rounding for entry in (files, {**files, "alpha/alpha.dtx": data})
     )
 
     assert np.any(before > 0.0)
@@ -201,8 +201,8 @@ def test_signals_come_after_the_robot_stands() -> None:
 
 
 def test_signals_are_links_and_numbers_are_those_of_the_first_board() -> None:
-    own = HandshakeEntry.model_construct(output=r"ModbusSrv-0\%Q3", inputs={"beta": "7"})
-    cell = cell_of(controlled("alpha", arm_model(), handshake=own), controlled("beta", arm_model()), kind=STAUBLI)
+    handshake = HandshakeEntry.model_construct(output=r"ModbusSrv-0\%Q3", inputs={"beta": "7"})
+    cell = cell_of(controlled("alpha", arm_model(), handshake=handshake), controlled("beta", arm_model()), kind=STAUBLI)
     job = job_of(cell, random_program(cell, marks=(4,)))
 
     files = VAL3.render(job)
@@ -222,8 +222,8 @@ def test_signals_are_links_and_numbers_are_those_of_the_first_board() -> None:
     ],
 )
 def test_signals_with_names_keep_them_where_these_are_free(output: str, entry: str, names: list[str]) -> None:
-    own = HandshakeEntry.model_construct(output=output, inputs={"beta": entry})
-    cell = cell_of(controlled("alpha", arm_model(), handshake=own), controlled("beta", arm_model()), kind=STAUBLI)
+    handshake = HandshakeEntry.model_construct(output=output, inputs={"beta": entry})
+    cell = cell_of(controlled("alpha", arm_model(), handshake=handshake), controlled("beta", arm_model()), kind=STAUBLI)
     job = job_of(cell, random_program(cell, marks=(4,)))
 
     files = VAL3.render(job)

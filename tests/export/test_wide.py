@@ -22,7 +22,7 @@ from cellplan.pipeline.wide_table import read_wide_tables, render_wide_tables, s
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 POSE = ["x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg"]
 
@@ -92,20 +92,20 @@ def test_errors_and_distances_have_the_extremes_of_the_report(run: VerifiedRun, 
     report = run.motions[0].report
     error = np.linalg.norm(report.accuracy[0].position_error, axis=1)
     assert table["path.position_error_mm"].max() == pytest.approx(1e3 * error.max(), abs=1e-9)
-    for kind, found in report.clearance.minima.items():
-        if found.minimum is not None and kind in report.clearance.curves:
-            assert table[f"clearance_{kind}_mm"].min() == pytest.approx(1e3 * found.minimum, abs=0.1)
+    for kind, minimum in report.clearance.minima.items():
+        if minimum.minimum is not None and kind in report.clearance.curves:
+            assert table[f"clearance_{kind}_mm"].min() == pytest.approx(1e3 * minimum.minimum, abs=0.1)
 
 
 def test_a_distance_is_never_above_what_the_collision_engine_measures(run: VerifiedRun, table: pd.DataFrame) -> None:
     scene = Scene.from_cell(run.cell)
     poses = scene.body_poses(run.motion.q)
-    kept = [pair for pair in scene.pairs if pair.solids is not None and pair.rule is Rule.CLEARANCE]
+    watched = [pair for pair in scene.pairs if pair.solids is not None and pair.rule is Rule.CLEARANCE]
     compared = 0
     for kind in (ClearanceClass.ROBOT_ROBOT, ClearanceClass.ENVIRONMENT, ClearanceClass.SELF):
-        own = [pair.solids for pair in kept if pair.clearance_class is kind]
-        for row in range(0, 41, 8) if own else ():
-            measured = min(scene.engine.proposed_direction(*pair, poses, sample=row)[0] for pair in own if pair)
+        pairs = [pair.solids for pair in watched if pair.clearance_class is kind]
+        for row in range(0, 41, 8) if pairs else ():
+            measured = min(scene.engine.proposed_direction(*pair, poses, sample=row)[0] for pair in pairs if pair)
             assert table[f"clearance_{kind}_mm"][row] <= 1e3 * measured + 1e-6
             compared += 1
     assert compared >= 6
@@ -113,7 +113,7 @@ def test_a_distance_is_never_above_what_the_collision_engine_measures(run: Verif
 
 def test_many_angles_are_those_of_one_rotation_after_the_other() -> None:
     rpy = np.random.default_rng(5).uniform([-3.1, -1.5, -3.1], [3.1, 1.5, 3.1], (40, 3))
-    np.testing.assert_allclose(roll_pitch_yaw(np.array([rotation_from_rpy(each) for each in rpy])), rpy, atol=1e-12)
+    np.testing.assert_allclose(roll_pitch_yaw(np.array([rotation_from_rpy(angles) for angles in rpy])), rpy, atol=1e-12)
     upright = np.array([rotation_from_rpy((0.3, 0.5 * np.pi, 0.8))])
     np.testing.assert_allclose(rotation_from_rpy(roll_pitch_yaw(upright)[0]), upright[0], atol=1e-12)
 

@@ -99,5 +99,5 @@ def _rest(text: str, end: int, *, block: bool) -> str:
     """What follows a value; the comment behind a block goes with it."""
     if not block:
         return text[end:]
-    found = text.find("\n", end)
-    return text[found:] if found >= 0 else ""
+    begin = text.find("\n", end)
+    return text[begin:] if begin >= 0 else ""

@@ -175,8 +175,8 @@ def test_an_interruption_at_any_moment_leaves_a_whole_run_or_none(tmp_path: Path
         process.send_signal(number)
         _, err = process.communicate(timeout=30)
 
-        before_it_listened, python_s_own = -number, -signal.SIGINT  # where foreign code was met; shells read it as 130
-        assert process.returncode in {0, 130, before_it_listened, python_s_own}, err
+        before_it_listened, by_python = -number, -signal.SIGINT  # where foreign code was met; shells read it as 130
+        assert process.returncode in {0, 130, before_it_listened, by_python}, err
         assert "Traceback" not in err or process.returncode == -number, err
         assert set(content(tmp_path)) == whole, share
         assert [path.name for path in tmp_path.iterdir()] == ["run"], share

@@ -39,9 +39,9 @@ def outcome(folder: Path, file: str, seed: int) -> str:
 
 
 def outcomes(folder: Path, file: str, seeds: range) -> list[str]:
-    found = [outcome(folder, file, seed) for seed in seeds]
+    result = [outcome(folder, file, seed) for seed in seeds]
     assert sorted(path.name for path in folder.iterdir()) == sorted([file, "c.yaml"])
-    return found
+    return result
 
 
 @pytest.mark.parametrize("file", hostile_files.SOUND)
@@ -60,6 +60,6 @@ def test_injured_files_are_read_or_refused(tmp_path: Path, file: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("file", hostile_files.SOUND)
 def test_very_many_injured_files_are_read_or_refused(tmp_path: Path, file: str) -> None:
-    found = outcomes(tmp_path, file, range(1000, 1400))
+    result = outcomes(tmp_path, file, range(1000, 1400))
 
-    assert found.count("refused") > 0.7 * len(found)
+    assert result.count("refused") > 0.7 * len(result)

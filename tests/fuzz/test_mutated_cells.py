@@ -105,8 +105,8 @@ def refusal(folder: Path, name: str, text: str) -> list[str] | None:
 
 
 def tell_lines(lines: list[str]) -> set[int]:
-    found = (re.match(r".*?changed\.yaml:(\d+): ", line) for line in lines)
-    return {int(match[1]) for match in found if match}
+    result = (re.match(r".*?changed\.yaml:(\d+): ", line) for line in lines)
+    return {int(match[1]) for match in result if match}
 
 
 @pytest.fixture(scope="module")
@@ -126,12 +126,14 @@ def share_of_right_lines(folder: Path, name: str, seeds: range) -> float:
     text = original(name)
     right = wrong = 0
     for seed in seeds:
-        found = injury(text, Random(f"{name}/{seed}"))
-        if found is None:
+        injured = injury(text, Random(f"{name}/{seed}"))
+        if injured is None:
             continue
-        lines = refusal(folder, name, found.text)
-        assert lines is not None, f"{name}, seed {seed}: {found.kind} at {found.path}, line {found.line}, was accepted"
-        is_right = found.line in tell_lines(lines)
+        lines = refusal(folder, name, injured.text)
+        assert lines is not None, (
+            f"{name}, seed {seed}: {injured.kind} at {injured.path}, line {injured.line}, was accepted"
+        )
+        is_right = injured.line in tell_lines(lines)
         right, wrong = right + is_right, wrong + (not is_right)
     return right / max(1, right + wrong)
 

@@ -48,12 +48,12 @@ def test_a_line_is_inside_where_its_points_are(shape: Solid, seed: int) -> None:
     spans = line_spans(shape, point[None], direction[None])
 
     inside = contains(shape, point + SAMPLES[:, None] * direction)
-    found = np.zeros(len(SAMPLES), dtype=bool)
+    is_inside = np.zeros(len(SAMPLES), dtype=bool)
     for enter, leave in zip(spans.enter, spans.leave, strict=True):
-        found |= (enter < SAMPLES) & (leave > SAMPLES)
+        is_inside |= (enter < SAMPLES) & (leave > SAMPLES)
     ends = np.concatenate([spans.enter, spans.leave])
     near_an_end = np.abs(SAMPLES[:, None] - ends).min(axis=1, initial=np.inf) < 1e-9
-    assert np.all((inside == found) | near_an_end)
+    assert np.all((inside == is_inside) | near_an_end)
 
 
 @pytest.mark.parametrize("axis", range(3))

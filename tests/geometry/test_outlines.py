@@ -22,11 +22,11 @@ def test_an_outline_reaches_as_far_as_its_solid_in_each_of_its_directions(solid:
     R = np.array([rotation_from_rpy(np.array([0.4 * k, -0.7 + 0.3 * k, 1.1])) for k in range(12)])
     p = np.random.default_rng(1).uniform(-1.0, 1.0, (12, 3))
 
-    found = outlines(solid, R, p)
+    result = outlines(solid, R, p)
 
     for k in range(12):
         reach = support(solid, AROUND @ R[k]) + AROUND @ p[k]
-        np.testing.assert_allclose((found[k] @ AROUND[:, :2].T).max(axis=0), reach, atol=1e-12)
+        np.testing.assert_allclose((result[k] @ AROUND[:, :2].T).max(axis=0), reach, atol=1e-12)
 
 
 def test_a_swept_outline_holds_both_of_its_ends() -> None:

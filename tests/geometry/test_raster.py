@@ -10,10 +10,10 @@ from cellplan.geometry.raster import contours, covered, stretches
 
 def squares(outlines: np.ndarray) -> set[tuple[int, int]]:
     """Row and column of each covered square; no stretch touches another."""
-    found = [tuple(each) for each in stretches(covered(outlines)).tolist()]
-    assert found == sorted(found)
-    assert all(one[0] < other[0] or one[2] + 1 < other[1] for one, other in pairwise(found))
-    return {(row, column) for row, first, last in found for column in range(first, last + 1)}
+    result = [tuple(entry) for entry in stretches(covered(outlines)).tolist()]
+    assert result == sorted(result)
+    assert all(one[0] < other[0] or one[2] + 1 < other[1] for one, other in pairwise(result))
+    return {(row, column) for row, first, last in result for column in range(first, last + 1)}
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -23,7 +23,7 @@ def test_covered_squares_are_those_whose_middles_lie_in_an_outline(seed: int) ->
     sizes = rng.uniform(0.5, 6.0, (4, 1, 2))
     outlines = rng.uniform(-12.0, 12.0, (4, 1, 2)) + sizes * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
-    found = squares(outlines)
+    result = squares(outlines)
 
     span = np.arange(-40, 41)
     inside = set[tuple[int, int]]()
@@ -34,7 +34,7 @@ def test_covered_squares_are_those_whose_middles_lie_in_an_outline(seed: int) ->
                 apart = np.array([column, row]) - corners
                 if (sides[:, 0] * apart[:, 1] - sides[:, 1] * apart[:, 0] >= 0.0).all():
                     inside.add((int(row), int(column)))
-    assert found == inside
+    assert result == inside
 
 
 def test_an_outline_along_the_rows_keeps_its_corners() -> None:

@@ -63,7 +63,7 @@ def test_findings_cross_whole() -> None:
     with pytest.raises(InvalidFileError) as caught:
         in_child(crashing_jobs.complain, guard=READER)
 
-    assert [str(each) for each in caught.value.findings] == ["f:1: one", "f:2: two"]
+    assert [str(finding) for finding in caught.value.findings] == ["f:1: one", "f:2: two"]
 
 
 def test_other_exceptions_are_internal_errors_that_name_the_file() -> None:

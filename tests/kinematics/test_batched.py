@@ -39,9 +39,9 @@ def test_tools_stand_where_successive_screws_put_them(name: str) -> None:
     cell, chains = CELLS[name], BatchChains(CELLS[name])
     q = configurations(cell, LANES)
 
-    found = tools(chains.state(q, chains.placement(cell)))
+    result = tools(chains.state(q, chains.placement(cell)))
 
-    for robot, poses in zip(cell.robots, found, strict=True):
+    for robot, poses in zip(cell.robots, result, strict=True):
         expected = ScrewChain(robot).tool_poses(q[cell.columns(robot.name)].T)
         np.testing.assert_allclose(poses, expected, atol=100 * ROUNDING)
 
@@ -51,16 +51,16 @@ def test_axes_are_the_screws_of_the_combined_model(name: str) -> None:
     cell, chains, model = CELLS[name], BatchChains(CELLS[name]), CombinedModel(CELLS[name])
     q = configurations(cell, LANES)
 
-    found = screws_of(chains, chains.state(q, chains.placement(cell)), cell)
+    screws = screws_of(chains, chains.state(q, chains.placement(cell)), cell)
 
     for lane in range(LANES):
         state = model.state(q[:, lane])
         for index, robot in enumerate(cell.robots):
             columns = cell.columns(robot.name)
             expected = state.screws_W[:, columns] * model.carries_flange[index, columns]
-            own = found[index, lane, :, : len(robot.model.joints)]
-            np.testing.assert_allclose(own, expected, atol=100 * ROUNDING)
-            assert not found[index, lane, :, len(robot.model.joints) :].any()
+            axes = screws[index, lane, :, : len(robot.model.joints)]
+            np.testing.assert_allclose(axes, expected, atol=100 * ROUNDING)
+            assert not screws[index, lane, :, len(robot.model.joints) :].any()
 
 
 def test_each_batch_entry_may_have_its_own_bases_and_tools() -> None:
@@ -72,19 +72,21 @@ def test_each_batch_entry_may_have_its_own_bases_and_tools() -> None:
             replace(r, X_WB=random_pose(rng), tool=replace(r.tool, X_FT=random_pose(rng))) for r in template.robots
         ]
         cells.append(replace(template, robots=tuple(robots)))
-    each = [chains.placement(cell) for cell in cells]
-    together = Placement(*(np.concatenate([getattr(p, part) for p in each], axis=-1) for part in Placement.__slots__))
+    placements = [chains.placement(cell) for cell in cells]
+    together = Placement(
+        *(np.concatenate([getattr(p, part) for p in placements], axis=-1) for part in Placement.__slots__)
+    )
 
-    found = tools(chains.state(q, together))
+    poses = tools(chains.state(q, together))
 
     for lane, cell in enumerate(cells):
         for index, robot in enumerate(cell.robots):
             expected = ScrewChain(robot).tool_poses(q[cell.columns(robot.name), lane][None])[0]
-            np.testing.assert_allclose(found[index, lane], expected, atol=100 * ROUNDING)
+            np.testing.assert_allclose(poses[index, lane], expected, atol=100 * ROUNDING)
     picked = tools(chains.state(q[:, [3, 1]], together.of(np.array([3, 1]))))
-    np.testing.assert_allclose(picked, found[:, [3, 1]], atol=ROUNDING)
+    np.testing.assert_allclose(picked, poses[:, [3, 1]], atol=ROUNDING)
     twice = tools(chains.state(np.repeat(q, 2, axis=1), together.repeated(2)))
-    np.testing.assert_allclose(twice, np.repeat(found, 2, axis=1), atol=ROUNDING)
+    np.testing.assert_allclose(twice, np.repeat(poses, 2, axis=1), atol=ROUNDING)
 
 
 def test_one_placement_stands_for_the_whole_batch() -> None:
@@ -98,37 +100,37 @@ def test_moving_the_world_moves_all_tools_along() -> None:
     cell, X = mixed_cell(8), random_pose(np.random.default_rng(1))
     chains, q = BatchChains(cell), configurations(cell, LANES)
 
-    here, there = (tools(chains.state(q, chains.placement(each))) for each in (cell, moved(cell, X)))
+    here, there = (tools(chains.state(q, chains.placement(entry))) for entry in (cell, moved(cell, X)))
 
     np.testing.assert_allclose(there, X @ here, atol=100 * ROUNDING)
 
 
 def test_what_is_plain_and_what_only_turns_is_known() -> None:
-    found = {name: BatchChains(CELLS[name]) for name in ("plain of equal arms", "followers", "mixed", "plain")}
-    assert {name: chains.is_plain for name, chains in found.items()} == {
+    result = {name: BatchChains(CELLS[name]) for name in ("plain of equal arms", "followers", "mixed", "plain")}
+    assert {name: chains.is_plain for name, chains in result.items()} == {
         "plain of equal arms": True,
         "followers": False,
         "mixed": False,
         "plain": True,
     }
-    assert found["plain"].is_all_turning
-    assert not found["followers"].is_all_turning
+    assert result["plain"].is_all_turning
+    assert not result["followers"].is_all_turning
 
 
 def test_columns_name_the_joints_of_each_robot() -> None:
     cell = mixed_cell(5)
     chains = BatchChains(cell)
     for index, robot in enumerate(cell.robots):
-        own = chains.columns[:, index]
+        columns_ = chains.columns[:, index]
         columns = cell.columns(robot.name)
-        assert own[own >= 0].tolist() == list(range(columns.start, columns.stop))
+        assert columns_[columns_ >= 0].tolist() == list(range(columns.start, columns.stop))
 
 
 def test_a_robot_on_its_own_base_has_a_tool_that_rests() -> None:
     cell = mixed_cell(5)
     robot = cell.robot("op2")
-    index = [each.name for each in cell.robots].index("op2")
+    index = [robot.name for robot in cell.robots].index("op2")
     chains = BatchChains(cell)
-    found = tools(chains.state(configurations(cell, LANES), chains.placement(cell)))[index]
+    poses = tools(chains.state(configurations(cell, LANES), chains.placement(cell)))[index]
     expected = robot.X_WB @ robot.model.X_BF @ robot.tool.X_FT
-    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=10 * ROUNDING)
+    np.testing.assert_allclose(poses, np.broadcast_to(expected, poses.shape), atol=10 * ROUNDING)

@@ -37,10 +37,10 @@ def test_links_and_axes_are_those_of_the_chains(cell: Cell) -> None:
 def test_tool_motion_is_that_of_poses_and_screws(cell: Cell) -> None:
     q = np.random.default_rng(1).uniform(-2.0, 2.0, (4, cell.joint_count))
     for robot in cell.robots:
-        chain, own = ScrewChain(robot), q[:, cell.columns(robot.name)]
-        X_WT, screws = chain.tool_motion(own)
-        np.testing.assert_allclose(X_WT, chain.tool_poses(own), atol=1e-13)
-        np.testing.assert_allclose(screws, chain.flange_screws(own), atol=1e-13)
+        chain, q_robot = ScrewChain(robot), q[:, cell.columns(robot.name)]
+        X_WT, screws = chain.tool_motion(q_robot)
+        np.testing.assert_allclose(X_WT, chain.tool_poses(q_robot), atol=1e-13)
+        np.testing.assert_allclose(screws, chain.flange_screws(q_robot), atol=1e-13)
 
 
 def test_positions_that_are_no_numbers_have_no_links(cell: Cell) -> None:

@@ -11,7 +11,7 @@ from cellplan.geometry.transforms import inverse, pose
 from cellplan.kinematics.perturbed_cell import draw_errors, perturbed_cell
 from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import Robot, Tool
-from cellplan.model.cell_errors import CellErrors, Draw, RobotDraw, drawn, link_vector
+from cellplan.model.cell_errors import CellErrors, Draw, RobotDraw, link_vector, sample
 from cellplan.model.settings.cell_errors import PoseErrorEntry, RobotErrorsEntry, ShiftSpreadEntry, TurnSpreadEntry
 from cellplan.model.settings.units import Mm
 
@@ -142,14 +142,14 @@ def test_draws_follow_the_cell_and_not_the_order_of_the_file(cell):
 
 def test_distributions_are_centred_and_as_wide_as_stated():
     rng = np.random.default_rng(5)
-    normal = np.array([1e3 * drawn(ShiftSpreadEntry(normal=2.0), rng) for _ in range(4000)])
-    uniform = np.array([1e3 * drawn(ShiftSpreadEntry(uniform=3.0), rng) for _ in range(4000)])
+    normal = np.array([1e3 * sample(ShiftSpreadEntry(normal=2.0), rng) for _ in range(4000)])
+    uniform = np.array([1e3 * sample(ShiftSpreadEntry(uniform=3.0), rng) for _ in range(4000)])
 
     assert abs(normal.mean()) < 4 * 2.0 / np.sqrt(4000)  # four standard errors of the mean
     assert normal.std() == pytest.approx(2.0, rel=4 / np.sqrt(2 * 4000))
     assert np.abs(uniform).max() <= 3.0
     assert uniform.std() == pytest.approx(3.0 / np.sqrt(3), rel=0.05)
-    assert drawn(Mm(0.5), rng) == 5e-4
+    assert sample(Mm(0.5), rng) == 5e-4
 
 
 def test_what_is_mounted_on_a_link_goes_with_it_as_its_own_bodies_do(cell):

@@ -61,16 +61,20 @@ def test_more_robots_than_one_model_takes_stand_where_successive_screws_put_them
     assert cell.joint_count > MAX_AXES
     q = np.random.default_rng(5).uniform(-1.5, 1.5, cell.joint_count)
     chains = [ScrewChain(robot) for robot in cell.robots]
-    own = [q[None, cell.columns(robot.name)] for robot in cell.robots]
+    by_robot = [q[None, cell.columns(robot.name)] for robot in cell.robots]
     model = CombinedModel(cell)
 
     state, links = model.state(q), model.links(q)
 
-    tools = np.concatenate([chain.tool_poses(each) for chain, each in zip(chains, own, strict=True)])
+    tools = np.concatenate([chain.tool_poses(q_robot) for chain, q_robot in zip(chains, by_robot, strict=True)])
     np.testing.assert_allclose(state.X_WT, tools, atol=100 * ROUNDING)
-    screws = np.concatenate([chain.flange_screws(each)[0] for chain, each in zip(chains, own, strict=True)], axis=1)
+    screws = np.concatenate(
+        [chain.flange_screws(q_robot)[0] for chain, q_robot in zip(chains, by_robot, strict=True)], axis=1
+    )
     np.testing.assert_allclose(state.screws_W, screws, atol=100 * ROUNDING)
-    D = np.concatenate([chain.link_displacements(each)[0, 1:] for chain, each in zip(chains, own, strict=True)])
+    D = np.concatenate(
+        [chain.link_displacements(q_robot)[0, 1:] for chain, q_robot in zip(chains, by_robot, strict=True)]
+    )
     np.testing.assert_allclose(links.D, D, atol=100 * ROUNDING)
     owner = np.repeat(np.arange(12), [len(r.model.joints) + len(r.model.followers) for r in cell.robots])
     assert not model.carries_link[owner[:, None] != owner[None, :]].any()

@@ -122,8 +122,8 @@ def panels(breaks: Array, count: int, nodes: Array) -> tuple[Array, tuple[Array,
     edges = breaks[:-1, None] + np.linspace(0.0, 1.0, count + 1) * np.diff(breaks)[:, None]
     low, high = edges[:, :-1, None], edges[:, 1:, None]
     times = (low + 0.5 * (nodes + 1.0) * (high - low)).ravel()
-    each = count * len(nodes)
-    return times, (np.repeat(breaks[:-1], each), np.repeat(breaks[1:], each)), (high - low).ravel()
+    rows = count * len(nodes)
+    return times, (np.repeat(breaks[:-1], rows), np.repeat(breaks[1:], rows)), (high - low).ravel()
 
 
 def spectra(path: ClockedPath, breaks: Array) -> tuple[Array, Array, Array]:
@@ -173,8 +173,8 @@ def test_between_breaks_the_motion_is_a_quickly_converging_polynomial(name: str)
 def test_twists_are_the_derivatives_of_the_poses(name: str) -> None:
     _, errors, widths = spectra_of(name)
 
-    room = 1e-11 + 1e-13 / widths[:, None]  # the derivative of a polynomial of degree 16 magnifies rounding
-    assert np.all(np.abs(errors) <= room)
+    tolerance = 1e-11 + 1e-13 / widths[:, None]  # the derivative of a polynomial of degree 16 magnifies rounding
+    assert np.all(np.abs(errors) <= tolerance)
 
 
 @pytest.mark.parametrize(
@@ -262,9 +262,9 @@ def test_all_intervals_at_once_are_each_on_its_own() -> None:
 
     for k, pair in enumerate(pairwise(breaks)):
         chosen = slice(5 * k, 5 * k + 5)
-        X_own, V_own = path.at(times[chosen], pair)
-        assert np.abs(X_own - X[chosen]).max() <= 1e-14  # one Newton step more or less
-        assert np.abs(V_own - V[chosen]).max() <= 1e-13
+        X_pair, V_pair = path.at(times[chosen], pair)
+        assert np.abs(X_pair - X[chosen]).max() <= 1e-14  # one Newton step more or less
+        assert np.abs(V_pair - V[chosen]).max() <= 1e-13
 
 
 def test_breaks_of_all_tasks_are_joined_within_the_clock() -> None:

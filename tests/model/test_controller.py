@@ -18,9 +18,9 @@ def test_a_coupled_joint_follows_its_closed_form() -> None:
     """Axis 3 counts against the horizontal, as its drive sits on the base: c3 = q3 + c2."""
     zero = counting([0.0, -0.5, 0.25], [1.0, -1.0, 1.0], {(2, 1): 1.0})
 
-    found = zero.from_model(np.array([0.1, 0.2, 0.3]))
+    values = zero.from_model(np.array([0.1, 0.2, 0.3]))
 
-    np.testing.assert_allclose(found, [0.1, -0.2 - 0.5, 0.3 + 0.25 + (-0.2 - 0.5)], atol=1e-15)
+    np.testing.assert_allclose(values, [0.1, -0.2 - 0.5, 0.3 + 0.25 + (-0.2 - 0.5)], atol=1e-15)
 
 
 def test_couplings_in_a_chain_add_up() -> None:

@@ -33,9 +33,9 @@ def test_equal_coefficients_stand_still_to_the_last_bit() -> None:
 def test_the_fit_of_its_own_rows_is_the_spline_itself(degree: int) -> None:
     path = spline(degree)
 
-    found = JointSpline.fitted(SHARES, path.at(SHARES), count=9, degree=degree)
+    fit = JointSpline.fitted(SHARES, path.at(SHARES), count=9, degree=degree)
 
-    np.testing.assert_allclose(found.coefficients, path.coefficients, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(fit.coefficients, path.coefficients, rtol=0.0, atol=1e-12)
 
 
 def test_the_basis_is_the_derivative_of_the_path_by_each_coefficient() -> None:

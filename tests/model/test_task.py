@@ -5,13 +5,13 @@ from builders.roller_paths import circle, task_on
 
 from cellplan.model.origin import Origin
 
-OWN = {"tasks.ring": 9, "tasks.ring.corners": 12}
+SOURCE = {"tasks.ring": 9, "tasks.ring.corners": 12}
 
 
 @pytest.mark.parametrize(
     ("lines", "place"),
     [
-        (OWN | {"motion.corners": 30}, "cell.yaml:12: tasks.ring.corners"),
+        (SOURCE | {"motion.corners": 30}, "cell.yaml:12: tasks.ring.corners"),
         ({"tasks.ring": 9, "motion.corners": 30}, "cell.yaml:30: motion.corners"),
         ({"tasks.ring": 9}, "cell.yaml:9: tasks.ring.corners"),
         ({}, "cell.yaml: tasks.ring.corners"),

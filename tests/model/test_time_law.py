@@ -19,12 +19,12 @@ LAWS = [
 def test_a_law_goes_from_nothing_to_all_and_never_back(law: TimeLaw) -> None:
     tau = np.linspace(0.0, 1.0, 1001)
 
-    way = advance(law, tau)
+    share = advance(law, tau)
 
-    assert way.share[0] == 0.0
-    assert way.share[-1] == 1.0
-    assert np.all(np.diff(way.share) > 0.0)
-    assert np.allclose(way.share + way.share[::-1], 1.0, atol=1e-15)  # speeding up mirrors slowing down
+    assert share.share[0] == 0.0
+    assert share.share[-1] == 1.0
+    assert np.all(np.diff(share.share) > 0.0)
+    assert np.allclose(share.share + share.share[::-1], 1.0, atol=1e-15)  # speeding up mirrors slowing down
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)

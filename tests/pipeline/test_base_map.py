@@ -27,7 +27,7 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def found(cell: Cell) -> Any:
+def mapped(cell: Cell) -> Any:
     return base_map(cell, "right", GRID)
 
 
@@ -42,9 +42,9 @@ def passes(cell: Cell, place: Any) -> bool:
 
 
 @pytest.mark.slow
-def test_ten_random_places_pass_or_fail_as_plain_solves_do(cell: Cell, found: Any) -> None:
-    chosen = np.random.default_rng(5).choice(len(found["places"]), 10, replace=False).tolist()
-    places = [found["places"][place] for place in chosen]
+def test_ten_random_places_pass_or_fail_as_plain_solves_do(cell: Cell, mapped: Any) -> None:
+    chosen = np.random.default_rng(5).choice(len(mapped["places"]), 10, replace=False).tolist()
+    places = [mapped["places"][place] for place in chosen]
 
     verdicts = [place["verdict"] == "passes" for place in places]
 
@@ -53,46 +53,46 @@ def test_ten_random_places_pass_or_fail_as_plain_solves_do(cell: Cell, found: An
 
 
 @pytest.mark.parametrize("verdict", ["passes", "limit"])
-def test_a_place_passes_or_fails_as_a_plain_solve_does(cell: Cell, found: Any, verdict: str) -> None:
-    place = [each for each in found["places"] if each["verdict"] == verdict][3]
+def test_a_place_passes_or_fails_as_a_plain_solve_does(cell: Cell, mapped: Any, verdict: str) -> None:
+    place = [place for place in mapped["places"] if place["verdict"] == verdict][3]
 
     assert passes(cell, place) == (verdict == "passes")
 
 
-def test_a_map_moves_with_its_cell(cell: Cell, found: Any) -> None:
+def test_a_map_moves_with_its_cell(cell: Cell, mapped: Any) -> None:
     by = {"robots.left.base.x_mm": 400, "robots.left.base.y_mm": -200}
     moved = cell.with_values({**by, "robots.right.base.x_mm": 2300, "robots.right.base.y_mm": 100})
 
     other = base_map(moved, "right", BaseGrid(x=(1400, 3000), y=(-800, 800), step=200))
 
-    assert [each["verdict"] for each in other["places"]] == [each["verdict"] for each in found["places"]]
-    cycles = [[p["figures"]["cycle_s"] for p in each["places"] if p["figures"]] for each in (found, other)]
+    assert [place["verdict"] for place in other["places"]] == [place["verdict"] for place in mapped["places"]]
+    cycles = [[p["figures"]["cycle_s"] for p in entry["places"] if p["figures"]] for entry in (mapped, other)]
     np.testing.assert_allclose(*cycles, rtol=1e-4)
 
 
-def test_every_place_has_a_verdict_and_what_fails_has_a_reason(found: Any) -> None:
-    assert sum(found["counts"].values()) == len(found["places"]) == 81
-    assert all((each["reason"] == "") == (each["verdict"] == "passes") for each in found["places"])
-    best = [found["places"][each["place"]]["figures"]["cycle_s"] for each in found["best"]]
+def test_every_place_has_a_verdict_and_what_fails_has_a_reason(mapped: Any) -> None:
+    assert sum(mapped["counts"].values()) == len(mapped["places"]) == 81
+    assert all((place["reason"] == "") == (place["verdict"] == "passes") for place in mapped["places"])
+    best = [mapped["places"][entry["place"]]["figures"]["cycle_s"] for entry in mapped["best"]]
     assert best == sorted(best)
-    assert best[0] == min(each["figures"]["cycle_s"] for each in found["places"] if each["verdict"] == "passes")
+    assert best[0] == min(place["figures"]["cycle_s"] for place in mapped["places"] if place["verdict"] == "passes")
 
 
-def test_equal_maps_have_equal_bytes(cell: Cell, found: Any, tmp_path: Path) -> None:
-    write_base_map(found, tmp_path / "one")
+def test_equal_maps_have_equal_bytes(cell: Cell, mapped: Any, tmp_path: Path) -> None:
+    write_base_map(mapped, tmp_path / "one")
     write_base_map(base_map(cell, "right", GRID), tmp_path / "other")
 
-    files = [{each.name: each.read_bytes() for each in (tmp_path / name).iterdir()} for name in ("one", "other")]
+    files = [{file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "other")]
     assert files[0] == files[1]
     assert set(files[0]) == {"map.json", "map.html", "map.svg"}
-    assert json.loads(files[0]["map.json"]) == json.loads(json.dumps(found))
+    assert json.loads(files[0]["map.json"]) == json.loads(json.dumps(mapped))
 
 
-def test_the_picture_is_written_in_requested_formats_too(found: Any, tmp_path: Path) -> None:
-    write_base_map(found, tmp_path / "map", formats=["png"])
-    write_base_map(found, tmp_path / "map", formats=["pdf"])  # an earlier map is replaced
+def test_the_picture_is_written_in_requested_formats_too(mapped: Any, tmp_path: Path) -> None:
+    write_base_map(mapped, tmp_path / "map", formats=["png"])
+    write_base_map(mapped, tmp_path / "map", formats=["pdf"])  # an earlier map is replaced
 
-    assert {each.name for each in (tmp_path / "map").iterdir()} == {"map.json", "map.html", "map.svg", "map.pdf"}
+    assert {file.name for file in (tmp_path / "map").iterdir()} == {"map.json", "map.html", "map.svg", "map.pdf"}
     assert (tmp_path / "map" / "map.pdf").read_bytes().startswith(b"%PDF")
 
 
@@ -153,13 +153,13 @@ def test_starts_judged_together_are_judged_as_each_by_itself(clearance: float, v
 
     alone: dict[int, PlaceVerdict] = {}
     for start, place in zip(q, at.tolist(), strict=True):
-        (found,) = judge(ready.job, start[None], np.array([place])).values()
-        alone[place] = found.or_better(alone.get(place))
+        (judgement,) = judge(ready.job, start[None], np.array([place])).values()
+        alone[place] = judgement.or_better(alone.get(place))
     assert len(known) == 2
     assert len(set(at.tolist())) < len(at)
-    assert verdict in {each.verdict for each in together.values()}
+    assert verdict in {value.verdict for value in together.values()}
     assert together.keys() == alone.keys()
-    for place, found in together.items():
-        assert found.verdict is alone[place].verdict
-        np.testing.assert_array_equal(found.start, alone[place].start)
-        assert found.cycle == pytest.approx(alone[place].cycle, rel=1e-9)
+    for place, judgement in together.items():
+        assert judgement.verdict is alone[place].verdict
+        np.testing.assert_array_equal(judgement.start, alone[place].start)
+        assert judgement.cycle == pytest.approx(alone[place].cycle, rel=1e-9)

@@ -61,31 +61,31 @@ def test_an_arm_with_spare_joints_drifts_from_cycle_to_cycle(planar):
     """The pseudo-inverse is not repetitive (Nicolato 2007, chapter 4)."""
     report = solve(planar(4, words="repeat: 2\n    time_law: constant", duration=4, step=0.004)).runs[0].report
 
-    found = report.repeatability
+    drift = report.repeatability
     assert report.passed
-    assert (found.cycles, found.period) == (2, pytest.approx(2.0, abs=1e-12))
-    assert not found.closes
-    assert np.rad2deg(max(drift.worst for drift in found.drifts)) > 0.05
+    assert (drift.cycles, drift.period) == (2, pytest.approx(2.0, abs=1e-12))
+    assert not drift.closes
+    assert np.rad2deg(max(drift.worst for drift in drift.drifts)) > 0.05
 
 
 @pytest.mark.slow
 def test_an_arm_without_spare_joints_comes_back_in_every_cycle(planar):
-    found = solve(planar(2, path=RECTANGLE, step=0.002, gain=250)).runs[0].report.repeatability
+    drift = solve(planar(2, path=RECTANGLE, step=0.002, gain=250)).runs[0].report.repeatability
 
-    assert found.cycles == 4
-    assert found.period == pytest.approx(2.0, abs=1e-12)
-    assert found.closes
-    assert max(drift.worst for drift in found.drifts) <= 2e-5  # half of acceleration times step over gain
+    assert drift.cycles == 4
+    assert drift.period == pytest.approx(2.0, abs=1e-12)
+    assert drift.closes
+    assert max(drift.worst for drift in drift.drifts) <= 2e-5  # half of acceleration times step over gain
 
 
 @pytest.mark.slow
 def test_cycles_under_one_law_differ_in_length(planar):
-    found = solve(planar(2)).runs[0].report.repeatability
+    drift = solve(planar(2)).runs[0].report.repeatability
 
-    assert np.diff(found.cycle_times)[[0, 3]] == pytest.approx(
+    assert np.diff(drift.cycle_times)[[0, 3]] == pytest.approx(
         [2.8755, 2.8755], abs=1e-4
     )  # 10 s^3 - 15 s^4 + 6 s^5 = 1/4
-    assert found.period is None
+    assert drift.period is None
 
 
 @pytest.mark.slow

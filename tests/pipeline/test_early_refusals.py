@@ -29,9 +29,9 @@ def cell(sound: Path) -> Path:
 @pytest.fixture
 def stages() -> Iterator[Stages]:
     """Stages of work that were begun before a refusal: none."""
-    found: Stages = []
-    yield found
-    assert found == []
+    result: Stages = []
+    yield result
+    assert result == []
 
 
 def noting(stages: Stages) -> Callable[[str, float], None]:
@@ -55,7 +55,7 @@ def test_a_page_is_refused_its_place_before_it_is_made(cell: Path, sound: Path, 
     for path in (cell, sound / "run"):
         request = ViewRequest(path=path, output=taken(tmp_path), cell=None)
 
-        said = refusal(lambda own=request: view(own, progress=noting(stages)))
+        said = refusal(lambda wanted=request: view(wanted, progress=noting(stages)))
 
         assert said == f"{tmp_path / 'mine.html'}: holds something that is no 3-D page; choose another file with -o"
 

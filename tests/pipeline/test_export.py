@@ -14,7 +14,7 @@ from cellplan.io.input.files import digest
 from cellplan.pipeline.export.dialects import DIALECTS
 from cellplan.pipeline.overrides import with_overrides
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture

@@ -33,30 +33,30 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
     """The left arm alone."""
     head, right = PAIR.split("  right:\n", 1)
     text = head + "part:\n" + right.split("part:\n", 1)[1]
-    kept = [line for line in text.splitlines() if not line.startswith("  second:")]
+    lines = [line for line in text.splitlines() if not line.startswith("  second:")]
     file = tmp_path_factory.mktemp("fastest") / "alone.yaml"
-    file.write_text("\n".join(kept).replace("pairwise", "simultaneous") + "\n", encoding="utf-8")
+    file.write_text("\n".join(lines).replace("pairwise", "simultaneous") + "\n", encoding="utf-8")
     return load_cell(file)
 
 
 @pytest.fixture(scope="module")
-def found(cell: Cell) -> ShortestCycles:
+def cycles(cell: Cell) -> ShortestCycles:
     return fastest(cell, demand=1500.0, points=1)
 
 
 @pytest.fixture(scope="module")
-def folder(found: ShortestCycles, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(cycles: ShortestCycles, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shortest cycles as they are written."""
     folder = tmp_path_factory.mktemp("written") / "fastest"
-    write_fastest(found, folder)
+    write_fastest(cycles, folder)
     return folder
 
 
-def test_the_time_laws_keep_all_limits_and_would_not_a_step_faster(cell: Cell, found: ShortestCycles) -> None:
-    cycle = found.by_time_laws
+def test_the_time_laws_keep_all_limits_and_would_not_a_step_faster(cell: Cell, cycles: ShortestCycles) -> None:
+    cycle = cycles.by_time_laws
     binding = cycle.bindings[0]
 
-    assert found.as_written.cycle == 2.0
+    assert cycles.as_written.cycle == 2.0
     assert cycle.solution.passed
     assert (binding.robot, binding.kind) == ("left", "acceleration")
     assert binding.share <= 1.0
@@ -66,8 +66,8 @@ def test_the_time_laws_keep_all_limits_and_would_not_a_step_faster(cell: Cell, f
     assert broken[0].subject == f"left/{binding.joint}"
 
 
-def test_the_common_speed_is_faster_and_its_path_the_same(found: ShortestCycles) -> None:
-    cycle, laws = found.by_common_speed, found.by_time_laws
+def test_the_common_speed_is_faster_and_its_path_the_same(cycles: ShortestCycles) -> None:
+    cycle, laws = cycles.by_common_speed, cycles.by_time_laws
 
     assert cycle.cycle < laws.cycle
     assert cycle.solution.passed
@@ -76,29 +76,29 @@ def test_the_common_speed_is_faster_and_its_path_the_same(found: ShortestCycles)
 
 
 @pytest.mark.slow
-def test_the_command_says_the_same(cell: Cell, found: ShortestCycles, tmp_path: Path) -> None:
+def test_the_command_says_the_same(cell: Cell, cycles: ShortestCycles, tmp_path: Path) -> None:
     status, out, err = run_command(f"cellplan fastest {cell.origin.file} --json --points 0 --quiet", tmp_path)
 
     record = json.loads(out)
     assert (status, record["status"], record["exit"], record["written_s"], err) == (0, "passed", 0, 2.0, "")
     assert (record["demand"], len(record["curve"])) == (None, 2)
     for name in ("time_laws", "common_speed", "reduced_speed"):
-        said, program = record["cycles"][name], found.programs[name]
+        said, program = record["cycles"][name], cycles.programs[name]
         assert said["cycle_s"] == pytest.approx(program.cycle)
         assert said["binding"][0]["joint"] == program.bindings[0].joint
         assert said["failed"] == []
 
 
-def test_loads_fall_with_the_cycle_as_the_scaling_law_says(found: ShortestCycles) -> None:
+def test_loads_fall_with_the_cycle_as_the_scaling_law_says(cycles: ShortestCycles) -> None:
     """Along one path velocities go with 1/T, accelerations with 1/T^2, the integral of velocity squared with 1/T.
 
     Rows 10 ms apart see the peaks of a motion of a second to a per cent.
     """
     for law in (Law.TIME_LAWS, Law.COMMON_SPEED):
-        points = [point.figures for point in found.curve if point.law is law]
+        points = [point.figures for point in cycles.curve if point.law is law]
         cycles = np.array([point["cycle_time_s"] for point in points])
         assert len(points) == 2
-        assert cycles[0] == found.programs[str(law)].cycle
+        assert cycles[0] == cycles.programs[str(law)].cycle
         np.testing.assert_allclose(cycles / cycles[0], [1.0, 3.0], rtol=0.01)
         for name, order in (("max_velocity_ratio", 1), ("max_acceleration_ratio", 2), ("energy_proxy_s", 1)):
             values = np.array([point[name] for point in points])
@@ -106,17 +106,17 @@ def test_loads_fall_with_the_cycle_as_the_scaling_law_says(found: ShortestCycles
         assert all(a["load_ratio"] > b["load_ratio"] for a, b in pairwise(points))
 
 
-def test_the_tool_speed_of_the_time_laws_is_that_of_a_quintic(found: ShortestCycles) -> None:
+def test_the_tool_speed_of_the_time_laws_is_that_of_a_quintic(cycles: ShortestCycles) -> None:
     """Its peak is 15/8 of the mean speed; chords of 10 ms are a little slower."""
-    for point in (point.figures for point in found.curve if point.law is Law.TIME_LAWS):
+    for point in (point.figures for point in cycles.curve if point.law is Law.TIME_LAWS):
         peak = 1.875 * 200.0 * np.pi / point["cycle_time_s"]
         assert point["max_tool_speed_mm_s"] == pytest.approx(peak, rel=1e-3)
         assert point["parts_per_h"] == pytest.approx(3600.0 / point["cycle_time_s"])
 
 
-def test_the_energy_proxy_of_a_quintic_is_its_integral(found: ShortestCycles) -> None:
+def test_the_energy_proxy_of_a_quintic_is_its_integral(cycles: ShortestCycles) -> None:
     """The integral of the squared rate of a quintic from 0 to 1 in a time T is 10/7 / T."""
-    report = found.by_time_laws.solution.runs[0].report
+    report = cycles.by_time_laws.solution.runs[0].report
     times, travel = np.linspace(0.0, 2.0, 2001), np.array([0.5, -1.0, 2.0])
     u = times / 2.0
     q = travel * (u**3 * (10.0 - 15.0 * u + 6.0 * u**2))[:, None]
@@ -126,13 +126,13 @@ def test_the_energy_proxy_of_a_quintic_is_its_integral(found: ShortestCycles) ->
     assert energy_proxy(moved) == pytest.approx(10.0 / 7.0 / 2.0 * np.sum((travel / limits) ** 2), rel=1e-5)
 
 
-def test_the_calmest_program_meets_the_demand_and_is_what_solve_gives(found: ShortestCycles, folder: Path) -> None:
-    demand = found.demand
+def test_the_calmest_program_meets_the_demand_and_is_what_solve_gives(cycles: ShortestCycles, folder: Path) -> None:
+    demand = cycles.demand
     assert demand is not None
     assert demand.allowed == pytest.approx(2.4)
     assert demand.program.cycle == pytest.approx(2.4)
-    assert demand.program.load < min(found.by_time_laws.load, found.by_common_speed.load)
-    slower = [point for point in found.curve if point.figures["cycle_time_s"] >= demand.program.cycle]
+    assert demand.program.load < min(cycles.by_time_laws.load, cycles.by_common_speed.load)
+    slower = [point for point in cycles.curve if point.figures["cycle_time_s"] >= demand.program.cycle]
     assert all(point.figures["load_ratio"] < demand.program.load for point in slower if point.law is Law.COMMON_SPEED)
 
     again = solve(load_cell(folder / "demand.yaml"))
@@ -142,8 +142,8 @@ def test_the_calmest_program_meets_the_demand_and_is_what_solve_gives(found: Sho
         assert table_body((folder / "demand" / "tables" / f"{name}.csv").read_text()) == table_body(text)
 
 
-def test_what_a_demand_saves_is_the_share_by_which_the_load_falls(found: ShortestCycles) -> None:
-    record = fastest_record(found)
+def test_what_a_demand_saves_is_the_share_by_which_the_load_falls(cycles: ShortestCycles) -> None:
+    record = fastest_record(cycles)
     demand = record["demand"]
     assert demand is not None
     calm, short = demand["program"]["figures"], record["cycles"]["common_speed"]["figures"]
@@ -151,29 +151,29 @@ def test_what_a_demand_saves_is_the_share_by_which_the_load_falls(found: Shortes
         assert calm[name] == pytest.approx((1.0 - share) * short[name])
     # a cycle longer by f has velocities lower by f
     assert demand["saving_against_shortest"]["max_velocity_ratio"] == pytest.approx(
-        1.0 - found.by_common_speed.cycle / 2.4, abs=0.005
+        1.0 - cycles.by_common_speed.cycle / 2.4, abs=0.005
     )
 
 
-def test_a_demand_below_all_reason_leaves_the_robots_waiting(cell: Cell, found: ShortestCycles) -> None:
-    asked = []
+def test_a_demand_below_all_reason_leaves_the_robots_waiting(cell: Cell, cycles: ShortestCycles) -> None:
+    calls = []
 
     def solved(law: Law, values: dict[str, object], _title: str) -> TimedProgram:
-        asked.append((law, values))
-        return found.by_time_laws
+        calls.append((law, values))
+        return cycles.by_time_laws
 
     met = calmest(
         cell,
         12.0,
-        written=found.as_written,
-        laws=found.by_time_laws,
-        common=found.by_common_speed,
+        written=cycles.as_written,
+        laws=cycles.by_time_laws,
+        common=cycles.by_common_speed,
         solved=solved,
     )
 
     assert met.allowed == pytest.approx(300.0)
-    assert dict(asked)[Law.COMMON_SPEED] == {
-        "motion.timing": {"cycle_s": pytest.approx(10.0 * found.by_common_speed.cycle)}
+    assert dict(calls)[Law.COMMON_SPEED] == {
+        "motion.timing": {"cycle_s": pytest.approx(10.0 * cycles.by_common_speed.cycle)}
     }
 
 
@@ -188,8 +188,8 @@ def test_another_demand_is_refused(text: str) -> None:
         read_demand(text)
 
 
-def test_a_demand_that_cannot_be_met_is_refused_with_what_binds(found: ShortestCycles) -> None:
-    shortest = found.by_common_speed
+def test_a_demand_that_cannot_be_met_is_refused_with_what_binds(cycles: ShortestCycles) -> None:
+    shortest = cycles.by_common_speed
 
     refuse_unless_possible(3600.0 / shortest.cycle, shortest, STEP)
     with pytest.raises(NoSolutionError) as caught:
@@ -209,9 +209,9 @@ def test_the_command_refuses_another_demand_at_once(cell: Cell, tmp_path: Path) 
     assert not list(tmp_path.iterdir())
 
 
-def test_the_tools_are_slow_enough_for_a_first_run(found: ShortestCycles) -> None:
+def test_the_tools_are_slow_enough_for_a_first_run(cycles: ShortestCycles) -> None:
     """The circle of 628 mm takes at least 2.51 s at 250 mm/s."""
-    program = found.programs["reduced_speed"]
+    program = cycles.programs["reduced_speed"]
     figures = program.figures.record(LOAD)
 
     assert program.law is Law.REDUCED_SPEED
@@ -219,17 +219,17 @@ def test_the_tools_are_slow_enough_for_a_first_run(found: ShortestCycles) -> Non
     assert 245.0 < figures["max_tool_speed_mm_s"] <= 250.0
     assert figures["share_above_250_mm_s"] == 0.0
     assert program.bindings[0].kind == "tool speed"
-    assert found.by_common_speed.figures.recorded("share_above_250_mm_s") > 0.5
+    assert cycles.by_common_speed.figures.recorded("share_above_250_mm_s") > 0.5
 
 
-def test_the_folder_holds_the_record_the_page_the_curve_and_every_program(found: ShortestCycles, folder: Path) -> None:
+def test_the_folder_holds_the_record_the_page_the_curve_and_every_program(cycles: ShortestCycles, folder: Path) -> None:
     record = json.loads((folder / "fastest.json").read_text())
 
-    assert record == json.loads(json.dumps(fastest_record(found)))
+    assert record == json.loads(json.dumps(fastest_record(cycles)))
     assert sorted(path.name for path in folder.iterdir()) == sorted(
-        ["fastest.json", "fastest.html", "curve.csv", "demand.yaml", *found.programs]
+        ["fastest.json", "fastest.html", "curve.csv", "demand.yaml", *cycles.programs]
     )
-    for name, program in found.programs.items():
+    for name, program in cycles.programs.items():
         assert json.loads((folder / name / "report.json").read_text())["cycle_time_s"] == pytest.approx(program.cycle)
     rows = list(csv.DictReader((folder / "curve.csv").open()))
     assert [row["law"] for row in rows] == [
@@ -290,23 +290,23 @@ def test_the_page_is_whole_and_shows_the_figures_of_the_record(folder: Path) -> 
         assert float(shown[7]) == pytest.approx(figures["energy_proxy_s"], rel=0.006)
 
 
-def test_an_interruption_leaves_nothing_behind(found: ShortestCycles, tmp_path: Path) -> None:
+def test_an_interruption_leaves_nothing_behind(cycles: ShortestCycles, tmp_path: Path) -> None:
     def interrupt(stage: str, _share: float) -> None:
         if stage == "writing the report":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_fastest(found, tmp_path / "fastest", progress=interrupt)
+        write_fastest(cycles, tmp_path / "fastest", progress=interrupt)
 
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_of_the_user_is_not_replaced(found: ShortestCycles, tmp_path: Path) -> None:
+def test_a_folder_of_the_user_is_not_replaced(cycles: ShortestCycles, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "curve.csv").write_text("of another kind")
 
     with pytest.raises(InputError, match=r"holds 'curve\.csv', which cellplan did not write"):
-        write_fastest(found, tmp_path / "mine")
+        write_fastest(cycles, tmp_path / "mine")
 
 
 def test_what_the_processes_of_the_curve_get_can_be_sent(cell: Cell) -> None:

@@ -46,8 +46,8 @@ def test_a_bracket_closes_where_a_step_less_fails(load: object, begin: int) -> N
 def alone(folder: Path) -> Cell:
     """The left arm of the pair."""
     head, right = PAIR.split("  right:\n", 1)
-    kept = [line for line in (head + "part:\n" + right.split("part:\n", 1)[1]).splitlines() if "second:" not in line]
-    return cell_of(folder, "\n".join(kept).replace("pairwise", "simultaneous") + "\n")
+    lines = [line for line in (head + "part:\n" + right.split("part:\n", 1)[1]).splitlines() if "second:" not in line]
+    return cell_of(folder, "\n".join(lines).replace("pairwise", "simultaneous") + "\n")
 
 
 @pytest.mark.slow
@@ -56,22 +56,22 @@ def test_the_shortest_by_the_time_laws_is_not_a_step_too_long(name: str, longest
     """On a mesh the load at one cycle says little of that at another: it is that of single rows."""
     cell = load_cell(CELLS / f"{name}.yaml")
 
-    found = fastest(cell, points=0).by_time_laws
+    result = fastest(cell, points=0).by_time_laws
 
-    assert found.load <= 1.0
-    assert found.cycle <= longest
+    assert result.load <= 1.0
+    assert result.cycle <= longest
     base = cell.with_values({"motion.timing": "as_written"})
-    share = (found.cycle - cell.motion.step) / solve(base).motion.times[-1]
+    share = (result.cycle - cell.motion.step) / solve(base).motion.times[-1]
     assert TimedProgram.solved(base, Law.TIME_LAWS, scaled_values(base, share), task=None, progress=silent).load > 1.0
 
 
 def test_a_path_shorter_than_its_steps_takes_the_fewest_steps(tmp_path: Path) -> None:
     slow = alone(tmp_path).with_values({"motion.step_s": 0.25, "motion.duration_s": 20.0})
 
-    found = fastest(slow, points=0)
+    retimed_motion = fastest(slow, points=0)
 
-    assert found.by_time_laws.cycle == pytest.approx(2.5)  # ten steps
-    lines = "\n".join(fastest_lines(fastest_record(found)))
+    assert retimed_motion.by_time_laws.cycle == pytest.approx(2.5)  # ten steps
+    lines = "\n".join(fastest_lines(fastest_record(retimed_motion)))
     assert "nothing binds" in lines
     assert "none is shorter: a step less (motion.step_s)" in lines
 

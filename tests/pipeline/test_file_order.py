@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders.timed_cells import found_start
+from builders.timed_cells import solved_start
 
 from cellplan import load_cell, solve
 from cellplan.geometry.transforms import Array
@@ -85,7 +85,7 @@ def test_starts_motion_and_verdict_are_the_same_to_the_last_digit(tmp_path: Path
 def start_by_robot(cell: Cell) -> Mapping[str, Array]:
     """The start that is found, by robot."""
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
-    q = found_start(Scene.from_cell(cell), toolpaths)
+    q = solved_start(Scene.from_cell(cell), toolpaths)
     return {robot.name: q[cell.columns(robot.name)] for robot in cell.robots}
 
 
@@ -93,10 +93,10 @@ def test_holders_found_together_do_not_depend_on_the_order(cells: Path) -> None:
     cell = load_cell(cells / "load_sharing_planar.yaml")
     expected = start_by_robot(cell)
 
-    found = start_by_robot(replace(cell, robots=cell.robots[::-1]))
+    starts = start_by_robot(replace(cell, robots=cell.robots[::-1]))
 
     for name, q in expected.items():
-        np.testing.assert_array_equal(found[name], q)
+        np.testing.assert_array_equal(starts[name], q)
 
 
 @pytest.mark.slow
@@ -105,9 +105,9 @@ def test_starts_of_real_arms_do_not_depend_on_the_order(cells: Path, name: str) 
     cell = load_cell(cells / f"{name}.yaml")
     expected = start_by_robot(cell)
     for robots in list(permutations(cell.robots))[1:]:
-        found = start_by_robot(replace(cell, robots=robots))
+        starts = start_by_robot(replace(cell, robots=robots))
         for robot, q in expected.items():
-            np.testing.assert_array_equal(found[robot], q)
+            np.testing.assert_array_equal(starts[robot], q)
 
 
 def test_the_way_to_the_order_of_names_and_back_is_none(cells: Path) -> None:

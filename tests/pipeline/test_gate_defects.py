@@ -12,7 +12,7 @@ from builders.stored_cells import solve_into, write_cell
 from cellplan import export_program, open_gate
 from cellplan.errors import InputError, NotVerifiedError
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 QUICK_ROUNDS, ALL_ROUNDS = 2, 6  # of every kind: 82 and 246 defects
 

@@ -18,7 +18,7 @@ from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
 from cellplan.report.text.run import summary_lines
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 ALLOWED_MM, ALLOWED_DEG = 0.003, 0.001
 

@@ -80,7 +80,7 @@ def test_thirty_two_robots_are_solved_and_certified_from_the_command_line(tmp_pa
     assert report["samples"] == 4001
     assert len(report["tasks"]) == 31
     assert max(task["max_position_error_mm"] for task in report["tasks"].values()) < 1e3 * NEAR
-    assert all(found["certified"] for found in report["clearance"].values())
+    assert all(value["certified"] for value in report["clearance"].values())
     assert len(list((run / "tables").glob("*.csv"))) == 32 + 1  # and the clock
     page = (run / "report.html").read_text(encoding="utf-8")
     assert page.count("<details>") >= 31 + 2 * 32  # a picture of each task, two of each robot

@@ -67,9 +67,9 @@ def test_the_record_is_that_of_a_map_made_in_one_go(folder: Path) -> None:
         {"robots.left.start_deg": [50, -85, 35], "motion.duration_s": 2, "motion.step_s": 0.02}
     )
 
-    found = base_map(cell, "right", GRID)
+    mapped = base_map(cell, "right", GRID)
 
-    assert json.loads((folder / "map.json").read_bytes()) == json.loads(json.dumps(found))
+    assert json.loads((folder / "map.json").read_bytes()) == json.loads(json.dumps(mapped))
     assert set(content(folder)) == {"map.json", "map.html", "map.svg", "study.json", "study.jsonl"}
 
 
@@ -91,23 +91,23 @@ def test_tiles_cover_every_place_with_a_start_once(folder: Path) -> None:
     record = json.loads((folder / "map.json").read_bytes())
 
     places = [place for trial in trials for place in sorted(set(trial["values"]["places"]))]
-    moved = [number for number, each in enumerate(record["places"]) if each["figures"]]
+    moved = [number for number, place in enumerate(record["places"]) if place["figures"]]
     assert len(trials) % tiles.SHARES == 0
     assert len(places) == len(set(places))
     assert set(moved) <= set(places)
 
 
 def test_a_lost_tile_costs_its_own_places_and_says_why(folder: Path, tmp_path: Path) -> None:
-    found = map_study(REQUEST, tmp_path / "map", workers=Crashing())
+    mapped = map_study(REQUEST, tmp_path / "map", workers=Crashing())
 
     whole = json.loads((folder / "map.json").read_bytes())
-    lost = [place for place, each in enumerate(found["places"]) if each["verdict"] == "not_judged"]
+    lost = [place for place, entry in enumerate(mapped["places"]) if entry["verdict"] == "not_judged"]
     assert lost
-    assert found["counts"]["not_judged"] == len(lost)
-    assert {found["places"][place]["reason"] for place in lost} == {"its process ended"}
+    assert mapped["counts"]["not_judged"] == len(lost)
+    assert {mapped["places"][place]["reason"] for place in lost} == {"its process ended"}
     assert all(
-        each["verdict"] == other["verdict"]
-        for place, (each, other) in enumerate(zip(found["places"], whole["places"], strict=True))
+        entry["verdict"] == other["verdict"]
+        for place, (entry, other) in enumerate(zip(mapped["places"], whole["places"], strict=True))
         if place not in lost
     )
     assert "its process ended" in (tmp_path / "map" / "map.html").read_text()
@@ -116,8 +116,8 @@ def test_a_lost_tile_costs_its_own_places_and_says_why(folder: Path, tmp_path: P
 def test_an_earlier_map_is_replaced_and_another_one_not_continued(folder: Path, tmp_path: Path) -> None:
     again = tmp_path / "map"
     again.mkdir()
-    for name, each in content(folder).items():
-        (again / name).write_bytes(each)
+    for name, bytes_ in content(folder).items():
+        (again / name).write_bytes(bytes_)
 
     other = MapRequest(cell=CELL, robot="right", grid=BaseGrid(x=(1000, 2600), step=200), settings=SETTINGS)
     with pytest.raises(Exception, match="expected the study that is to be continued, got one with another value"):

@@ -24,7 +24,7 @@ from cellplan.pipeline.export.part_targets import joints_of_part_poses, with_par
 MM = 1000.0
 WRITTEN = 3e-7  # [m] rounding of four decimals of a millimetre, and of seven of a quaternion at a metre
 AWAY = 1.8e-6  # [rad] two units of the fourth decimal of a degree, by which joint targets are rounded at the most
-FOUND = 1e-3  # [rad] or [m] that rounding moves a joint, where an arm of these is nearly stretched
+TURN_TOL = 1e-3  # [rad] or [m] that rounding moves a joint, where an arm of these is nearly stretched
 TASK_OF = {NAMES[0]: "T_ROB1", NAMES[1]: "T_ROB2", NAMES[2]: "T_ROB3"}
 
 
@@ -79,18 +79,18 @@ def test_joints_are_found_again(seed: int, process: bool) -> None:
     job = filled(part_job(rows=40, seed=seed, process=process, step=0.002))
 
     files = RAPID.render(job)
-    found = joints_of_part_poses(job.frame, job.programs, RAPID.read(job.frame, files))
+    joints = joints_of_part_poses(job.frame, job.programs, RAPID.read(job.frame, files))
 
     assert rules_broken(files, TASK_OF) == []
     cell, written = job.frame.cell, job.programs[0].robots
-    for name, rows in found[0].robots.items():
+    for name, rows in joints[0].robots.items():
         robot = cell.robot(name)
-        assert np.abs(rows.q - written[name].q).max() < FOUND
+        assert np.abs(rows.q - written[name].q).max() < TURN_TOL
         X_CP = cell.part.X_CP
         for row in range(0, len(rows), 5):  # the pose on the part, from joints that were found and that were written
             poses = [
-                np.linalg.inv(tip(cell.robot(NAMES[2]), each[NAMES[2]].q[row]) @ X_CP) @ tip(robot, each[name].q[row])
-                for each in (found[0].robots, written)
+                np.linalg.inv(tip(cell.robot(NAMES[2]), entry[NAMES[2]].q[row]) @ X_CP) @ tip(robot, entry[name].q[row])
+                for entry in (joints[0].robots, written)
             ]
             np.testing.assert_allclose(poses[0], poses[1], rtol=0.0, atol=6.0 * AWAY)
 
@@ -155,13 +155,13 @@ def test_another_place_is_not_met_by_the_joints() -> None:
 )
 def test_configuration_of_an_arm(degrees: tuple[float, ...], expected: tuple[int, ...]) -> None:
     """The lower arm stands upright at zero, 0.6 m long, the forearm points forward, 0.6 m to the wrist."""
-    found = configuration(wide("arm"), np.deg2rad([degrees]))[0]
+    result = configuration(wide("arm"), np.deg2rad([degrees]))[0]
 
-    assert tuple(found[:3]) == expected[:3]
+    assert tuple(result[:3]) == expected[:3]
     lean, bend = np.deg2rad(degrees[1]), np.deg2rad(degrees[1] + degrees[2])
     forward = 0.6 * np.sin(lean) + 0.6 * np.cos(bend)
     is_behind = np.sin(np.deg2rad(degrees[2]) + 0.5 * np.pi) < 0.0  # of the lower arm: the forearm is folded over it
-    assert found[3] == 4 * (forward < 0.0) + 2 * is_behind + (degrees[4] < 0)
+    assert result[3] == 4 * (forward < 0.0) + 2 * is_behind + (degrees[4] < 0)
 
 
 def wide(name: str) -> Robot:
@@ -177,11 +177,11 @@ def test_the_eight_ways_to_a_pose_have_eight_numbers() -> None:
     target = tip(robot, np.array([0.4, 0.3, 0.5, 0.7, 0.9, -0.4]))
     signs = [(shoulder, elbow, wrist) for shoulder in (1, -1) for elbow in (1, -1) for wrist in (1, -1)]
 
-    ways = np.array([closed_form(robot, target, *each) for each in signs])
+    solutions = np.array([closed_form(robot, target, *sign) for sign in signs])
 
-    for q in ways:
+    for q in solutions:
         np.testing.assert_allclose(tip(robot, q), target, rtol=0.0, atol=1e-12)
-    assert sorted(configuration(robot, ways)[:, 3].tolist()) == list(range(8))
+    assert sorted(configuration(robot, solutions)[:, 3].tolist()) == list(range(8))
 
 
 def closed_form(robot: Robot, target: Array, shoulder: int, elbow: int, wrist: int) -> Array:
@@ -206,11 +206,11 @@ def test_quaternions_turn_back_into_their_rotations() -> None:
     angles = np.concatenate([rng.uniform(0.0, 2.0 * np.pi, 390), np.full(10, np.pi)])
     R = rotation_exp(axes * angles[:, None])
 
-    found = quaternions(R)
+    turned_back = quaternions(R)
 
-    np.testing.assert_allclose(quaternion_to_rotation(found), R, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-14)
-    assert np.all(np.sum(found[1:] * found[:-1], axis=1) >= 0.0)
+    np.testing.assert_allclose(quaternion_to_rotation(turned_back), R, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(turned_back, axis=1), 1.0, atol=1e-14)
+    assert np.all(np.sum(turned_back[1:] * turned_back[:-1], axis=1) >= 0.0)
 
 
 # What cannot be written

@@ -71,11 +71,11 @@ def pair(sound: Path) -> VerifiedRun:
 def test_recoveries_from_random_stops_are_free_by_brute_force(pen: VerifiedRun) -> None:
     places, rng = RunPlaces.of(pen), np.random.default_rng(3)
     for at, frozen in random_stops(pen, 2, rng)[1:]:  # one in which the robot stands at another time
-        found = recover(pen, at=at, frozen=frozen)
+        recovery = recover(pen, at=at, frozen=frozen)
 
-        assert found.judgement is not None, found.reason
-        assert next(phase.kind for phase in found.judgement.phases) == "retract"
-        result = brute_force(found, places, rng, moments=10)
+        assert recovery.judgement is not None, recovery.reason
+        assert next(phase.kind for phase in recovery.judgement.phases) == "retract"
+        result = brute_force(recovery, places, rng, moments=10)
         assert result.faults == []
         assert result.smallest >= 0.005 - 1e-4  # what coal's distances leave open
 
@@ -113,16 +113,16 @@ def test_the_clock_names_the_phase_of_each_row(stopped: Recovery, tmp_path: Path
     assert [row["time_s"] for row in clock] == [line.split(",")[0] for line in lines if line[0].isdigit()]
     assert [phase["kind"] for phase in record["phases"]] == ["retract", "transfer"]
     for number, phase in enumerate(record["phases"], start=1):
-        own = [row for row in clock if row["number"] == str(number)]
-        times = [float(row["time_s"]) for row in own]
-        assert {(row["phase"], row["robots"]) for row in own} == {(phase["kind"], "pen")}
+        rows = [row for row in clock if row["number"] == str(number)]
+        times = [float(row["time_s"]) for row in rows]
+        assert {(row["phase"], row["robots"]) for row in rows} == {(phase["kind"], "pen")}
         assert times[0] == phase["begin_s"]
         assert times[-1] <= phase["end_s"]
     assert float(clock[-1]["time_s"]) == record["duration_s"]
 
 
 def test_the_page_of_the_record_lists_its_keys(stopped: Recovery, pen: VerifiedRun, tmp_path: Path) -> None:
-    found = write_recovery(stopped, tmp_path / "found")
+    result = write_recovery(stopped, tmp_path / "found")
     none = write_recovery(recover(pen, at=0.5, keep=["pen"]), tmp_path / "none")
     text = (ROOT / "docs" / "reference" / "recovery-json.md").read_text(encoding="utf-8")
     sections = dict(part.split("\n", 1) for part in text.split("\n## ")[1:])
@@ -131,17 +131,17 @@ def test_the_page_of_the_record_lists_its_keys(stopped: Recovery, pen: VerifiedR
         cells = re.findall(r"^\| ((?:`[^`]+`(?:, )?)+) \|", sections[section], re.MULTILINE)
         return {key for cell in cells for key in re.findall(r"`([^`]+)`", cell)}
 
-    robot = found["state"]["robots"]["pen"]
-    assert listed("Record") == set(found) | set(none)
-    assert listed("State") == set(found["state"]) | {f"robots.NAME.{key}" for key in robot}
-    assert listed("Phase") == set(found["phases"][0])
-    assert listed("Clearance") == set(found["clearance"])
-    assert listed("Pair") == set(found["begins_too_near"][0])
-    assert listed("Check") == set(found["checks"][0])
+    robot = result["state"]["robots"]["pen"]
+    assert listed("Record") == set(result) | set(none)
+    assert listed("State") == set(result["state"]) | {f"robots.NAME.{key}" for key in robot}
+    assert listed("Phase") == set(result["phases"][0])
+    assert listed("Clearance") == set(result["clearance"])
+    assert listed("Pair") == set(result["begins_too_near"][0])
+    assert listed("Check") == set(result["checks"][0])
     header = (tmp_path / "found" / "tables" / "clock.csv").read_text(encoding="utf-8").splitlines()[3]
     assert listed("clock.csv") == set(header.split(","))
     gone = [*none, *re.findall(r"`(\w+)`", text.split("With `not_found` there are no ")[1].split(".")[0])]
-    assert sorted(gone) == sorted(set(found) | set(none))
+    assert sorted(gone) == sorted(set(result) | set(none))
 
 
 def test_a_table_in_which_the_tool_goes_deeper_first_fails(pen: VerifiedRun) -> None:
@@ -156,8 +156,8 @@ def test_a_table_in_which_the_tool_goes_deeper_first_fails(pen: VerifiedRun) -> 
 
     def checks(rows: np.ndarray) -> dict[str, bool]:
         text = render_table(robot, times, rows, header=_header())
-        found = judged({"pen": text}, [replace(phases[0], q=rows)], places=places, state=state)
-        return {check.name: check.passed for check in found.checks if check.name in {"coming_apart", "begin"}}
+        judgement = judged({"pen": text}, [replace(phases[0], q=rows)], places=places, state=state)
+        return {check.name: check.passed for check in judgement.checks if check.name in {"coming_apart", "begin"}}
 
     assert checks(retract) == {"coming_apart": True, "begin": True}
     assert checks(q) == {"coming_apart": False, "begin": True}
@@ -165,26 +165,26 @@ def test_a_table_in_which_the_tool_goes_deeper_first_fails(pen: VerifiedRun) -> 
 
 
 def test_a_robot_that_cannot_leave_the_part_goes_back_along_the_program(pair: VerifiedRun) -> None:
-    found = recover(pair, at=0.5)
+    recovery = recover(pair, at=0.5)
 
-    assert found.judgement is not None
-    assert [phase.kind for phase in found.judgement.phases] == ["back"]
-    tables = [parse_table(found.tables[robot.name], robot.name) for robot in pair.cell.robots]
+    assert recovery.judgement is not None
+    assert [phase.kind for phase in recovery.judgement.phases] == ["back"]
+    tables = [parse_table(recovery.tables[robot.name], robot.name) for robot in pair.cell.robots]
     q = np.concatenate([table.q for table in tables], axis=1)
     np.testing.assert_allclose(q[-1], pair.motion.q[0], atol=1e-11)
     rows = pair.motion.q[pair.motion.times <= 0.5]
-    farthest = max(float(np.abs(rows - each).max(axis=1).min()) for each in q)
+    farthest = max(float(np.abs(rows - entry).max(axis=1).min()) for entry in q)
     assert farthest < float(np.abs(np.diff(rows, axis=0)).max())  # never farther from the program than its rows
-    assert "no millimetre off" in found.tried[0]
+    assert "no millimetre off" in recovery.tried[0]
 
 
 def test_where_nothing_is_found_the_reason_is_written_and_no_table(pair: VerifiedRun, tmp_path: Path) -> None:
-    found = recover(pair, at=0.5, frozen={"right": 0.45})
-    record = write_recovery(found, tmp_path / "out")
+    recovery = recover(pair, at=0.5, frozen={"right": 0.45})
+    record = write_recovery(recovery, tmp_path / "out")
 
-    assert not found.succeeded
-    assert "right: its tool comes no millimetre off" in found.reason
-    assert "robots stand at different times" in found.reason
+    assert not recovery.succeeded
+    assert "right: its tool comes no millimetre off" in recovery.reason
+    assert "robots stand at different times" in recovery.reason
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["recovery.json"]
     written = json.loads((tmp_path / "out" / "recovery.json").read_text(encoding="utf-8"))
     assert written == record
@@ -193,11 +193,11 @@ def test_where_nothing_is_found_the_reason_is_written_and_no_table(pair: Verifie
 
 
 def test_a_robot_that_is_kept_on_the_part_cannot_be_recovered(pen: VerifiedRun) -> None:
-    found = recover(pen, at=0.5, keep=["pen"])
+    recovery = recover(pen, at=0.5, keep=["pen"])
 
-    assert not found.succeeded
-    assert "no robot that may move takes them apart" in found.reason
-    assert "'pen', which is to stand still" in found.reason
+    assert not recovery.succeeded
+    assert "no robot that may move takes them apart" in recovery.reason
+    assert "'pen', which is to stand still" in recovery.reason
 
 
 @pytest.mark.parametrize(
@@ -225,11 +225,11 @@ def test_recoveries_of_shipped_cells_are_free_by_brute_force(name: str, tmp_path
     run, rng = open_gate(tmp_path / "run", cell=cell), np.random.default_rng(5)
     places = RunPlaces.of(run)
     for at, frozen in random_stops(run, 9, rng):
-        found = recover(run, at=at, frozen=frozen)
-        if not found.succeeded:
-            assert found.reason
+        recovery = recover(run, at=at, frozen=frozen)
+        if not recovery.succeeded:
+            assert recovery.reason
             continue
-        assert brute_force(found, places, rng).faults == []
+        assert brute_force(recovery, places, rng).faults == []
 
 
 def _header() -> TableHeader:

@@ -14,7 +14,7 @@ from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.solver import Integrator
 from cellplan.pipeline.overrides import with_overrides
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 COARSE = {"motion.step_s": 0.005, "solver.gain_per_s": 200}  # the gain goes with the step
 

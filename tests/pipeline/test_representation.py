@@ -23,12 +23,14 @@ def test_results_are_one_line(solution: Solution) -> None:
     report, cell = solution.runs[0].report, solution.cell
     toolpath = build_toolpath(cell.tasks[0], cell.part)
 
-    clearance = min(each.minimum for each in report.clearance.minima.values() if each.minimum is not None)
-    pair = next(" - ".join(each.pair) for each in report.clearance.minima.values() if each.minimum == clearance)
-    found = f"passed: {len(report.checks)} checks; smallest clearance {math.floor(1e4 * clearance) / 10:.4g} mm, {pair}"
-    assert repr(solution) == f"<Solution of 'small-pair', simultaneous, 1 s, {found}>"
-    assert repr(report) == f"<Report of 'small-pair', simultaneous, 1 s, {found}>"
-    assert repr(solution.runs[0]) == f"<Run of 'small-pair', all tasks, 1 s, {found}>"
+    clearance = min(value.minimum for value in report.clearance.minima.values() if value.minimum is not None)
+    pair = next(" - ".join(value.pair) for value in report.clearance.minima.values() if value.minimum == clearance)
+    expected = (
+        f"passed: {len(report.checks)} checks; smallest clearance {math.floor(1e4 * clearance) / 10:.4g} mm, {pair}"
+    )
+    assert repr(solution) == f"<Solution of 'small-pair', simultaneous, 1 s, {expected}>"
+    assert repr(report) == f"<Report of 'small-pair', simultaneous, 1 s, {expected}>"
+    assert repr(solution.runs[0]) == f"<Run of 'small-pair', all tasks, 1 s, {expected}>"
     assert repr(solution.motion) == "<Motion of 9 joints, 41 samples, 1 s>"
     assert repr(cell) == "<Cell 'small-pair': robots left, right, idle; tasks path; simultaneous>"
     assert repr(cell.robots[0]) == "<Robot 'left': left, 3 joints>"
@@ -54,7 +56,7 @@ def test_help_describes_every_parameter_and_every_attribute() -> None:
             named = [field.name for field in dataclasses.fields(value)]
         elif inspect.isfunction(value):
             named = [*inspect.signature(value).parameters]
-        silent += [f"{name}: {each}" for each in named if not re.search(rf"^ +{each}: ", text, re.MULTILINE)]
+        silent += [f"{name}: {entry}" for entry in named if not re.search(rf"^ +{entry}: ", text, re.MULTILINE)]
 
     assert silent == []
 

@@ -25,11 +25,11 @@ def test_a_pairwise_job_is_as_good_as_its_worst_run() -> None:
 
     whole = screen(pairwise, candidate)
 
-    each = [screen(pairwise, candidate, task=task.name) for task in cell.tasks]
-    np.testing.assert_array_equal(whole.margins, np.min([run.margins for run in each], axis=0))
-    np.testing.assert_array_equal(whole.speed_ratios, np.max([run.speed_ratios for run in each], axis=0))
-    assert whole.error == max(run.error for run in each)
-    assert whole.is_followed == all(run.is_followed for run in each)
+    entry = [screen(pairwise, candidate, task=task.name) for task in cell.tasks]
+    np.testing.assert_array_equal(whole.margins, np.min([run.margins for run in entry], axis=0))
+    np.testing.assert_array_equal(whole.speed_ratios, np.max([run.speed_ratios for run in entry], axis=0))
+    assert whole.error == max(run.error for run in entry)
+    assert whole.is_followed == all(run.is_followed for run in entry)
 
 
 @pytest.mark.parametrize(
@@ -38,10 +38,10 @@ def test_a_pairwise_job_is_as_good_as_its_worst_run() -> None:
 def test_every_kind_of_job_can_be_screened(name: str) -> None:
     cell = load_cell(CELLS / f"{name}.yaml")
 
-    found = screen(cell, as_candidate(cell))
+    screening = screen(cell, as_candidate(cell))
 
-    assert found.is_followed.all()
-    assert found.error[0] <= 1e-5  # [m] the accuracy that is asked for
+    assert screening.is_followed.all()
+    assert screening.error[0] <= 1e-5  # [m] the accuracy that is asked for
 
 
 def test_candidates_are_left_as_they_are() -> None:

@@ -46,9 +46,9 @@ def test_what_a_cell_demands_of_stops_counts_in_a_search_too(clearance_mm: float
     cell = on_two_controllers(**{"checks.stop": {"clearance_mm": clearance_mm}})
     scene, motion = solve_motion(cell, task=None, progress=silent)
 
-    found = certified(motion, scene, progress=silent, early=EarlyClearance())
+    result = certified(motion, scene, progress=silent, early=EarlyClearance())
 
-    report = found.runs[0].report
+    report = result.runs[0].report
     assert report.skew is None
     (check,) = [check for check in report.checks if check.name == "stop_clearance"]
     assert check.passed is (clearance_mm < 1.0)

@@ -9,7 +9,7 @@ from builders.stored_cells import write_cell
 from cellplan import load_cell, solve
 from cellplan.pipeline.check import check
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 CELLS = sorted((Path(__file__).resolve().parents[2] / "cells").glob("*.yaml"))
 # `test_cell_passes` finds the same starts and proves more of them
@@ -57,7 +57,7 @@ def test_cell_passes(path):
     for run in solution.runs:
         clearance = run.report.clearance
         assert clearance.not_certified == ()
-        assert all(found.certified for found in clearance.minima.values() if found.minimum is not None)
+        assert all(value.certified for value in clearance.minima.values() if value.minimum is not None)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_tables_do_not_depend_on_where_the_cell_was_called_from(tmp_path, monkey
     with solved_anew():
         from_afar = solve(load_cell(path)).runs[0].program.tables
         monkeypatch.chdir(path.parent)
-        beside = solve(load_cell(path.name)).runs[0].program.tables
+        tables = solve(load_cell(path.name)).runs[0].program.tables
 
-    assert beside == from_afar
-    assert all("# cell digest: sha256 " in text for text in beside.values())
+    assert tables == from_afar
+    assert all("# cell digest: sha256 " in text for text in tables.values())

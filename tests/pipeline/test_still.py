@@ -8,7 +8,7 @@ from builders.two_phases import PAIR
 
 from cellplan import Solution, load_cell, solve
 from cellplan.model.report import Check, Report
-from cellplan.pipeline.cell_drawings import STILL, DrawnPhase, phase_drawings, program_drawings
+from cellplan.pipeline.cell_drawings import STILL, DepictedPhase, phase_drawings, program_drawings
 from cellplan.pipeline.gate.compare_drawings import foreign_piece, is_same_drawing
 from cellplan.pipeline.still.instant import worst_instant
 from cellplan.pipeline.still.picture import MARKED, materials, still_picture
@@ -18,7 +18,7 @@ from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 from cellplan.report.still.picture import StillPicture
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -37,12 +37,12 @@ def with_checks(solution: Solution, *checks: Check) -> Report:
     return replace(solution.runs[0].report, checks=checks)
 
 
-def drawn(solution: Solution, report: Report) -> StillPicture:
+def picture_of(solution: Solution, report: Report) -> StillPicture:
     return still_picture(solution.cell, solution.runs[0].schedule, report)
 
 
-def phases(solution: Solution) -> list[DrawnPhase]:
-    return [DrawnPhase(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
+def phases(solution: Solution) -> list[DepictedPhase]:
+    return [DepictedPhase(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
 
 
 def test_the_instant_of_a_sound_run_is_that_of_the_smallest_clearance_of_its_report(solved: Solution) -> None:
@@ -62,7 +62,7 @@ def test_the_instant_of_a_sound_run_is_that_of_the_smallest_clearance_of_its_rep
 
 def test_the_nearest_points_lie_on_the_bodies_that_are_drawn(solved: Solution) -> None:
     run = solved.runs[0]
-    shown = drawn(solved, run.report)
+    shown = picture_of(solved, run.report)
     pair = dict(zip(worst_instant(run.report, solved.cell).bodies, shown.mark, strict=True))
 
     for solid in shown.solids:
@@ -99,7 +99,7 @@ def test_of_one_kind_the_largest_excess_decides(solved: Solution) -> None:
 
 
 def test_bodies_that_touch_are_marked_and_the_other_robot_is_muted(solved: Solution) -> None:
-    shown = drawn(solved, with_checks(solved, failed("collision", "left/A - part")))
+    shown = picture_of(solved, with_checks(solved, failed("collision", "left/A - part")))
 
     materials = {solid.name: solid.material for solid in shown.solids}
     assert {materials["left/A"], materials["part"]} == {MARKED, f"{MARKED}-2"}
@@ -111,7 +111,7 @@ def test_bodies_that_touch_are_marked_and_the_other_robot_is_muted(solved: Solut
 
 def test_a_failure_without_an_instant_does_not_make_the_smallest_clearance_look_failed(solved: Solution) -> None:
     told = failed("payload", "left", at_s=None)
-    shown = drawn(solved, with_checks(solved, told))
+    shown = picture_of(solved, with_checks(solved, told))
 
     assert shown.title.startswith("Smallest clearance")
     assert told.message in shown.notes
@@ -134,7 +134,7 @@ def test_a_robot_called_like_a_colour_leaves_the_colours_of_other_things_alone(
 
 def test_a_joint_beyond_its_limit_marks_the_link_that_it_moves(solved: Solution) -> None:
     joint = solved.cell.robot("left").model.joint_names[1]
-    shown = drawn(solved, with_checks(solved, failed("joint_position", f"left/{joint}")))
+    shown = picture_of(solved, with_checks(solved, failed("joint_position", f"left/{joint}")))
 
     marked = [solid for solid in shown.solids if solid.material == MARKED]
     assert [solid.name for solid in marked] == list(shown.marked)
@@ -146,7 +146,7 @@ def test_a_tool_off_its_path_is_marked_at_its_tip(solved: Solution) -> None:
     from cellplan.kinematics.screw_chain import ScrewChain
 
     report = with_checks(solved, failed("position_error", "first"))
-    shown = drawn(solved, report)
+    shown = picture_of(solved, report)
 
     row = int(np.searchsorted(report.times, 1.0))
     tip = ScrewChain(solved.cell.robot("left")).tool_poses(report.q["left"][row : row + 1])[0, :3, 3]
@@ -162,7 +162,7 @@ def test_of_several_phases_the_worst_one_is_shown(solved: Solution) -> None:
 
     assert whole[STILL] == phase_drawings(bad)[STILL]
     smallest = min(
-        (first, second), key=lambda each: min(m.minimum or 1.0 for m in each.report.clearance.minima.values())
+        (first, second), key=lambda phase: min(m.minimum or 1.0 for m in phase.report.clearance.minima.values())
     )
     assert program_drawings(solved.cell, [first, second])[STILL] == phase_drawings(smallest)[STILL]
 
@@ -184,8 +184,8 @@ def test_the_picture_of_a_program_is_of_the_phase_that_its_report_names(solved: 
     """Phases that are alike but for the noise of the arithmetic, and one that comes nearer."""
     first = solved.runs[0].report
     minima = {
-        kind: replace(each, minimum=None if each.minimum is None else nearer * each.minimum)
-        for kind, each in first.clearance.minima.items()
+        kind: replace(minimum, minimum=None if minimum.minimum is None else nearer * minimum.minimum)
+        for kind, minimum in first.clearance.minima.items()
     }
     second = replace(first, phase="second", clearance=replace(first.clearance, minima=minima))
     one, other = phases(solved)

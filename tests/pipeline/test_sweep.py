@@ -17,7 +17,7 @@ from cellplan.study.variants import read_axis
 CELLS = Path(__file__).resolve().parents[2] / "cells"
 CELL = CELLS / "planar_pair.yaml"
 SLOW = ("motion.step_s=0.02", "solver.integrator=accurate", "tasks.circle.tolerance.position_mm=0.5")
-pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
+pytestmark = pytest.mark.usefixtures("trials_here", "stored_solutions")
 AXIS = "motion.duration_s=1,2,-1"
 
 

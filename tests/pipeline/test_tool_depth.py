@@ -46,7 +46,7 @@ def test_what_is_deeper_than_allowed_fails(tmp_path: Path, path: str, more: str,
     task = tasks_record(run.report, cell)["seam"]
     assert task["max_tool_depth_mm"] == pytest.approx(depth_mm, abs=1e-3)
     assert task["direction"] == "counterclockwise"
-    assert [each.name for each in run.report.checks if not each.passed] == [] if passes else ["tool_depth"]
+    assert [check.name for check in run.report.checks if not check.passed] == [] if passes else ["tool_depth"]
     assert check(cell).passed == passes
 
 

@@ -42,11 +42,11 @@ def given(free: Case) -> Case:
 
 
 def test_the_fit_of_a_motion_gives_the_motion_back(free: Case, given: Case) -> None:
-    own, found = free.resolved().q, given.resolved().q
-    fit = np.abs(found[:, :6] - own[:, :6]).max()
+    free_q, given_q = free.resolved().q, given.resolved().q
+    fit = np.abs(given_q[:, :6] - free_q[:, :6]).max()
 
     assert fit < np.radians(0.05)
-    np.testing.assert_allclose(found, own, rtol=0.0, atol=5.0 * fit)  # wrists turn faster than what they follow
+    np.testing.assert_allclose(given_q, free_q, rtol=0.0, atol=5.0 * fit)  # wrists turn faster than what they follow
 
 
 def test_the_positioner_is_where_its_spline_is_and_as_fast(given: Case) -> None:
@@ -69,8 +69,8 @@ def test_another_engine_sees_all_tools_on_their_paths(given: Case) -> None:
     for row in range(0, len(motion.times), 97):
         state = model.state(motion.q[row])
         for number, scheduled in enumerate(given.schedule.tasks, start=1):
-            found = inverse(state.X_WP) @ state.X_WT[number]
-            np.testing.assert_allclose(found, scheduled.X_PT[row], rtol=0.0, atol=2.0 * CELL.solver.accuracy_mm.si)
+            X_PT = inverse(state.X_WP) @ state.X_WT[number]
+            np.testing.assert_allclose(X_PT, scheduled.X_PT[row], rtol=0.0, atol=2.0 * CELL.solver.accuracy_mm.si)
 
 
 def test_a_path_that_stands_still_is_a_part_at_rest(free: Case) -> None:
@@ -97,13 +97,13 @@ def test_eulers_steps_lead_the_operators_the_same_way(given: Case) -> None:
 def test_screening_has_the_figures_of_the_same_motion(given: Case) -> None:
     candidates = Candidates.of([given.cell], given.start[None])
 
-    found = screen_layouts(given.cell, given.schedule, candidates, moving=given.moving, accuracy=1e-6)
+    screening = screen_layouts(given.cell, given.schedule, candidates, moving=given.moving, accuracy=1e-6)
 
     motion, limits = given.resolved(), CELL.joint_limits
-    room = np.minimum(motion.q.min(axis=0) - limits.lower, limits.upper - motion.q.max(axis=0))
-    assert found.is_feasible.all()
-    np.testing.assert_allclose(found.margins[0], room, rtol=0.0, atol=np.radians(0.02))
-    np.testing.assert_allclose(found.speed_ratios[0], speed_ratios(motion.q, motion.times, CELL), rtol=0.02)
+    margins = np.minimum(motion.q.min(axis=0) - limits.lower, limits.upper - motion.q.max(axis=0))
+    assert screening.is_feasible.all()
+    np.testing.assert_allclose(screening.margins[0], margins, rtol=0.0, atol=np.radians(0.02))
+    np.testing.assert_allclose(screening.speed_ratios[0], speed_ratios(motion.q, motion.times, CELL), rtol=0.02)
 
 
 def speed_ratios(q: Array, times: Array, cell: Cell) -> Array:

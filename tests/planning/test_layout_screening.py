@@ -41,24 +41,26 @@ def shifts(count: int, largest: float) -> Array:
 
 
 def test_a_candidate_has_the_figures_of_the_cell_resolved_alone(job: SimpleNamespace) -> None:
-    asked = candidates(job, shifts(3, 0.1))
+    wanted = candidates(job, shifts(3, 0.1))
 
-    found = screen_layouts(job.cell, job.schedule, asked, moving=job.moving, accuracy=1e-6)
+    screening = screen_layouts(job.cell, job.schedule, wanted, moving=job.moving, accuracy=1e-6)
 
-    assert found.is_feasible.all()
+    assert screening.is_feasible.all()
     for k in range(3):
-        robots = tuple(replace(robot, X_WB=X_WB) for robot, X_WB in zip(job.cell.robots, asked.X_WB[k], strict=True))
+        robots = tuple(replace(robot, X_WB=X_WB) for robot, X_WB in zip(job.cell.robots, wanted.X_WB[k], strict=True))
         cell = replace(job.cell, robots=robots)
-        motion = plan_motion(MotionTask(cell, job.schedule, job.moving, found.start[k]))
+        motion = plan_motion(MotionTask(cell, job.schedule, job.moving, screening.start[k]))
         joints = [joint for robot in robots for joint in robot.model.joints]
-        room = np.minimum(
+        margins = np.minimum(
             motion.q.min(axis=0) - [joint.lower for joint in joints],
             [joint.upper for joint in joints] - motion.q.max(axis=0),
         )
         speeds = np.abs(np.diff(motion.q, axis=0)).max(axis=0) / job.cell.motion.step
         # the turning points of joints lie between the instants that either of them looks at
-        np.testing.assert_allclose(found.margins[k], room, rtol=0.0, atol=np.radians(0.02))
-        np.testing.assert_allclose(found.speed_ratios[k], speeds / [j.velocity for j in joints], rtol=0.02, atol=1e-3)
+        np.testing.assert_allclose(screening.margins[k], margins, rtol=0.0, atol=np.radians(0.02))
+        np.testing.assert_allclose(
+            screening.speed_ratios[k], speeds / [j.velocity for j in joints], rtol=0.02, atol=1e-3
+        )
 
 
 def test_it_does_not_matter_who_else_is_screened(job: SimpleNamespace) -> None:
@@ -77,7 +79,7 @@ def test_a_cell_moved_as_a_whole_keeps_its_figures(job: SimpleNamespace) -> None
     here = candidates(job, shifts(2, 0.05))
     moved = Candidates(X_WB=pose((3.0, -2.0, 1.0), (0.1, 0.2, 2.0)) @ here.X_WB, X_FT=here.X_FT, start=here.start)
 
-    before, after = (screen_layouts(job.cell, job.schedule, each, moving=job.moving) for each in (here, moved))
+    before, after = (screen_layouts(job.cell, job.schedule, case, moving=job.moving) for case in (here, moved))
 
     np.testing.assert_allclose(after.margins, before.margins, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(after.speed_ratios, before.speed_ratios, rtol=0.0, atol=1e-8)
@@ -88,13 +90,13 @@ def test_a_longer_tool_changes_the_start_of_its_own_robot_only(job: SimpleNamesp
     X_FT = here.X_FT.copy()
     X_FT[1, 1] = X_FT[1, 1] @ pose((0.0, 0.0, 0.03))
 
-    found = screen_layouts(job.cell, job.schedule, replace(here, X_FT=X_FT), moving=job.moving)
+    screening = screen_layouts(job.cell, job.schedule, replace(here, X_FT=X_FT), moving=job.moving)
 
-    assert found.is_followed.all()
+    assert screening.is_followed.all()
     kuka = job.cell.columns("kuka")
-    assert np.max(np.abs(found.margins[1, kuka] - found.margins[0, kuka])) > np.radians(0.5)
-    assert np.max(np.abs(found.start[1] - found.start[0])[kuka]) > np.radians(0.5)
-    others = np.delete(found.start[1] - found.start[0], np.arange(kuka.start, kuka.stop))
+    assert np.max(np.abs(screening.margins[1, kuka] - screening.margins[0, kuka])) > np.radians(0.5)
+    assert np.max(np.abs(screening.start[1] - screening.start[0])[kuka]) > np.radians(0.5)
+    others = np.delete(screening.start[1] - screening.start[0], np.arange(kuka.start, kuka.stop))
     assert np.max(np.abs(others)) <= 1e-12  # [rad] rounding
 
 
@@ -103,24 +105,26 @@ def test_what_is_out_of_reach_is_lost_and_affects_no_other(job: SimpleNamespace)
     places[2, 1] += FAR
     alone = screen_layouts(job.cell, job.schedule, candidates(job, places[[0, 1, 3]]), moving=job.moving)
 
-    found = screen_layouts(job.cell, job.schedule, candidates(job, places), moving=job.moving)
+    screening = screen_layouts(job.cell, job.schedule, candidates(job, places), moving=job.moving)
 
-    assert found.lost_at[2] == -np.inf
-    assert found.is_followed.tolist() == [True, True, False, True]
-    assert not found.is_feasible[2]
-    np.testing.assert_allclose(found.margins[[0, 1, 3]], alone.margins, rtol=0.0, atol=1e-9)
+    assert screening.lost_at[2] == -np.inf
+    assert screening.is_followed.tolist() == [True, True, False, True]
+    assert not screening.is_feasible[2]
+    np.testing.assert_allclose(screening.margins[[0, 1, 3]], alone.margins, rtol=0.0, atol=1e-9)
 
 
 def test_a_tool_that_cannot_follow_is_lost_on_the_way(job: SimpleNamespace) -> None:
     places = np.zeros((41, 3, 3))
     places[:, 0, 1] = np.linspace(0.0, 0.8, 41)  # the first operator stands farther and farther away
 
-    found = screen_layouts(job.cell, job.schedule, candidates(job, places), moving=job.moving[1:])  # the part at rest
+    screening = screen_layouts(
+        job.cell, job.schedule, candidates(job, places), moving=job.moving[1:]
+    )  # the part at rest
 
-    lost = np.flatnonzero((found.lost_at >= 0.0) & ~found.is_followed)
+    lost = np.flatnonzero((screening.lost_at >= 0.0) & ~screening.is_followed)
     assert len(lost) > 0
-    assert np.all(found.lost_at[lost] < job.schedule.times[-1])
-    assert found.is_followed[0]
+    assert np.all(screening.lost_at[lost] < job.schedule.times[-1])
+    assert screening.is_followed[0]
 
 
 def test_candidates_must_fit_the_cell(job: SimpleNamespace) -> None:
@@ -138,7 +142,7 @@ def test_no_candidates_give_no_figures(job: SimpleNamespace) -> None:
     none = candidates(job, np.zeros((1, 3, 3)))
     none = Candidates(X_WB=none.X_WB[:0], X_FT=none.X_FT[:0], start=none.start[:0])
 
-    found = screen_layouts(job.cell, job.schedule, none, moving=job.moving)
+    screening = screen_layouts(job.cell, job.schedule, none, moving=job.moving)
 
-    assert found.margins.shape == (0, job.cell.joint_count)
-    assert not len(found.is_feasible)
+    assert screening.margins.shape == (0, job.cell.joint_count)
+    assert not len(screening.is_feasible)

@@ -35,8 +35,8 @@ def arm(points: list[Any], start: list[float], *, step: float = 1e-3, damping: f
 
 
 def tips(case: Case, q: Array) -> Array:
-    found: Array = ScrewChain(case.cell.robots[0]).tool_poses(q)[:, :2, 3]
-    return found
+    result: Array = ScrewChain(case.cell.robots[0]).tool_poses(q)[:, :2, 3]
+    return result
 
 
 @pytest.mark.slow
@@ -83,13 +83,13 @@ def test_more_accuracy_takes_more_work_and_gives_less_error() -> None:
 
 def test_an_account_is_kept() -> None:
     motion = triangles(CELLS["mixed"]).resolved()
-    found = motion.resolution
-    assert found.integrator is Integrator.ACCURATE
-    assert found.nodes == 6 * 24 + 1  # three sides in two panels each
-    assert found.panels == 6
-    assert found.sweeps > 0
-    assert found.solves >= found.nodes
-    assert found.euler_from is None
+    result = motion.resolution
+    assert result.integrator is Integrator.ACCURATE
+    assert result.nodes == 6 * 24 + 1  # three sides in two panels each
+    assert result.panels == 6
+    assert result.sweeps > 0
+    assert result.solves >= result.nodes
+    assert result.euler_from is None
     stepped = triangles(CELLS["mixed"]).resolved(integrator=EULER).resolution
     assert (stepped.integrator, stepped.nodes, stepped.solves, stepped.error_between) == (EULER, 1001, 1000, None)
 

@@ -48,8 +48,8 @@ def seen_by_the_checks(case: Case, q: Array) -> Array:
     X_WP = part_poses(case.cell, chains, positions)
     worst = np.zeros(len(q))
     for task in case.schedule.tasks:
-        found = task_accuracy(task, chains[task.task.robot], q=positions[task.task.robot], X_WP=X_WP)
-        for error in (found.position_error, found.orientation_error):
+        result = task_accuracy(task, chains[task.task.robot], q=positions[task.task.robot], X_WP=X_WP)
+        for error in (result.position_error, result.orientation_error):
             worst = np.maximum(worst, np.linalg.norm(error, axis=1))
     return worst
 
@@ -93,9 +93,9 @@ def test_what_the_nodes_and_the_points_between_them_miss_is_found_and_resolved()
     case = replace(case, schedule=schedule_paths(case.cell, (dented, *others)))
     allowed = case.cell.solver.accuracy_mm.si
 
-    missed, found = case.resolved(), closely(case)
+    missed, result = case.resolved(), closely(case)
 
     assert missed.resolution is not None
     assert missed.resolution.error_between is not None
     assert missed.resolution.error_between <= allowed < 0.5 * DENT < seen_by_the_checks(case, missed.q).max()
-    assert seen_by_the_checks(case, found.q).max() <= allowed
+    assert seen_by_the_checks(case, result.q).max() <= allowed

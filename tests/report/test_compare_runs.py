@@ -67,9 +67,9 @@ def test_texts_may_be_reworded_round_the_same_figures_only(
     record = json.loads(report.read_text(encoding="utf-8"))
     report.write_text(json.dumps(record | {"caution": old}), encoding="utf-8")
 
-    found = compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts={}, may_be_reworded=True)
+    result = compare_runs.compare_run(trees[0] / "pair", trees[1] / "pair", texts={}, may_be_reworded=True)
 
-    assert found is is_different
+    assert result is is_different
     assert f"{0 if is_different else 1} texts reworded" in capsys.readouterr().out
 
 

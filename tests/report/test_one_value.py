@@ -24,8 +24,8 @@ def odd(passed_run: Any) -> Any:
     """A run whose figures look different in every other rounding."""
     report = passed_run.report
     minima = {
-        kind: replace(each, minimum=None if each.minimum is None else 9.9989e-3)
-        for kind, each in report.clearance.minima.items()
+        kind: replace(value, minimum=None if value.minimum is None else 9.9989e-3)
+        for kind, value in report.clearance.minima.items()
     }
     joints = tuple(replace(use, margin=min(use.margin, 0.2552)) for use in report.joints)
     clearance = replace(report.clearance, minima=minima)
@@ -39,7 +39,7 @@ def record_of(run: Any) -> Any:
 
 def test_duration_clearance_margin_and_speed_are_the_same_on_terminal_and_pages(odd: Any) -> None:
     record = record_of(odd)
-    cards = {each["label"]: f"{each['value']} {each['unit']}" for each in key_figures(record)}
+    cards = {entry["label"]: f"{entry['value']} {entry['unit']}" for entry in key_figures(record)}
     lines = {line.strip().split("  ")[0]: line for line in figure_lines(record, "the report")}
     facts = dict(_facts(record))
 
@@ -112,5 +112,5 @@ def test_the_table_of_phases_has_the_errors_of_all_operators_between_the_rows_to
     ((phase, (position, orientation)),) = phase_errors(record).items()
 
     assert phase == "work-1"
-    assert [(each["value"], each["where"]) for each in (position, orientation)] == [("0.004", "seam (left)")] * 2
+    assert [(entry["value"], entry["where"]) for entry in (position, orientation)] == [("0.004", "seam (left)")] * 2
     assert not position["is_bad"]

@@ -111,7 +111,7 @@ def distance_to_link(model: RobotModel, link: int, points_B: Array) -> Array:
 def surface_of_link(model: RobotModel, link: int) -> Array:
     """Points in B spread over the outer surface of a link's bodies at the reference configuration."""
     rng = np.random.default_rng(7)
-    found = []
+    results = []
     for body in model.bodies:
         if body.link == link:
             mesh = tessellate(body.shape, 24)
@@ -121,8 +121,8 @@ def surface_of_link(model: RobotModel, link: int) -> Array:
             )
             chosen = triangles[rng.choice(len(triangles), size=800, p=areas / areas.sum())]
             shares = rng.dirichlet(np.ones(3), size=800)
-            found.append(transform_points(body.X_BS, np.einsum("nij,ni->nj", chosen, shares)))
-    points = np.concatenate(found)
+            results.append(transform_points(body.X_BS, np.einsum("nij,ni->nj", chosen, shares)))
+    points = np.concatenate(results)
     outer: Array = points[distance_to_link(model, link, points) > -1e-6]
     return outer
 

@@ -79,10 +79,10 @@ def test_the_kuka_turns_as_the_arms_of_its_family(configurations: Array, shared_
     folder = shared_robots / "kuka_kr16_2"
     kr16 = load_urdf(folder / "kuka_kr16_2.urdf", UrdfOptions(package_dirs=(shared_robots,))).model
 
-    found = chain(maker).flange_poses(configurations)[:, :3, :3]
+    result = chain(maker).flange_poses(configurations)[:, :3, :3]
     expected = chain(kr16).flange_poses(configurations)[:, :3, :3]
 
-    np.testing.assert_allclose(found, expected, atol=1e-9)  # the URDF writes pi with 16 digits
+    np.testing.assert_allclose(result, expected, atol=1e-9)  # the URDF writes pi with 16 digits
 
 
 def test_the_limits_of_the_kuka_belong_to_the_maker_s_zero() -> None:

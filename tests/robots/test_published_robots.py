@@ -156,7 +156,7 @@ def test_the_flange_is_where_the_published_parameters_have_it(name: str) -> None
     convention, rows = PUBLISHED[name]
     q = configurations(model)
 
-    np.testing.assert_allclose(chain(model).flange_poses(q), [convention(rows, each) for each in q], atol=SAME)
+    np.testing.assert_allclose(chain(model).flange_poses(q), [convention(rows, entry) for entry in q], atol=SAME)
 
 
 def test_the_panda_has_the_limits_that_its_maker_gives_in_radians() -> None:
@@ -210,8 +210,8 @@ def test_a_reach_to_an_unknown_joint_is_refused(tmp_path: Path) -> None:
 
 def distance_to_link(model: RobotModel, link: int, points_B: Array) -> Array:
     bodies = [body for body in model.bodies if body.link == link]
-    found = [distance_to(body.shape, transform_points(inverse(body.X_BS), points_B)) for body in bodies]
-    nearest: Array = np.min(found, axis=0)
+    result = [distance_to(body.shape, transform_points(inverse(body.X_BS), points_B)) for body in bodies]
+    nearest: Array = np.min(result, axis=0)
     return nearest
 
 
@@ -276,10 +276,10 @@ def test_the_reference_page_shows_the_figures_of_the_table(name: str, repository
 def test_bodies_hold_the_real_robot_as_well_as_they_say(name: str, shared_robots: Path) -> None:
     model = load_bundled(name)
     meshes = mesh_points(shared_robots / URDFS[name] / f"{URDFS[name]}.urdf", model, is_visual=True, count=3000)
-    found = compare(model, meshes)
+    comparison = compare(model, meshes)
     assert model.body_accuracy is not None
-    assert len(found) == len(model.joints) + 1
-    for row in found:
+    assert len(comparison) == len(model.joints) + 1
+    for row in comparison:
         assert row.outside < model.body_accuracy.accuracy_mm.si <= 0.050, row.link
         assert row.usual < 0.025, row.link  # [m] half of it: a box round a casting with rounded edges
         assert row.fat < 0.040, row.link

@@ -26,5 +26,5 @@ def test_a_real_arm_on_either_side_of_the_part_gives_one_matrix(shared_robots: P
     for seed in range(3):
         q = np.random.default_rng(seed).uniform(-2.0, 2.0, cell.joint_count)
         planned = planners_jacobian(cell, q)
-        for way in (dh_cooperation_jacobian, screw_cooperation_jacobian, davies_cooperation_jacobian):
-            assert np.abs(way(cell, q) - planned).max() <= AGREEMENT * np.abs(planned).max()
+        for derivation in (dh_cooperation_jacobian, screw_cooperation_jacobian, davies_cooperation_jacobian):
+            assert np.abs(derivation(cell, q) - planned).max() <= AGREEMENT * np.abs(planned).max()

@@ -53,8 +53,8 @@ def gripping(*, off: float = 0.03, deep: float = 0.0, bodies: tuple[str, ...] | 
 
 
 def pair_of(scene: Scene, first: str, second: str) -> ScenePair:
-    (found,) = (pair for pair in scene.pairs if set(scene.names(pair)) == {first, second})
-    return found
+    (pair,) = (pair for pair in scene.pairs if set(scene.names(pair)) == {first, second})
+    return pair
 
 
 def refusal(cell: Cell) -> str:
@@ -74,7 +74,7 @@ def test_named_bodies_grip_and_all_others_keep_the_clearance() -> None:
     assert [scene.bodies[pair.first].name for pair in scene.mounted] == list(FINGERS)
     hand = pair_of(scene, "a/hand", "part")
     assert (hand.rule, hand.demand, hand.solids is None) == (Rule.CLEARANCE, 0.005, False)
-    gripped = {each.bodies for each in scene.left_out if each.kind is LeftOutKind.GRIP}
+    gripped = {pair.bodies for pair in scene.left_out if pair.kind is LeftOutKind.GRIP}
     assert gripped == {("a/left", "part"), ("a/right", "part")}
 
 
@@ -168,7 +168,7 @@ def disabled(*pairs: tuple[str, str]) -> Cell:
 def test_a_disabled_pair_is_left_out_and_listed_with_its_reason() -> None:
     plain, scene = Scene.from_cell(disabled()), Scene.from_cell(disabled(("foot", "forearm"), ("foot", "tube")))
 
-    listed = [(each.bodies, each.reason) for each in scene.left_out if each.kind is LeftOutKind.SRDF]
+    listed = [(pair.bodies, pair.reason) for pair in scene.left_out if pair.kind is LeftOutKind.SRDF]
     reason = "disabled in arm.srdf as 'Never'"
     assert listed == [(("a/foot", "a/forearm"), reason), (("a/foot", "a/tube"), reason)]
     assert {scene.names(pair) for pair in scene.pairs} == {plain.names(pair) for pair in plain.pairs} - {
@@ -179,20 +179,22 @@ def test_a_disabled_pair_is_left_out_and_listed_with_its_reason() -> None:
 def test_a_pair_that_is_joined_anyway_is_no_exclusion_of_the_file() -> None:
     scene = Scene.from_cell(disabled(("foot", "column")))
 
-    assert not [each for each in scene.left_out if each.kind is LeftOutKind.SRDF]
-    assert ("a/column", "a/foot", "joined by joint a1") in {(*sorted(each[:2]), each[2]) for each in scene.exclusions}
+    assert not [pair for pair in scene.left_out if pair.kind is LeftOutKind.SRDF]
+    assert ("a/column", "a/foot", "joined by joint a1") in {
+        (*sorted(exclusion[:2]), exclusion[2]) for exclusion in scene.exclusions
+    }
 
 
 def test_disabled_links_are_watched_against_all_else() -> None:
     """Every pair of two links of the arm is disabled: part, tools, attachments, the other arm and the wall remain."""
-    names = [each.name for each in gripper_model().bodies]
+    names = [body.name for body in gripper_model().bodies]
     plain = Scene.from_cell(disabled())
     scene = Scene.from_cell(disabled(*((one, other) for one in names for other in names if one < other)))
 
-    own = {f"a/{name}" for name in names}
+    links = {f"a/{name}" for name in names}
     lost = {plain.names(pair) for pair in plain.pairs} - {scene.names(pair) for pair in scene.pairs}
     assert lost
-    assert all(set(pair) <= own for pair in lost)
+    assert all(set(pair) <= links for pair in lost)
     assert scene.mounted == plain.mounted
 
 
@@ -209,7 +211,7 @@ def working(*, gripper: tuple[str, ...], deep: float = 0.0) -> Cell:
 def test_a_gripper_may_touch_what_it_works_on_near_the_tip_as_a_tool_may() -> None:
     scene = Scene.from_cell(working(gripper=("hand", "left", "right")))
 
-    assert {each.bodies: each.kind for each in scene.left_out if "part" in each.bodies} == {
+    assert {pair.bodies: pair.kind for pair in scene.left_out if "part" in pair.bodies} == {
         ("a/left", "part"): LeftOutKind.AT_WORK,
         ("a/right", "part"): LeftOutKind.AT_WORK,
     }
@@ -236,10 +238,10 @@ def test_how_deep_a_gripper_works_is_judged_like_a_tool(deep: float) -> None:
     cell = working(gripper=("left", "right"), deep=deep)
     scene = Scene.from_cell(cell)
 
-    (found,) = tool_depths(cell, schedule(2, work("a")), scene.chains, {"a": np.zeros((2, 6))})
+    (depth,) = tool_depths(cell, schedule(2, work("a")), scene.chains, {"a": np.zeros((2, 6))})
 
-    assert found.depth == pytest.approx(deep, abs=1e-5)
-    assert found.body == "axis" or found.body in {"left", "right"}
+    assert depth.depth == pytest.approx(deep, abs=1e-5)
+    assert depth.body == "axis" or depth.body in {"left", "right"}
 
 
 def test_the_depth_of_fingers_beside_the_axis_is_that_of_the_finger() -> None:
@@ -247,8 +249,8 @@ def test_the_depth_of_fingers_beside_the_axis_is_that_of_the_finger() -> None:
     cell = working(gripper=("left", "right"))
     rib = fixed_part(Box((0.02, 0.02, 0.3)), pose((0.7 + GRIP_HEIGHT + 0.01 - 0.004, 0.03, 1.0)))
 
-    (found,) = tool_depths(
+    (depth,) = tool_depths(
         replace(cell, part=rib), schedule(2, work("a")), Scene.from_cell(cell).chains, {"a": np.zeros((2, 6))}
     )
 
-    assert (found.body, found.depth) == ("left", pytest.approx(0.004, abs=1e-5))
+    assert (depth.body, depth.depth) == ("left", pytest.approx(0.004, abs=1e-5))

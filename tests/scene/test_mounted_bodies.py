@@ -36,7 +36,7 @@ def rule_of(scene: Scene, *names: str) -> Rule | None:
 
 def pose_of(cell: Cell, name: str, q: np.ndarray) -> np.ndarray:
     scene = Scene.from_cell(cell)
-    index = [each.name for each in scene.bodies].index(name)
+    index = [body.name for body in scene.bodies].index(name)
     poses = scene.body_poses(q[None])
     return np.append(poses.p[index, 0], poses.R[index, 0].ravel())
 
@@ -44,7 +44,7 @@ def pose_of(cell: Cell, name: str, q: np.ndarray) -> np.ndarray:
 def test_a_pedestal_reaches_from_the_floor_to_the_base_wherever_the_base_stands() -> None:
     for height in (0.1, 0.9):
         bodies = Scene.from_cell(make_cell(arm(base=pose((1.0, 2.0, height)), pedestal=COLUMN))).bodies
-        column = next(each for each in bodies if each.name == "a/pedestal")
+        column = next(body for body in bodies if body.name == "a/pedestal")
 
         X_WS = pose((1.0, 2.0, height)) @ column.X_BS
         assert column.shape.length == pytest.approx(height)
@@ -90,7 +90,7 @@ def test_a_pedestal_carries_its_own_base_and_is_judged_against_everything_else()
 
 def test_a_pedestal_carries_the_first_link_of_a_robot_whose_foot_has_no_body() -> None:
     model = arm_model()
-    model = replace(model, bodies=tuple(each for each in model.bodies if each.link != BASE))
+    model = replace(model, bodies=tuple(body for body in model.bodies if body.link != BASE))
     scene = Scene.from_cell(make_cell(arm(model=model, pedestal=COLUMN)))
 
     assert reason_of(scene, "a/pedestal", "a/column") == "stands on it, as the foot has no body"
@@ -101,9 +101,9 @@ def test_an_attachment_moves_with_its_link() -> None:
     valve = body("valve", 2, shape=Sphere(0.03), at=(0.2, 0.1, 1.1))
     q = np.array([0.3, -0.4, 0.8, 1.0, -0.2, 0.5])
     cell = make_cell(arm(attachments=(valve,)))
-    drawn = replace(arm_model(), bodies=(*arm_model().bodies, valve))
+    model = replace(arm_model(), bodies=(*arm_model().bodies, valve))
 
-    of_file = pose_of(make_cell(arm(model=drawn)), "a/valve", q)
+    of_file = pose_of(make_cell(arm(model=model)), "a/valve", q)
     np.testing.assert_allclose(pose_of(cell, "a/valve", q), of_file, atol=1e-14)
 
 
@@ -118,8 +118,8 @@ def test_an_attachment_that_touches_another_link_in_every_configuration_is_refus
 
 
 def test_an_attachment_that_touches_other_bodies_now_and_then_is_judged_by_the_motion() -> None:
-    beside = body("valve", 2, shape=Sphere(0.05), at=(0.2, 0.16, 1.0))
-    scene = Scene.from_cell(make_cell(arm(attachments=(beside,)), things=(floor(),)))
+    neighbour = body("valve", 2, shape=Sphere(0.05), at=(0.2, 0.16, 1.0))
+    scene = Scene.from_cell(make_cell(arm(attachments=(neighbour,)), things=(floor(),)))
 
     for name in ("a/tube", "a/upper_arm", "a/wrist", "a/tool", "part", "floor"):
         assert rule_of(scene, "a/valve", name) is Rule.CLEARANCE, name

@@ -61,7 +61,7 @@ def test_a_part_the_wrong_way_round_is_refused_with_all_that_it_touches() -> Non
 
 def test_a_part_the_wrong_way_round_is_refused_where_the_flange_has_no_body() -> None:
     model = arm_model()
-    bare = replace(model, bodies=tuple(each for each in model.bodies if each.name != "hand"))
+    bare = replace(model, bodies=tuple(body for body in model.bodies if body.name != "hand"))
 
     said = refusal(make_cell(placed("a", bare), part=held_part(PLATE, "a", WRONG)))
 
@@ -71,7 +71,7 @@ def test_a_part_the_wrong_way_round_is_refused_where_the_flange_has_no_body() ->
 def test_pairs_named_by_the_user_are_no_error() -> None:
     scene = Scene.from_cell(holder(WRONG, checks=leave(("a/wrist", "part"), ("a/tube", "part"))))
 
-    kinds = {each.bodies: each.kind for each in scene.left_out}
+    kinds = {pair.bodies: pair.kind for pair in scene.left_out}
     assert kinds["a/wrist", "part"] is LeftOutKind.EXCLUDED
     assert kinds["a/hand", "part"] is LeftOutKind.GRIP
 
@@ -179,14 +179,14 @@ def test_what_stands_is_judged_by_its_depth_and_feet_keep_their_distance() -> No
 def test_a_first_link_that_only_just_touches_the_floor_stands_there() -> None:
     model = arm_model()
     bodies = tuple(
-        replace(each, X_BS=pose((0.0, 0.0, 0.075))) if each.name == "column" else each for each in model.bodies[1:]
+        replace(body, X_BS=pose((0.0, 0.0, 0.075))) if body.name == "column" else body for body in model.bodies[1:]
     )
     legless = placed("a", replace(model, bodies=bodies), base=pose((0.0, 0.0, 1e-8)))
 
     scene = Scene.from_cell(make_cell(legless, things=(floor(),)))
 
-    found = {scene.bodies[pair.first].name: (pair.mount, pair.moves) for pair in scene.mounted}
-    assert found["a/column"] == (Mount.STANDING, True)
+    result = {scene.bodies[pair.first].name: (pair.mount, pair.moves) for pair in scene.mounted}
+    assert result["a/column"] == (Mount.STANDING, True)
 
 
 def test_nothing_is_left_out_of_a_cell_without_anything_mounted() -> None:
@@ -209,8 +209,8 @@ def test_the_order_of_the_robots_changes_no_verdict_on_pairs() -> None:
     one, other = Scene.from_cell(make_cell(*arms)), Scene.from_cell(make_cell(*arms[::-1]))
 
     def verdicts(scene: Scene) -> dict[frozenset[str], str]:
-        kept = {frozenset(scene.names(pair)): str(pair.rule) for pair in scene.pairs}
-        return kept | {frozenset((first, second)): reason for first, second, reason in scene.exclusions}
+        rules = {frozenset(scene.names(pair)): str(pair.rule) for pair in scene.pairs}
+        return rules | {frozenset((first, second)): reason for first, second, reason in scene.exclusions}
 
     assert verdicts(one) == verdicts(other)
 

@@ -33,21 +33,21 @@ def with_bases(cell: Cell, bases: dict[str, Array]) -> Cell:
     return replace(cell, robots=tuple(replace(robot, X_WB=bases[robot.name]) for robot in cell.robots))
 
 
-def assert_same(found: Scene, expected: Scene) -> None:
+def assert_same(scene: Scene, expected: Scene) -> None:
     """Everything that a certificate asks of a scene."""
-    assert (found.pairs, found.mounted, found.excluded) == (expected.pairs, expected.mounted, expected.excluded)
-    assert (found.exclusions, found.left_out) == (expected.exclusions, expected.left_out)
-    assert [body.name for body in found.bodies] == [body.name for body in expected.bodies]
+    assert (scene.pairs, scene.mounted, scene.excluded) == (expected.pairs, expected.mounted, expected.excluded)
+    assert (scene.exclusions, scene.left_out) == (expected.exclusions, expected.left_out)
+    assert [body.name for body in scene.bodies] == [body.name for body in expected.bodies]
     rng = np.random.default_rng(2)
-    q = rng.uniform(-1.0, 1.0, (2, found.cell.joint_count))
-    poses = [scene.body_poses(q) for scene in (found, expected)]
+    q = rng.uniform(-1.0, 1.0, (2, scene.cell.joint_count))
+    poses = [scene.body_poses(q) for scene in (scene, expected)]
     np.testing.assert_allclose(poses[0].R, poses[1].R, atol=1e-12)
     np.testing.assert_allclose(poses[0].p, poses[1].p, atol=1e-12)
-    np.testing.assert_allclose(found.engine.radii, expected.engine.radii, atol=1e-12)
-    for one, other in zip(found.bodies, expected.bodies, strict=True):
+    np.testing.assert_allclose(scene.engine.radii, expected.engine.radii, atol=1e-12)
+    for one, other in zip(scene.bodies, expected.bodies, strict=True):
         if not is_ground(one) and not isinstance(one.shape, Mesh):
             assert repr(one.shape) == repr(other.shape) or one.shape == pytest.approx(other.shape)
-    near = [scene.near(q, 0.3) for scene in (found, expected)]
+    near = [scene.near(q, 0.3) for scene in (scene, expected)]
     np.testing.assert_array_equal(near[0].rows, near[1].rows)
     np.testing.assert_allclose(near[0].distances, near[1].distances, atol=1e-6)
 
@@ -73,14 +73,14 @@ def scene() -> Scene:
 
 def test_only_columns_whose_height_changes_are_made_anew(scene: Scene) -> None:
     base = scene.cell.robot("kuka").X_WB
-    beside, above = (scene.moved({"kuka": pose(step) @ base}) for step in ((0.1, 0.0, 0.0), (0.0, 0.0, 0.1)))
+    shifted, above = (scene.moved({"kuka": pose(step) @ base}) for step in ((0.1, 0.0, 0.0), (0.0, 0.0, 0.1)))
     column = next(index for index, body in enumerate(scene.bodies) if body.name == "kuka/pedestal")
-    assert beside.engine is scene.engine
-    kept = [a is b for a, b in zip(above.engine.bodies, scene.engine.bodies, strict=True)]
-    assert kept.count(False) == 1
-    assert not kept[column]
+    assert shifted.engine is scene.engine
+    unchanged = [a is b for a, b in zip(above.engine.bodies, scene.engine.bodies, strict=True)]
+    assert unchanged.count(False) == 1
+    assert not unchanged[column]
     assert scene.body_poses(np.zeros((1, 24))).p[column, 0, 0] == pytest.approx(base[0, 3])
-    assert beside.body_poses(np.zeros((1, 24))).p[column, 0, 0] == pytest.approx(base[0, 3] + 0.1)
+    assert shifted.body_poses(np.zeros((1, 24))).p[column, 0, 0] == pytest.approx(base[0, 3] + 0.1)
 
 
 def test_a_column_that_comes_or_goes_is_a_pair_more_or_less(scene: Scene) -> None:

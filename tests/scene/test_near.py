@@ -38,24 +38,24 @@ def test_all_pairs_that_are_near_are_found_with_their_exact_distances(
     scene: Scene, q: np.ndarray, near: NearPairs
 ) -> None:
     poses = scene.body_poses(q[:1])
-    found = {int(row): d for row, k, d in zip(near.rows, near.samples, near.distances, strict=True) if k == 0}
+    result = {int(row): d for row, k, d in zip(near.rows, near.samples, near.distances, strict=True) if k == 0}
     centres = scene.engine.sphere_centres(poses, sample=0)
     for row, ends in zip(scene.solid_rows.tolist(), scene.solid_pairs.tolist(), strict=True):
         i, j = ends
         if np.linalg.norm(centres[i] - centres[j]) > scene.engine.radii[[i, j]].sum() + WITHIN:
-            assert row not in found
+            assert row not in result
             continue
         exact = measure(scene.engine, (i, j), poses, sample=0)
-        if row in found:
+        if row in result:
             is_convex = scene.engine.bodies[i].is_convex and scene.engine.bodies[j].is_convex
             lowest = exact.bound - 1e-4 if is_convex else 0.0
-            assert found[row] <= 0.0 if exact.touches else lowest <= found[row] <= exact.bound + 1e-4
+            assert result[row] <= 0.0 if exact.touches else lowest <= result[row] <= exact.bound + 1e-4
         else:
             assert exact.bound > WITHIN - 1e-4
     for row in scene.ground_rows.tolist():
         height = scene.ground_heights(scene.pairs[row], poses)[0]
-        assert (row in found) == (height < WITHIN)
-        assert row not in found or found[row] == pytest.approx(height)
+        assert (row in result) == (height < WITHIN)
+        assert row not in result or result[row] == pytest.approx(height)
 
 
 def test_normals_go_from_the_first_point_to_the_second(near: NearPairs) -> None:
@@ -73,9 +73,9 @@ def test_gradients_are_those_of_differences(scene: Scene, q: np.ndarray, near: N
         for side in sides
     ]
     keys = list(zip(near.rows.tolist(), near.samples.tolist(), strict=True))
-    found = np.array([(known[0][key] - known[1][key]) / (2.0 * step) for key in keys])
+    result = np.array([(known[0][key] - known[1][key]) / (2.0 * step) for key in keys])
     expected = near.by_joints @ moved
-    is_smooth = np.abs(found - expected) < 2e-3 * np.abs(moved).max()
+    is_smooth = np.abs(result - expected) < 2e-3 * np.abs(moved).max()
     assert is_smooth.mean() > 0.9  # parallel faces and edges have no gradient: any of their nearest points may count
 
 

@@ -228,11 +228,11 @@ def test_all_pieces_of_a_link_are_left_out_by_its_name() -> None:
 def test_a_whole_robot_is_left_out_by_its_own_name() -> None:
     cell = in_pieces()
     scene = Scene.from_cell(cell)
-    own = {body.name for body in scene.bodies if body.robot == "a"}
+    bodies = {body.name for body in scene.bodies if body.robot == "a"}
 
-    assert left_out(cell, "a", "post") == {frozenset((name, "post")) for name in own}
-    assert len(left_out(cell, "a", "b")) == len(own) ** 2
-    assert "a/tool" in own
+    assert left_out(cell, "a", "post") == {frozenset((name, "post")) for name in bodies}
+    assert len(left_out(cell, "a", "b")) == len(bodies) ** 2
+    assert "a/tool" in bodies
 
 
 @pytest.mark.parametrize(
@@ -331,10 +331,10 @@ def test_every_holder_may_touch_the_part_with_its_tool_and_hand() -> None:
 def test_links_near_a_part_by_their_mounting_are_the_same_for_every_holder() -> None:
     """A broad plate at 0.1 m from either tool tip reaches back over the wrists of both arms."""
     scene = Scene.from_cell(two_arms(part=shared_part(Box((0.3, 0.3, 0.42))), tasks=()))
-    said, kept = reasons(scene), watched(scene)
+    said, watched_pairs = reasons(scene), watched(scene)
     rules = [
-        kept[frozenset((f"{robot}/wrist", "part"))].rule
-        if frozenset((f"{robot}/wrist", "part")) in kept
+        watched_pairs[frozenset((f"{robot}/wrist", "part"))].rule
+        if frozenset((f"{robot}/wrist", "part")) in watched_pairs
         else said[frozenset((f"{robot}/wrist", "part"))]
         for robot in "ab"
     ]

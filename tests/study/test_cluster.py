@@ -91,9 +91,9 @@ def here(folder: Path, evaluate: Any = halved) -> bytes:
 
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_study_although_a_worker_is_killed(cluster: LocalCluster, tmp_path: Path) -> None:
-    found = on_cluster(cluster, tmp_path / "cluster", Killer(tmp_path / "mark"))
+    result = on_cluster(cluster, tmp_path / "cluster", Killer(tmp_path / "mark"))
     assert [process.poll() for process in cluster.processes].count(-signal.SIGKILL) == 1
-    assert found == here(tmp_path / "here", Killer(tmp_path / "mark"))
+    assert result == here(tmp_path / "here", Killer(tmp_path / "mark"))
 
 
 @pytest.mark.slow
@@ -104,8 +104,8 @@ def test_a_cluster_that_has_workers_is_never_given_up_for_having_none(cluster: L
 
 @pytest.mark.slow
 def test_results_that_count_are_worked_out_again_here(cluster: LocalCluster, tmp_path: Path) -> None:
-    found = on_cluster(cluster, tmp_path / "cluster", Wrong(os.getpid()))
-    assert found == here(tmp_path / "here", Wrong(os.getpid()))  # every wrong one would have been the best
+    result = on_cluster(cluster, tmp_path / "cluster", Wrong(os.getpid()))
+    assert result == here(tmp_path / "here", Wrong(os.getpid()))  # every wrong one would have been the best
 
 
 @pytest.mark.slow

@@ -41,17 +41,17 @@ def recorded(folder: Path) -> set[bytes]:
 
 def running_on(folder: Path) -> list[int]:
     """Worker processes that have not ended 10 s after their parent."""
-    found = []
+    results = []
     for path in (folder.parent / "pids").iterdir():
         try:
             handle = os.pidfd_open(int(path.name))
         except ProcessLookupError:
             continue
         if not select.select([handle], [], [], 10.0)[0]:
-            found.append(int(path.name))
+            results.append(int(path.name))
         os.close(handle)
         path.unlink()
-    return found
+    return results
 
 
 def undisturbed(folder: Path, trials: int = TRIALS) -> bytes:

@@ -27,8 +27,8 @@ def refuse(path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def workers():
-    with Workers(1, first=partial(os.getpid), at_once=1) as found:
-        yield found
+    with Workers(1, first=partial(os.getpid), at_once=1) as result:
+        yield result
 
 
 def test_work_is_done_in_a_process_of_its_own(workers: Workers) -> None:

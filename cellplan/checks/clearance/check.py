@@ -152,8 +152,8 @@ def _curves(
     for kind in ClearanceClass:
         watched = bound.of_class(kind)
         if any(pair.is_compared for pair in watched):
-            drawn = [pair for pair in watched if pair.is_compared or pair.touches or pair.unproved]
-            curves[kind] = np.maximum(bound.lowest_bounds(drawn), 0.0)[block]
+            shown = [pair for pair in watched if pair.is_compared or pair.touches or pair.unproved]
+            curves[kind] = np.maximum(bound.lowest_bounds(shown), 0.0)[block]
     return curve_times, curves
 
 

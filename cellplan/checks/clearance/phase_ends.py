@@ -134,8 +134,8 @@ def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
 
 def _across(end: _End, pair: PairSkew) -> PairSkew:
     """A pair with what an end allows, where that is less than what is known."""
-    for subject, is_kept in _demands(end, (pair.first, pair.second)):
-        skew = _largest(is_kept, pair.allowed)
+    for subject, is_met in _demands(end, (pair.first, pair.second)):
+        skew = _largest(is_met, pair.allowed)
         if skew < pair.allowed:
             time = float(end.before.report.times[-1])
             limit = AllowedSkew(limit=SkewLimit.END, skew=skew, subject=subject, at_s=time)
@@ -143,14 +143,14 @@ def _across(end: _End, pair: PairSkew) -> PairSkew:
     return pair
 
 
-def _largest(is_kept: Predicate, most: float) -> float:
+def _largest(is_met: Predicate, most: float) -> float:
     """The largest skew in [s] up to the most of which it is kept, by halving."""
-    if most <= 0.0 or is_kept(most):
+    if most <= 0.0 or is_met(most):
         return most
     low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if is_kept(middle):
+        if is_met(middle):
             low = middle
             if high - low <= 0.1 * high:
                 break
@@ -169,7 +169,7 @@ def _demands(end: _End, pair: tuple[str, str]) -> Iterator[tuple[str, Predicate]
         for relation, limits, depth in _relations(phase):
             tool = _ReachingTool(end=end, phase=phase, relation=relation, is_before=phase is end.before)
             if {relation.robot, tool.carrier} == set(pair):
-                yield f"tool of {relation.robot}", partial(tool.is_kept, limits=limits, depth=depth)
+                yield f"tool of {relation.robot}", partial(tool.is_met, limits=limits, depth=depth)
 
 
 def _keeps_clearance(end: _End, pair: tuple[str, str], skew: float) -> bool:
@@ -186,7 +186,7 @@ def _keeps_clearance(end: _End, pair: tuple[str, str], skew: float) -> bool:
     rectangles = [index(np.concatenate(ordered)) for span in spans for ordered in (span, span[::-1])]
     region = ClockRegion(first=pair[0], second=pair[1], rectangles=np.array(rectangles))
     scenes = {phase.place: phase.scene for phase in end.reached(skew)}
-    return all(certify_regions(scene, q, [region])[0].is_kept for scene in scenes.values())
+    return all(certify_regions(scene, q, [region])[0].is_met for scene in scenes.values())
 
 
 def _relations(phase: _Placed) -> Iterator[tuple[Relation, tuple[float, float], float | None]]:
@@ -221,7 +221,7 @@ class _ReachingTool:
         cell = self.phase.scene.cell
         return None if cell.carrier is None else cell.robots[cell.carrier].name
 
-    def is_kept(self, skew: float, *, limits: tuple[float, float], depth: float | None) -> bool:
+    def is_met(self, skew: float, *, limits: tuple[float, float], depth: float | None) -> bool:
         """Whether its error and its depth are within what is allowed when one of both robots is across the end.
 
         Args:
@@ -231,7 +231,7 @@ class _ReachingTool:
         """
         position, orientation = self._error()
         reach = 0.0 if depth is None else tool_reach(self.phase.scene.cell, self.relation.robot)
-        (moved, turned), (carried, swung) = self._ways(skew)
+        (moved, turned), (carried, swung) = self._travels(skew)
         is_deep = depth is not None and moved + carried + reach * (turned + swung) > depth
         return position + moved + carried <= limits[0] and orientation + turned + swung <= limits[1] and not is_deep
 
@@ -249,7 +249,7 @@ class _ReachingTool:
         error = errors_on_part(X_PT, desired, self.relation)[0]
         return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
-    def _ways(self, skew: float) -> tuple[Array, Array]:
+    def _travels(self, skew: float) -> tuple[Array, Array]:
         """Ways of the tool in the world, and of the part under the tool, on either side of the end, in [m] and [rad].
 
         The one robot is before the end and the other one after it: of each the larger of both ways counts. In a
@@ -268,8 +268,8 @@ class _ReachingTool:
             chain, steps = arms.tool(self.relation.robot, seen_by=seen_by), arms.steps(rows)
             moved = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1) + 0.5 * chain.bend(steps)
             turned = np.sqrt(0.5) * np.linalg.norm(np.diff(poses[:, :3, :3], axis=0), axis=(1, 2))
-            ways = np.stack([moved, turned + 0.5 * chain.turn_bend(steps)], axis=1)
-            paths.append(np.maximum(ways[:at].sum(axis=0), ways[at:].sum(axis=0)))
+            travels = np.stack([moved, turned + 0.5 * chain.turn_bend(steps)], axis=1)
+            paths.append(np.maximum(travels[:at].sum(axis=0), travels[at:].sum(axis=0)))
         tool, part = paths
         part[0] += part[1] * tool[0]
         return tool, part

@@ -17,7 +17,7 @@ from cellplan.certify.free_motion import FreeMotion
 from cellplan.certify.free_shift import ShiftBound, free_shift
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_reach
-from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolWays
+from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolTravel
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, stacked_positions
 from cellplan.model.motion import Schedule
@@ -106,12 +106,12 @@ class _SkewedTool:
     name: str
     robot: str
     carrier: str
-    ways: ToolWays
+    travel: ToolTravel
     depth: ErrorGrowth | None
 
     def limits(self) -> Iterator[AllowedSkew]:
         """What tolerance and depth allow."""
-        skew, at_s = min(self.ways.position.allowed(), self.ways.orientation.allowed(), key=lambda entry: entry[0])
+        skew, at_s = min(self.travel.position.allowed(), self.travel.orientation.allowed(), key=lambda entry: entry[0])
         yield self._limit(SkewLimit.TOOL, skew, at_s)
         if self.depth is not None:
             yield self._limit(SkewLimit.DEPTH, *self.depth.allowed())
@@ -125,7 +125,7 @@ class _SkewedTool:
         """What the skew costs this tool, at the one that is stated too."""
         stated = _stated(cell, self.robot, self.carrier)
         (by_position, at_position), (by_orientation, at_orientation) = (
-            way.allowed() for way in (self.ways.position, self.ways.orientation)
+            growth.allowed() for growth in (self.travel.position, self.travel.orientation)
         )
         least = min(by_position, by_orientation)
         at_s = at_position if by_position <= by_orientation else at_orientation
@@ -133,12 +133,12 @@ class _SkewedTool:
             name=self.name,
             robot=self.robot,
             carrier=self.carrier,
-            speed=self.ways.speed,
+            speed=self.travel.speed,
             by_position=min(by_position, MOST_SKEW),
             by_orientation=min(by_orientation, MOST_SKEW),
             at_s=at_s if least < MOST_SKEW else None,
-            position=None if stated is None else self.ways.position.largest(stated),
-            orientation=None if stated is None else self.ways.orientation.largest(stated),
+            position=None if stated is None else self.travel.position.largest(stated),
+            orientation=None if stated is None else self.travel.orientation.largest(stated),
             shortest_cycle=None if stated is None else _shortest_cycle(stated, least, duration),
         )
 
@@ -173,11 +173,13 @@ def _tools(
         tool = shifted(relation=task, mover=movers[task.robot], desired=scheduled.X_PT, limits=limits, first=first)
         depth = by_task.get(task.name)
         reach = tool_reach(cell, task.robot)
-        deep = None if depth is None else tool.depth_way(times, depth.depth, depth.limit, reach=reach)
-        yield _SkewedTool(name=task.name, robot=task.robot, carrier=carrier, ways=tool.ways(times), depth=deep)
+        deep = None if depth is None else tool.depth_growth(times, depth.depth, depth.limit, reach=reach)
+        yield _SkewedTool(name=task.name, robot=task.robot, carrier=carrier, travel=tool.travel(times), depth=deep)
     for grasp in cell.closures:
         if {grasp.robot, carrier} in apart:
             desired = np.broadcast_to(grasp.X_PT, (len(times), 4, 4))
             limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
             tool = shifted(relation=grasp, mover=movers[grasp.robot], desired=desired, limits=limits)
-            yield _SkewedTool(name=grasp.name, robot=grasp.robot, carrier=carrier, ways=tool.ways(times), depth=None)
+            yield _SkewedTool(
+                name=grasp.name, robot=grasp.robot, carrier=carrier, travel=tool.travel(times), depth=None
+            )

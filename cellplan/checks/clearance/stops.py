@@ -183,8 +183,8 @@ def _without_touching(scene: Scene) -> Scene:
 def _nearest(scene: Scene, q: Array, regions: Sequence[ClockRegion]) -> list[RegionBound]:
     """Distances in some regions: the smallest of all is searched for, the others are proved to be no smaller."""
     bounds = list(certify_regions(scene, q, regions)) if regions else []
-    waiting = sorted(range(len(bounds)), key=lambda place: (bounds[place].is_kept, bounds[place].proved))
-    first = [place for place in waiting if not bounds[place].is_kept] or waiting[:1]
+    waiting = sorted(range(len(bounds)), key=lambda place: (bounds[place].is_met, bounds[place].proved))
+    first = [place for place in waiting if not bounds[place].is_met] or waiting[:1]
     _search(scene, q, regions, places=first, bounds=bounds)
     level = min((bound.distance for bound in bounds), default=np.inf)
     rest = [place for place in waiting if place not in first]
@@ -196,7 +196,7 @@ def _nearest(scene: Scene, q: Array, regions: Sequence[ClockRegion]) -> list[Reg
     for place, bound in zip(
         rest, certify_regions(replace(scene, pairs=farther), q, [regions[place] for place in rest]), strict=True
     ):
-        if bound.is_kept:
+        if bound.is_met:
             bounds[place] = bound
     _search(scene, q, regions, places=[place for place in rest if not bounds[place].proved >= level], bounds=bounds)
     return bounds
@@ -273,7 +273,7 @@ class _Stops:
             worst=None
             if bound.at is None
             else self._instant((bound.first, bound.second), self._at(_met(bound, self._standing))),
-            is_free=bound.is_kept or (bound.distance > 0.0 and bound.proved > 0.0),
+            is_free=bound.is_met or (bound.distance > 0.0 and bound.proved > 0.0),
         )
 
     def _at(self, rows: tuple[float, float]) -> tuple[float, float]:

@@ -34,10 +34,10 @@ def point_accelerations(times: Array, points: Array) -> Array:
     """
     steps = np.diff(times)
     spread = (-1, *[1] * (points.ndim - 1))
-    speeds = np.zeros((len(times) + 1, *points.shape[1:]))
-    speeds[1:-1] = np.diff(points, axis=0) / steps.reshape(spread)
+    velocities = np.zeros((len(times) + 1, *points.shape[1:]))
+    velocities[1:-1] = np.diff(points, axis=0) / steps.reshape(spread)
     around = 0.5 * (np.concatenate([steps[:1], steps]) + np.concatenate([steps, steps[-1:]]))
-    return np.diff(speeds, axis=0) / around.reshape(spread)
+    return np.diff(velocities, axis=0) / around.reshape(spread)
 
 
 def joint_accelerations(times: Array, q: Array, *, cycle: float, jumps_at: Array = NO_TIMES) -> RowAccelerations:
@@ -70,8 +70,8 @@ def _jumps(moves: Array) -> Array:
     padded = np.concatenate([np.zeros_like(moves[:1]), moves, np.zeros_like(moves[:1]), np.zeros_like(moves[:1])])
     before, first, second = padded[:-2], padded[1:-1], padded[2:]
     excess = 2.0 * np.abs(first) - np.abs(second)
-    is_same_way = np.where(first * second < 0.0, np.abs(first), excess)
-    sizes = np.clip(is_same_way, 0.0, np.abs(first))
+    jump = np.where(first * second < 0.0, np.abs(first), excess)
+    sizes = np.clip(jump, 0.0, np.abs(first))
     return np.where(np.abs(before) <= STANDSTILL_TOL, sizes, 0.0)
 
 

@@ -11,7 +11,7 @@ from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Cell, Timing
 from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.process_times import kept_rests, process_span
+from cellplan.model.process_times import fixed_rests, process_span
 from cellplan.model.report import Check
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.task import TIME_TOLERANCE, Task
@@ -43,7 +43,7 @@ def check_feeds(scene: Scene, schedule: Schedule, q: Mapping[str, Array], X_WP: 
     for path in schedule.paths if clock is not None else ():
         process, (on, off) = path.task.process, process_span(path.task, path.corners)
         for key, delay in (("on_delay", (on, path.start)), ("off_delay", (path.end, off))):
-            if process is not None and clock is not None and delay in kept_rests(path.task, path.corners):
+            if process is not None and clock is not None and delay in fixed_rests(path.task, path.corners):
                 begin, end = clock.reached_at(np.array(delay)).tolist()
                 yield _check_delay(path.task, process, key, (begin, end - begin), step=schedule.step)
 

@@ -41,7 +41,7 @@ def conditioning(
         moving: Names of the robots that may move.
     """
     count = len(schedule.times)
-    at_each: Array = np.broadcast_to(X_WP, (count, 4, 4))
+    part_frames: Array = np.broadcast_to(X_WP, (count, 4, 4))
     stack: list[Array] = []
     robots: dict[str, list[Array]] = {}
     relations = _relations(cell, schedule, moving)
@@ -50,7 +50,7 @@ def conditioning(
         piece = slice(first, first + most)
         positions = {name: values[piece] for name, values in q.items()}
         rows = [
-            _blocks(cell, relation, chains, positions, X_WP=at_each[piece], R_PT=R_PT[piece])
+            _blocks(cell, relation, chains, positions, X_WP=part_frames[piece], R_PT=R_PT[piece])
             for relation, R_PT in relations
         ]
         names = [*cell.positioners[:1], *(relation.robot for relation, _ in relations)]
@@ -59,7 +59,7 @@ def conditioning(
             robots.setdefault(relation.robot, []).append(_smallest(row[relation.robot]))
         for name in cell.positioners[:1]:
             if name in moving and all(relation.robot != name for relation, _ in relations):
-                J_WP = _at_point(chains[name].flange_screws(positions[name]), at_each[piece])
+                J_WP = _at_point(chains[name].flange_screws(positions[name]), part_frames[piece])
                 robots.setdefault(name, []).append(_smallest(J_WP))
     spectrum = np.concatenate(stack)
     smallest, largest = spectrum[:, -1], spectrum[:, 0]

@@ -44,12 +44,12 @@ class ErrorGrowth:
         """Bound of what is added to the error at each of the rows by either clock being ahead by so much, (N,)."""
         growth = np.zeros(len(self.rows))
         for later in (self.rows + shift, self.rows - shift):
-            way = np.abs(self._at(self.sums, later) - self._at(self.sums, self.rows))
+            travel = np.abs(self._at(self.sums, later) - self._at(self.sums, self.rows))
             if self.turns.any():
                 turned = np.abs(self._at(self.turns, later) - self._at(self.turns, self.rows))
                 turned += float(np.diff(self.turns).max(initial=0.0))  # the step that begins before the later time
-                way += turned * np.abs(self._at(self.whole, later) - self._at(self.whole, self.rows))
-            np.maximum(growth, way, out=growth)
+                travel += turned * np.abs(self._at(self.whole, later) - self._at(self.whole, self.rows))
+            np.maximum(growth, travel, out=growth)
         return growth
 
     def largest(self, shift: float) -> float:
@@ -101,7 +101,7 @@ def _crossing(sums: Array, times: Array, goals: Array) -> Array:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ToolWays:
+class ToolTravel:
     """How a tool moves on the part when its clock is shifted."""
 
     position: ErrorGrowth  # in [m]
@@ -158,7 +158,7 @@ class ShiftedTool:
     limits: tuple[float, float]  # largest position error in [m] and orientation error in [rad]
     first: int = 0  # first row at which errors are judged
 
-    def ways(self, times: Array) -> ToolWays:
+    def travel(self, times: Array) -> ToolTravel:
         """What the errors of the tool grow by, at times of the rows in [s], shape (N,)."""
         mover, nodes = self.mover, self.mover.nodes()
         X_WT, parts = mover.poses(nodes), np.diff(nodes)
@@ -173,7 +173,7 @@ class ShiftedTool:
         common = {"times": at, "rows": times[self.first :]}
         lengths, angles = np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
         still = np.zeros(len(at))
-        return ToolWays(
+        return ToolTravel(
             position=ErrorGrowth(
                 sums=constrained, turns=turns, whole=whole, errors=lengths, limit=self.limits[0], **common
             ),
@@ -183,7 +183,7 @@ class ShiftedTool:
             speed=float((np.diff(constrained) / np.diff(at)).max(initial=0.0)),
         )
 
-    def depth_way(self, times: Array, depth: float, limit: float, *, reach: float) -> ErrorGrowth:
+    def depth_growth(self, times: Array, depth: float, limit: float, *, reach: float) -> ErrorGrowth:
         """What the depth of the tool grows by: no more than its points move on the part.
 
         Args:
@@ -236,9 +236,9 @@ class ShiftedTool:
         return half / float(np.sin(half)) if half > 0.0 else 1.0
 
 
-def _summed(ways: Array) -> Array:
+def _summed(travels: Array) -> Array:
     """Sums of ways from the first node on, shape (K,)."""
-    return np.append(0.0, np.cumsum(ways))
+    return np.append(0.0, np.cumsum(travels))
 
 
 def _norms(change: Array) -> Array:

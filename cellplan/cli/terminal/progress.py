@@ -51,14 +51,14 @@ def _bar() -> Iterator[Listener]:
         *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True, auto_refresh=False
     ) as bar:
         task = bar.add_task("starting", total=1.0)
-        last, drawn = "", 0.0
+        last, shown_at = "", 0.0
 
         def listen(stage: str, share: float) -> None:
-            nonlocal last, drawn
+            nonlocal last, shown_at
             bar.update(task, description=stage, completed=share)
-            if stage != last or time.monotonic() - drawn >= DRAW_EVERY_S:
+            if stage != last or time.monotonic() - shown_at >= DRAW_EVERY_S:
                 bar.refresh()
-                last, drawn = stage, time.monotonic()
+                last, shown_at = stage, time.monotonic()
 
         yield listen
 

@@ -23,7 +23,7 @@ from cellplan.geometry.transforms import Array
 SUNK_TOL: Final = 5e-4  # [m] points that may be deeper than the deepest known one by less are not sought
 MAX_POINTS: Final = 4000  # [-] points of one surface that are measured; with more, the most promising ones are
 ROUND_SIDE_COUNT: Final = 96  # [-] sides of a sphere or capsule at most: it is within 0.1 % of the radius, or 0.03 mm
-MOST_KEPT: Final = 64  # [-] solids whose surface, or tree of triangles, is kept
+CACHE_SIZE: Final = 64  # [-] solids whose surface, or tree of triangles, is kept
 STRAIGHT: Final = 1.0 - 1e-9  # [-] cosine from which on a way from a triangle is along its normal: that says its side
 POINT_RADIUS: Final = 1e-9  # [m] radius of the ball that stands for a point
 RAYS: Final = np.array([[0.8, 0.36, 0.48], [-0.48, 0.8, 0.36], [0.36, 0.48, -0.8]])  # unit, along no usual edge
@@ -68,7 +68,7 @@ def deepest_point(
     return best
 
 
-@lru_cache(maxsize=MOST_KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _tree(body: CollisionBody) -> SurfaceTree:
     """The surface of a solid as patches."""
     surface = body.core
@@ -77,7 +77,7 @@ def _tree(body: CollisionBody) -> SurfaceTree:
     return SurfaceTree.over(surface.vertices[surface.faces])
 
 
-@lru_cache(maxsize=MOST_KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _probe(body: CollisionBody) -> Engine:
     """A solid and a point."""
     if isinstance(body.shape, Mesh):
@@ -115,10 +115,10 @@ def _depths_in_mesh(probe: Engine, mesh: Mesh, points: Array, *, worth: Array, s
     R = np.broadcast_to(np.eye(3), (2, len(points), 3, 3))
     poses = BodyPoses(np.ascontiguousarray(R), np.stack([np.zeros_like(points), points]))
     nearest = [nearest_triangle(probe, 0, 1, poses, sample=k) for k in range(len(points))]
-    faces, ways = np.array([face for face, _ in nearest]), np.array([way for _, way in nearest])
-    depths = np.linalg.norm(ways, axis=1)
+    faces, gaps = np.array([face for face, _ in nearest]), np.array([gap for _, gap in nearest])
+    depths = np.linalg.norm(gaps, axis=1)
     is_relevant = depths > worth
-    height = np.einsum("ij,ij->i", _normals(mesh.vertices[mesh.faces[faces]]), ways)
+    height = np.einsum("ij,ij->i", _normals(mesh.vertices[mesh.faces[faces]]), gaps)
     if not has_several_solids(mesh):  # the nearest face of one solid may be inside another
         sides = np.where((sides == 0.0) & (np.abs(height) >= STRAIGHT * depths), np.sign(height), sides)
     undecided = np.flatnonzero(is_relevant & (sides == 0.0))

@@ -72,15 +72,15 @@ def read_move(statement: RapidStatement, unit: RapidUnit, data: RapidData, place
     _require_kind(statement, kind, unit, data, place)
     if named is not None:
         target = data.target(statement, named, is_cartesian=is_cartesian)
-    own_number = _number(statement, number, place)
-    own_duration = _duration(statement, duration, place)
+    row_number = _number(statement, number, place)
+    seconds = _duration(statement, duration, place)
     if place.is_first and not is_fine:
         statement.refuse("fine in the first move", zone)
     if speed.lower() not in _SPEEDS:
         data.require(statement, speed, "speeddata")
-    own_zone = STOP if is_fine else _zone(statement, zone, data)
+    blend = STOP if is_fine else _zone(statement, zone, data)
     _require_frames(statement, unit, data, tool=tool, work_object=work_object, is_cartesian=is_cartesian)
-    return RapidMove(statement, target, is_cartesian, own_number, own_duration, own_zone)
+    return RapidMove(statement, target, is_cartesian, row_number, seconds, blend)
 
 
 def _zone(statement: RapidStatement, name: str, data: RapidData) -> Zone:

@@ -246,7 +246,7 @@ def _require_same_moves(first: _Task, other: _Task) -> None:
             f"{len(first.moves) - 1} moves before it, as in the other tasks", str(len(other.moves) - 1)
         )
     for name, key in (("\\ID", "number"), ("\\T", "duration")):
-        for place, (own_move, other_move) in enumerate(zip(first.moves, other.moves, strict=True)):
-            expected, got = getattr(own_move, key), getattr(other_move, key)
+        for place, (first_move, other_move) in enumerate(zip(first.moves, other.moves, strict=True)):
+            expected, got = getattr(first_move, key), getattr(other_move, key)
             if expected != got:
                 other.moves[place].statement.refuse(f"{name}:={expected}, as in the other tasks", str(got))

@@ -40,7 +40,7 @@ def zone_name(size: int) -> str:
 
 
 WORDS: Final = frozenset(_WORDS.split())  # of the language, and of what its controllers declare
-OWN_NAMES: Final = frozenset(  # of declarations and pages here, and of speeds and zones of the language
+DECLARED_NAMES: Final = frozenset(  # of declarations and pages here, and of speeds and zones of the language
     {TASKS, SYNC_ON, SYNC_OFF, PART, FROM, ROWS, *map(zone_name, ZONES)}
     | {f"page_{number:03d}" for number in range(1, 1000)}
     | {f"{letter}{number}" for letter in "vz" for number in range(10_000)}
@@ -79,7 +79,7 @@ def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
     Raises:
         InputError: A robot has no controller of the kind, or what is promised needs another arrangement of tasks.
     """
-    modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | OWN_NAMES)
+    modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | DECLARED_NAMES)
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     if is_synchronised:
         require_one_controller(frame)

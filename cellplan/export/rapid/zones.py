@@ -85,7 +85,7 @@ def _tool_zones(unit: RapidUnit, rows: RobotRows, shares: Array) -> Array:
     whole[1:-1] &= at_part[:-2] & at_part[2:]
     joint = ~at_part
     joint[1:-1] &= joint[:-2] & joint[2:]
-    ways = np.linalg.norm(np.diff(np.where(at_part[:, None], rows.X_PT[:, :3, 3], 0.0), axis=0), axis=1)
+    lengths = np.linalg.norm(np.diff(np.where(at_part[:, None], rows.X_PT[:, :3, 3], 0.0), axis=0), axis=1)
     on_part = np.zeros(len(zones))
-    on_part[1:-1] = shares[1:-1] * np.minimum(ways[:-1], ways[1:])
+    on_part[1:-1] = shares[1:-1] * np.minimum(lengths[:-1], lengths[1:])
     return np.where(joint, zones, np.where(whole, np.minimum(zones, on_part), 0.0))

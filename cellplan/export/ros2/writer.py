@@ -41,10 +41,10 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
     files = {}
     for program in job.programs:
         clock = shared_clock(program, job.frame.robots)
-        speeds = {name: _resting_speeds(program.robots[name]) for name in job.frame.robots}
-        parts = _parts(job, clock, speeds)
+        velocities = {name: _rest_velocities(program.robots[name]) for name in job.frame.robots}
+        parts = _parts(job, clock, velocities)
         for name in job.frame.robots:
-            lines = _points(job.frame.robot(name), program.robots[name], speeds[name])
+            lines = _points(job.frame.robot(name), program.robots[name], velocities[name])
             for number, (first, last) in enumerate(parts, start=1):
                 path = file_path(program.name, file_name(name, number, 0 if job.frame.split is None else len(parts)))
                 part = f"part {number} of {len(parts)}: it begins and ends at rest; {WHEN}"
@@ -53,7 +53,7 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
     return files
 
 
-def _resting_speeds(rows: RobotRows) -> Array:
+def _rest_velocities(rows: RobotRows) -> Array:
     """Speeds of rows, exactly zero at both ends, shape (N, n).
 
     Raises:
@@ -77,7 +77,7 @@ def _resting_speeds(rows: RobotRows) -> Array:
     return qd
 
 
-def _parts(job: ExportJob, clock: Array, speeds: Mapping[str, Array]) -> list[tuple[int, int]]:
+def _parts(job: ExportJob, clock: Array, velocities: Mapping[str, Array]) -> list[tuple[int, int]]:
     """First and last row of each part: as few parts as hold no more points than a controller takes.
 
     Raises:
@@ -87,7 +87,7 @@ def _parts(job: ExportJob, clock: Array, speeds: Mapping[str, Array]) -> list[tu
     _require_split(job.frame, count)
     if most is None:
         return [(0, count - 1)]
-    rests = np.flatnonzero(np.all([np.all(qd == 0.0, axis=1) for qd in speeds.values()], axis=0)).tolist()
+    rests = np.flatnonzero(np.all([np.all(qd == 0.0, axis=1) for qd in velocities.values()], axis=0)).tolist()
     first, last = max(pairwise(rests), key=lambda stretch: stretch[1] - stretch[0])
     if last - first + 1 > most:
         raise InputError(

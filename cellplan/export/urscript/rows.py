@@ -17,7 +17,7 @@ SLOWEST: Final = 0.01  # [rad/s] a move is stated no slower
 TICK: Final = 1e-3  # [rad/s], [rad/s^2] speeds and accelerations are rounded down to it
 BLEND_TICK: Final = 1e-4  # [m] radii are rounded down to it
 SMALLEST_BLEND: Final = 5e-4  # [m] a smaller radius saves no time
-BLEND_ROOM: Final = 0.99  # [-] neighbouring blends may not touch
+BLEND_SHARE: Final = 0.99  # [-] neighbouring blends may not touch
 
 
 def move_speeds(robot: Robot, rows: RobotRows) -> Array:
@@ -65,6 +65,6 @@ def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
     if not np.any(np.asarray(blend) > 0.0):
         return np.zeros(len(rows))
     radii = tool_zones(robot, rows.q, np.broadcast_to(blend, len(rows)))
-    radii = np.floor(BLEND_ROOM * radii / BLEND_TICK) * BLEND_TICK
+    radii = np.floor(BLEND_SHARE * radii / BLEND_TICK) * BLEND_TICK
     free = may_round(ProgramRows(name=None, robots={robot.name: rows}), Promise.SEQUENCE_ONLY)[robot.name]
     return np.where(free & (radii >= SMALLEST_BLEND), radii, 0.0)

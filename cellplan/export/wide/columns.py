@@ -119,7 +119,7 @@ def wide_columns(program: WideRows) -> Columns:
     groups += [_task_columns(program, task) for task in tasks]
     groups += [_speed_columns(program, robot) for robot in robots]
     groups.append({"smallest_singular_value": program.spread(_singular_values)})
-    groups += [{f"clearance_{kind}_mm": MM * program.spread(partial(kept_distance, kind))} for kind in ClearanceClass]
+    groups += [{f"clearance_{kind}_mm": MM * program.spread(partial(proved_distance, kind))} for kind in ClearanceClass]
     columns: Columns = {}
     for group in groups:
         twice = sorted(columns.keys() & group.keys())
@@ -141,7 +141,7 @@ def joint_columns(robot: Robot, q: Array) -> dict[str, Array]:
     }
 
 
-def kept_distance(kind: ClearanceClass, phase: PhaseRows) -> Array | None:
+def proved_distance(kind: ClearanceClass, phase: PhaseRows) -> Array | None:
     """Distance in [m] that a class of pairs is proved to keep in each row, shape (n,); None without such pairs.
 
     The curve of a report holds one distance for each stretch of the motion, at its middle. A row lies in the stretch of
@@ -199,8 +199,8 @@ def _task_columns(program: WideRows, task: str) -> Columns:
 
 def _speed_columns(program: WideRows, robot: Robot) -> Columns:
     """Speeds of the joints of a robot, and of its tool tip in the world."""
-    speeds = program.spread(lambda phase: phase.report.qd[robot.name], width=len(robot.model.joints))
-    columns: Columns = {f"{name}_s": values for name, values in joint_columns(robot, speeds).items()}
+    velocities = program.spread(lambda phase: phase.report.qd[robot.name], width=len(robot.model.joints))
+    columns: Columns = {f"{name}_s": values for name, values in joint_columns(robot, velocities).items()}
     tool = program.spread(lambda phase: _speeds(phase.X_WT[robot.name][:, :3, 3], phase.report.times))
     columns[f"{robot.name}.tool_speed_mm_s"] = MM * tool
     return columns

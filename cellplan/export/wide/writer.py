@@ -55,10 +55,10 @@ def read_wide(cell: Cell, text: str, file: str) -> dict[str, JointTable]:
         raise InputError(f"{file}:{bad}: expected {len(names)} fields, got {len(rows[bad - 2])}")
     if lines[-1]:
         raise InputError(f"{file}: expected the last row to end with a line break; the file is truncated")
-    return {robot.name: read_table(robot, _own_columns(robot, names, rows, file), file) for robot in cell.robots}
+    return {robot.name: read_table(robot, _robot_columns(robot, names, rows, file), file) for robot in cell.robots}
 
 
-def _own_columns(robot: Robot, names: list[str], rows: list[list[str]], file: str) -> str:
+def _robot_columns(robot: Robot, names: list[str], rows: list[list[str]], file: str) -> str:
     """Times and joints of one robot as a file of the plain format."""
     columns = {name: f"{robot.name}.{name}" for name in joint_fields(robot, np.empty((0, len(robot.model.joints))))}
     missing = [name for name in (TIME, *columns.values()) if names.count(name) != 1]

@@ -245,8 +245,8 @@ class _Reader:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         """An element opens; those that make no shape are left out with all below them."""
-        is_kept = tag in KNOWN_ELEMENTS and (tag != "asset" or len(self._open) == 1)
-        if self._skipped or (self._open and not is_kept):
+        is_known = tag in KNOWN_ELEMENTS and (tag != "asset" or len(self._open) == 1)
+        if self._skipped or (self._open and not is_known):
             self._skipped += 1
             return
         element = Located(tag, attributes)

@@ -82,12 +82,12 @@ def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
     low, high = _boxes(vertices, faces, label, count=len(names))
     turned = faces.copy()
     for shell in inward:
-        is_own = label == shell
+        is_in_shell = label == shell
         holders = np.all(low <= low[shell], axis=1) & np.all(high >= high[shell], axis=1)
         holders[shell] = False
         around = vertices[faces[holders[label]]]
-        if not len(around) or not _all_within(around, _points_behind(vertices[faces[is_own][:, ::-1]])):
-            turned[is_own] = faces[is_own][:, ::-1]
+        if not len(around) or not _all_within(around, _points_behind(vertices[faces[is_in_shell][:, ::-1]])):
+            turned[is_in_shell] = faces[is_in_shell][:, ::-1]
     return turned
 
 

@@ -74,7 +74,7 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     Raises:
         InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
     """
-    return _kept_mesh(path, np.asarray(scale, dtype=float), unit=None, is_upright=False)
+    return _cached_mesh(path, np.asarray(scale, dtype=float), unit=None, is_upright=False)
 
 
 def read_drawing(path: Path, *, unit: str | None) -> Mesh:
@@ -87,14 +87,14 @@ def read_drawing(path: Path, *, unit: str | None) -> Mesh:
         InputError: As for `read_mesh`; a COLLADA file states another unit.
     """
     factor = 1.0 if _is_collada(path.name) else MESH_UNITS[unit or ""]
-    return _kept_mesh(path, np.asarray(factor), unit=unit, is_upright=True)
+    return _cached_mesh(path, np.asarray(factor), unit=unit, is_upright=True)
 
 
-def _kept_mesh(path: Path, scale: Array, *, unit: str | None, is_upright: bool) -> Mesh:
+def _cached_mesh(path: Path, scale: Array, *, unit: str | None, is_upright: bool) -> Mesh:
     """Mesh in [m], recalled or read."""
     data = _read_bytes(path)
-    way = f"{path.suffix.lower()} {unit} {is_upright}" if _is_collada(path.name) else path.suffix.lower()
-    key = key_of("mesh", data, way.encode(), scale.tobytes())
+    options = f"{path.suffix.lower()} {unit} {is_upright}" if _is_collada(path.name) else path.suffix.lower()
+    key = key_of("mesh", data, options.encode(), scale.tobytes())
     cached = recall_mesh(key, source=path.name)
     if cached is not None:
         return cached

@@ -17,7 +17,7 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.shapes import Mesh
 
 MAX_LEAF: Final = 4  # triangles in a leaf of the tree, at most
-MOST_KEPT: Final = 32  # trees
+CACHE_SIZE: Final = 32  # trees
 RAY_CHUNK: Final = 2048  # rays followed at once
 BOX_FRACTION: Final = 1e-9  # [-] of the extent: boxes are grown by it so that rays along their faces stay in
 EDGE_TOL: Final = 1e-14  # [-] rounding of a triple product against the squared distance of the corners
@@ -45,7 +45,7 @@ class Crossings:
     """Every crossing of some lines with a mesh, sorted by line and then along the line."""
 
     line: Indices  # which line, shape (K,)
-    way: Array  # signed way from the line's point in [m], shape (K,)
+    distance: Array  # signed way from the line's point in [m], shape (K,)
     is_entering: NDArray[np.bool_]  # whether the line enters the solid there rather than leaves it, shape (K,)
 
 
@@ -70,15 +70,15 @@ def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     ahead = np.sum((middle - origins) * rays, axis=1)  # rays are followed from their point nearest to the middle
     tree = _tree(mesh)
-    face, way = np.full(len(origins), -1), np.full(len(origins), np.inf)
+    face, distance = np.full(len(origins), -1), np.full(len(origins), np.inf)
     for first in range(0, len(origins), RAY_CHUNK):
         chosen = slice(first, first + RAY_CHUNK)
         starts = origins[chosen] + ahead[chosen, None] * rays[chosen]
-        face[chosen], way[chosen] = _first_hits(tree, triangles, starts, rays=rays[chosen], behind=-ahead[chosen])
+        face[chosen], distance[chosen] = _first_hits(tree, triangles, starts, rays=rays[chosen], behind=-ahead[chosen])
     hit = face >= 0
     points = np.full(origins.shape, np.nan)
-    points[hit] = origins[hit] + ((ahead + way)[hit, None]) * rays[hit]
-    return RayHits(points=points, faces=face, distance=np.where(hit, np.maximum(ahead + way, 0.0), np.inf))
+    points[hit] = origins[hit] + ((ahead + distance)[hit, None]) * rays[hit]
+    return RayHits(points=points, faces=face, distance=np.where(hit, np.maximum(ahead + distance, 0.0), np.inf))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +115,7 @@ class _Tree:
         return np.repeat(ray, self.order.shape[1]), self.order[node].ravel()
 
 
-@lru_cache(maxsize=MOST_KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def _tree(mesh: Mesh) -> _Tree:
     """The tree of a mesh; a path, or a depth, asks for the same mesh again and again."""
     return _Tree.over(mesh.vertices[mesh.faces])
@@ -162,30 +162,30 @@ def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
     tree = _tree(mesh)
     middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     ahead = np.sum((middle - points) * directions, axis=1)
-    lines, ways, enters = [], [], []
+    lines, distances, enters = [], [], []
     for first in range(0, len(points), RAY_CHUNK):
         chosen = slice(first, first + RAY_CHUNK)
         starts = points[chosen] + ahead[chosen, None] * directions[chosen]
-        line, _, way, steep = _all_hits(tree, triangles, starts, rays=directions[chosen])
+        line, _, distance, steep = _all_hits(tree, triangles, starts, rays=directions[chosen])
         lines.append(line + first)
-        ways.append(way + ahead[line + first])
+        distances.append(distance + ahead[line + first])
         enters.append(steep < 0.0)
-    line, way, entering = np.concatenate(lines), np.concatenate(ways), np.concatenate(enters)
-    order = np.lexsort((~entering, np.round(way, SAME_DECIMALS), line))
-    return Crossings(line=line[order], way=way[order], is_entering=entering[order])
+    line, distance, entering = np.concatenate(lines), np.concatenate(distances), np.concatenate(enters)
+    order = np.lexsort((~entering, np.round(distance, SAME_DECIMALS), line))
+    return Crossings(line=line[order], distance=distance[order], is_entering=entering[order])
 
 
 def _first_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array, behind: Array) -> tuple[Indices, Array]:
     """Nearest triangle of each ray, and the way to it from ``starts``; ways below ``behind`` lie behind the origin."""
-    ray, face, way, _ = _all_hits(tree, triangles, starts, rays=rays)
+    ray, face, distance, _ = _all_hits(tree, triangles, starts, rays=rays)
     reach = float(np.abs(triangles).max()) + float(np.abs(starts).max(initial=0.0))
-    ahead = way >= behind[ray] - GRAZING_TOL * reach
-    ray, face, way = ray[ahead], face[ahead], way[ahead]
-    order = np.lexsort((face, way, ray))
+    ahead = distance >= behind[ray] - GRAZING_TOL * reach
+    ray, face, distance = ray[ahead], face[ahead], distance[ahead]
+    order = np.lexsort((face, distance, ray))
     met, place = np.unique(ray[order], return_index=True)
-    first_face, first_way = np.full(len(starts), -1), np.full(len(starts), np.inf)
-    first_face[met], first_way[met] = face[order][place], way[order][place]
-    return first_face, first_way
+    first_face, first_distance = np.full(len(starts), -1), np.full(len(starts), np.inf)
+    first_face[met], first_distance[met] = face[order][place], distance[order][place]
+    return first_face, first_distance
 
 
 def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> tuple[Indices, Indices, Array, Array]:
@@ -205,10 +205,10 @@ def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> t
     steep = np.sum(normal * direction, axis=1)
     crossing = inside & (np.abs(steep) > GRAZING_TOL * np.linalg.norm(normal, axis=1))
     ray, face, corner = ray[crossing], face[crossing], corner[crossing]
-    way = np.sum(normal[crossing] * corner[:, 0], axis=1) / steep[crossing]
+    distance = np.sum(normal[crossing] * corner[:, 0], axis=1) / steep[crossing]
     depth = np.einsum("kci,ki->kc", corner, direction[crossing])
-    way = np.clip(way, depth.min(axis=1, initial=np.inf), depth.max(axis=1, initial=-np.inf))
-    return ray, face, way, steep[crossing]
+    distance = np.clip(distance, depth.min(axis=1, initial=np.inf), depth.max(axis=1, initial=-np.inf))
+    return ray, face, distance, steep[crossing]
 
 
 def _triple(d: Array, p: Array, q: Array) -> Array:

@@ -16,7 +16,7 @@ from cellplan.geometry.mesh.counts import count_edges, shells
 from cellplan.geometry.mesh.topology import weld_tolerance
 from cellplan.geometry.shapes import Mesh
 
-MOST_KEPT: Final = 32  # meshes
+CACHE_SIZE: Final = 32  # meshes
 OPPOSITE: Final = 1.0 - 1e-6  # [-] cosine from which on two normals are opposite; the distance of corners decides
 NEAR_PLANES: Final = 1e-4  # [-] difference of two planes' keys up to which they may be one
 KEY: Final = np.array([0.437, 0.619, 0.283])  # [-] no usual planes have equal keys
@@ -25,7 +25,7 @@ PAIR_CHUNK: Final = 2_000_000  # pairs of triangles compared at once: 200 MB
 Polygon = list[tuple[float, float]]
 
 
-@lru_cache(maxsize=MOST_KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def outer_surface(mesh: Mesh) -> Mesh:
     """The surface of a closed mesh without what its solids have in common, as triangles with corners of their own.
 
@@ -48,7 +48,7 @@ def outer_surface(mesh: Mesh) -> Mesh:
     return Mesh(vertices=triangles.reshape(-1, 3), faces=faces, source=mesh.source, is_closed=True)
 
 
-@lru_cache(maxsize=MOST_KEPT)
+@lru_cache(maxsize=CACHE_SIZE)
 def has_several_solids(mesh: Mesh) -> bool:
     """Whether a closed mesh is in several pieces, or has edges of more than two triangles."""
     label = shells(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]

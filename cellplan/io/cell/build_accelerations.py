@@ -67,7 +67,7 @@ def acceleration_findings(
             )
             yield document.finding(path, text)
         if _chosen(choice).is_unlimited:
-            yield from _limits_beside_unlimited(name, entry, document, where=key_text(path))
+            yield from _unjudged_limits(name, entry, document, where=key_text(path))
         if entry.acceleration is not None:
             words = f"joint ({listed(model.joint_names)})"
             yield from _too_many_times(choice, len(model.joints), document, path=path, words=words)
@@ -77,7 +77,7 @@ def acceleration_findings(
         yield from _too_many_times(valid.acceleration, max(following), document, path=("acceleration",), words=words)
 
 
-def _limits_beside_unlimited(robot: str, entry: RobotEntry, document: YamlDocument, *, where: str) -> Iterator[Finding]:
+def _unjudged_limits(robot: str, entry: RobotEntry, document: YamlDocument, *, where: str) -> Iterator[Finding]:
     """Limits of accelerations and jerk in the cell itself, which `unlimited` would leave unjudged."""
     for joint, limits in entry.limits.items():
         for key, value in limits.model_dump(exclude_none=True).items():

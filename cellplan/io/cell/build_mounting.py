@@ -31,12 +31,12 @@ TILTED: Final = ("mount", "tilted")
 RAIL_LINKS: Final[Mapping[str, int]] = {"track": BASE, "carriage": BASE + 1}  # lists of solids of a rail -> their link
 STEEPEST_DEG: Final = 75.0  # a steeper base has hardly anything below it: it is fixed to a wall
 MOST_LEAN_DEG: Final = 1.0  # [deg] of a base on a pedestal: calibration, not a tilted or hanging arm
-ROOM_MM: Final = 1e-3  # [mm] a lower pedestal is none
+SHORTEST_MM: Final = 1e-3  # [mm] a lower pedestal is none
 
 
 def build_mount(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> Mount | None:
     """What a robot stands on, hangs from or is fixed to; None without a body."""
-    way, column = _column(entry)
+    path, column = _column(entry)
     if column is None:
         return None
     radius = None if column.cylinder is None else column.cylinder.radius_mm.si
@@ -46,26 +46,26 @@ def build_mount(entry: RobotEntry, environment: Mapping[str, ObstacleEntry]) -> 
     if isinstance(column, WallEntry):
         return Bracket(radius=radius, size=size, length=column.length_mm.si)
     floor = (floor_height_mm(entry, environment) or Mm(0.0)).si
-    return (Wedge if way == TILTED else Pedestal)(radius=radius, size=size, floor=floor)
+    return (Wedge if path == TILTED else Pedestal)(radius=radius, size=size, floor=floor)
 
 
 def _column(entry: RobotEntry) -> tuple[KeyPath, ColumnEntry | None]:
     """The column that a robot is mounted on, and its key path below the robot; None without one."""
     if entry.mount is None:
         return ("pedestal",), entry.pedestal
-    ways = {("mount", key): getattr(entry.mount, key) for key in MOUNTS}
-    way, given = next((way, given) for way, given in ways.items() if given is not None)
-    return way, given if isinstance(given, ColumnEntry) else None
+    mounts = {("mount", key): getattr(entry.mount, key) for key in MOUNTS}
+    path, given = next((path, given) for path, given in mounts.items() if given is not None)
+    return path, given if isinstance(given, ColumnEntry) else None
 
 
 def with_floor_height(
     values: dict[str, Any], entry: RobotEntry, environment: Mapping[str, ObstacleEntry]
 ) -> dict[str, Any]:
     """A robot as plain values with the height of the floor written out, where it stands on one."""
-    way, column = _column(entry)
+    path, column = _column(entry)
     if isinstance(column, PedestalEntry):
         inner = values
-        for key in way:
+        for key in path:
             inner = inner[str(key)]
         inner["floor_z_mm"] = floor_height_mm(entry, environment)
     return values
@@ -118,7 +118,7 @@ def floor_height_mm(entry: RobotEntry, environment: Mapping[str, ObstacleEntry])
     if isinstance(column, PedestalEntry) and column.floor_z_mm is not None:
         return column.floor_z_mm
     planes = [thing.plane.z_mm for thing in environment.values() if thing.plane is not None]
-    return max((z_mm for z_mm in planes if z_mm <= entry.base.xyz_mm[2] + ROOM_MM), default=None)
+    return max((z_mm for z_mm in planes if z_mm <= entry.base.xyz_mm[2] + SHORTEST_MM), default=None)
 
 
 def build_attachments(entries: Iterable[AttachmentEntry], model: RobotModel, read_mesh: MeshReader) -> tuple[Body, ...]:
@@ -155,8 +155,8 @@ def mounted_names(entry: RobotEntry) -> tuple[str, ...]:
 
 def _mount_names(entry: RobotEntry) -> tuple[str, ...]:
     """Names of the bodies that a robot is mounted on."""
-    way, column = _column(entry)
-    below = () if column is None else (PEDESTAL if way[-1] == PEDESTAL else MOUNT,)
+    path, column = _column(entry)
+    below = () if column is None else (PEDESTAL if path[-1] == PEDESTAL else MOUNT,)
     return (*below, *(_rail_body_name(key, index) for key, index, _ in rail_entries(entry)))
 
 
@@ -164,17 +164,17 @@ def mounting_findings(name: str, model: RobotModel, valid: ValidEntries, documen
     """What a cell mounts on a robot or puts below it must fit its links, its base and the floor."""
     entry = valid.robots[name]
     yield from _attachment_findings(name, entry, model, document)
-    way, column = _column(entry)
-    path = ("robots", name, *way)
+    mount, column = _column(entry)
+    path = ("robots", name, *mount)
     yield from _rail_findings(name, entry, model, document)
     if column is None:
         return
-    carrier = PEDESTAL if way[-1] == PEDESTAL else MOUNT
+    carrier = PEDESTAL if mount[-1] == PEDESTAL else MOUNT
     if any(body.name == carrier for body in model.bodies):
         yield document.key_finding(path, f"unexpected key, a body of the model is called '{carrier}' already")
     if isinstance(column, PedestalEntry):
         yield from _floor_findings(path, entry, column, valid=valid, document=document)
-    if isinstance(column, HangingEntry) and column.ceiling_z_mm - entry.base.xyz_mm[2] < ROOM_MM:
+    if isinstance(column, HangingEntry) and column.ceiling_z_mm - entry.base.xyz_mm[2] < SHORTEST_MM:
         text = f"expected a ceiling above the base at {entry.base.xyz_mm[2]:g} mm, got {column.ceiling_z_mm:g} mm"
         yield document.finding((*path, "ceiling_z_mm"), text)
     yield from _lean_findings(path, entry, document)
@@ -228,7 +228,7 @@ def _floor_findings(
     if floor is None:
         text = "missing, expected the height of the floor: no plane of the environment lies below the base"
         yield document.finding((*path, "floor_z_mm"), text)
-    elif height - floor < ROOM_MM:
+    elif height - floor < SHORTEST_MM:
         text = f"expected a base above the floor at {floor:g} mm, got one at {height:g} mm: leave the pedestal out"
         yield document.finding(path if pedestal.floor_z_mm is None else (*path, "floor_z_mm"), text)
     elif path[-2:] == TILTED:

@@ -28,7 +28,7 @@ KINDS: Final[Mapping[str, VariableKind]] = {
     "part": VariableKind.PART,
 }
 WEIGHT_FACTOR: Final = 20.0  # [-] by which weights change where no range is given
-LIMIT_ROOM: Final = 1e-9  # [rad] or [m] by which a range may exceed the limits of a joint: rounding of degrees
+LIMIT_TOL: Final = 1e-9  # [rad] or [m] by which a range may exceed the limits of a joint: rounding of degrees
 ALL: Final = "a range [low, high]"
 
 
@@ -234,7 +234,7 @@ def _start_refusal(range_: VaryRange, context: Context) -> str | None:
         return f"expected {name}.start_deg, as all joints of '{name}' turn"
     if range_.address.startswith(f"robots.{name}.start_deg") and not all(joint.is_revolute for joint in model.joints):
         return f"expected {name}.start: {{…}} with one key per joint, as not all joints of '{name}' turn"
-    if range_.lower < joint.lower - LIMIT_ROOM or range_.upper > joint.upper + LIMIT_ROOM:
+    if range_.lower < joint.lower - LIMIT_TOL or range_.upper > joint.upper + LIMIT_TOL:
         scale = 1000.0 if unit is Mm else math.degrees(1.0)
         limits = f"{joint.lower * scale:g} to {joint.upper * scale:g} {'deg' if range_.is_angle else 'mm'}"
         return f"expected a range within the limits of the joint '{joint.name}', {limits}"

@@ -77,16 +77,16 @@ def _excluded(name: str, valid: ValidEntries, document: YamlDocument) -> Iterato
                 text = f"expected a joint of another robot beside {path}, got '{name}/{lock.joint}': {REMOVE}"
                 yield document.finding(("motion", "locked_joints", index), text)
     if (solver := valid.solver) is not None:
-        for key in _beside_smallest(solver):
+        for key in _nonminimal_keys(solver):
             text = f"expected the accurate mode (weighted_pseudo_inverse without goals) beside {path}: change it"
             yield document.finding(("solver", *key.split(".")), text)
 
 
-def _beside_smallest(solver: SolverEntry) -> tuple[str, ...]:
+def _nonminimal_keys(solver: SolverEntry) -> tuple[str, ...]:
     """Keys of the solver that exclude a given path, which goes with the smallest weighted velocities alone."""
     if solver.integrator != "auto":  # an explicit accurate mode has its own rule
         return ("integrator",) if solver.integrator == "euler" else ()
-    return solver.beside_smallest
+    return solver.nonminimal_keys
 
 
 def _rows(place: KeyPath, path: JointPathEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:

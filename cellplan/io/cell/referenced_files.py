@@ -304,8 +304,8 @@ def _digests(written: str, place: Path, files: Iterable[Path]) -> dict[str, str]
     """Digests of what a file reads in turn, by the paths from the cell."""
     digests = {}
     for file in files:
-        way = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
-        key = posixpath.normpath(posixpath.join(posixpath.dirname(written), way))
+        relative = os.path.relpath(file.resolve(), place.parent.resolve()).replace(os.sep, "/")
+        key = posixpath.normpath(posixpath.join(posixpath.dirname(written), relative))
         digests[key] = digest_of_file(file, file=file.name)
     return digests
 

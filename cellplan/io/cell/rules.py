@@ -10,7 +10,7 @@ from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.task import TaskEntry
 from cellplan.io.yaml.reader import YamlDocument
 
-TIME_ROOM: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
+TIME_TOL: Final = 1e-9  # [-] of the duration: rounding of start_s + duration_s
 ORIENTATION_AXES: Final = frozenset({"rx", "ry", "rz"})
 MEANS_ELSE: Final = {"part": "the workpiece", "world": "the frame that everything stands in"}
 AT_REST: Final = frozenset({"part_at_rest", "semi_coordinated"})  # modes in which tasks are done on a part at rest
@@ -107,7 +107,7 @@ def _times(valid: ValidEntries, document: YamlDocument, name: str) -> Iterator[F
         also = f" and retract_s = {leaving:g}" if leaving else ""
         text = f"expected a start before the end of the clock (motion.duration_s = {clock:g}){also}, got {start:g}"
         yield document.finding(("tasks", name, "start_s"), text)
-    elif task.duration_s is not None and start + task.duration_s + leaving > clock * (1.0 + TIME_ROOM):
+    elif task.duration_s is not None and start + task.duration_s + leaving > clock * (1.0 + TIME_TOL):
         words = "start_s + duration_s + retract_s" if leaving else "start_s + duration_s"
         text = (
             f"expected an end within the clock (motion.duration_s = {clock:g}), "

@@ -24,13 +24,13 @@ COLUMNS: Final = (TIME, *POSITION, *AXIS, *QUATERNION)
 MOST_BYTES: Final = 50_000_000
 MOST_POINTS: Final = 200_000
 FINDING_LIMIT: Final = 20  # different findings that are reported
-UNIT_ROOM: Final = 1e-3  # [-] room for quaternions written with four digits
+UNIT_TOL: Final = 1e-3  # [-] room for quaternions written with four digits
 SHORTEST_AXIS: Final = 1e-6  # [-] a shorter vector has no direction
 LONGEST_AXIS: Final = 1e6  # [-] of a component of a direction, as in a cell file
 FARTHEST: Final = 100_000.0  # [mm] no part is that large: a wrong unit
 SHORTEST_S: Final = 1e-6  # [s] between two times, halved for rounding; no controller resolves less
 LATEST: Final = 1e6  # [s] eleven days: a wrong unit
-CLOSING_ROOM: Final = 1e-3  # [mm] room for a return to the start written with three decimals
+CLOSING_TOL: Final = 1e-3  # [mm] room for a return to the start written with three decimals
 FEWEST_CLOSED: Final = 4  # rows of a trajectory that encloses something and repeats its start
 METRES_PER_MM: Final = 1e-3
 
@@ -207,7 +207,7 @@ def _read_row(line: int, text: str, columns: list[str], findings: _Findings) -> 
             findings.add(line, f"expected {_desired(word)}, got {shown(word)}", column=column)
             continue
         value = float(word)
-        limit, unit = _LIMITS.get(column, (1.0 + UNIT_ROOM, ""))
+        limit, unit = _LIMITS.get(column, (1.0 + UNIT_TOL, ""))
         if abs(value) > limit:
             findings.add(line, f"expected at most {limit:.10g}{unit} either way, got {word}", column=column)
             continue
@@ -230,7 +230,7 @@ def _units(
     vectors = values[:, [columns.index(column) for column in desired]]
     norms = np.linalg.norm(vectors, axis=1)
     length = "length 1" if desired == QUATERNION else "a length"
-    is_bad = ~(np.abs(norms - 1.0) <= UNIT_ROOM) if desired == QUATERNION else ~(norms >= SHORTEST_AXIS)
+    is_bad = ~(np.abs(norms - 1.0) <= UNIT_TOL) if desired == QUATERNION else ~(norms >= SHORTEST_AXIS)
     for row in np.flatnonzero(is_bad):
         findings.add(int(row) + 2, f"expected a {what} ({listed(desired)}) of {length}, got {norms[row]:.6g}")
     unit: Array = vectors / np.where(norms > 0.0, norms, 1.0)[:, None]
@@ -270,13 +270,13 @@ def _close(
         return
     place = [columns.index(column) for column in POSITION]
     gap = np.abs(values[-1, place] - values[0, place]).max()
-    if gap > CLOSING_ROOM:
+    if gap > CLOSING_TOL:
         text = f"expected a closed trajectory to end at the point of its first row, but it ends {gap:.6g} mm from it"
         findings.add(last, f"{text}; repeat the first row at the end of the cycle")
     values[-1, place] = values[0, place]
     for vectors in directions:
         if vectors is not None:
             sign = -1.0 if vectors.shape[1] == len(QUATERNION) and vectors[-1] @ vectors[0] < 0.0 else 1.0
-            if np.linalg.norm(sign * vectors[-1] - vectors[0]) > UNIT_ROOM:
+            if np.linalg.norm(sign * vectors[-1] - vectors[0]) > UNIT_TOL:
                 findings.add(last, "expected a closed trajectory to end with the orientation of its first row")
             vectors[-1] = vectors[0]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from cellplan.io.cell.rules import TIME_ROOM, needs_surface
+from cellplan.io.cell.rules import TIME_TOL, needs_surface
 from cellplan.io.input.findings import Finding, KeyPath
 from cellplan.io.schema.partial import ValidEntries
 from cellplan.io.schema.path import CsvEntry
@@ -13,7 +13,7 @@ from cellplan.model.task import SampledPath, TimedPath
 
 Targets = Mapping[str, SampledPath | TimedPath]  # what was read of the files of paths, by task
 
-OWN_CLOCK: Final = ("duration_s", "feed_mm_s", "process", "time_law", "corners")  # what a trajectory decides by itself
+CLOCK_KEYS: Final = ("duration_s", "feed_mm_s", "process", "time_law", "corners")  # what a trajectory decides by itself
 
 
 def target_findings(valid: ValidEntries, targets: Targets, document: YamlDocument) -> Iterator[Finding]:
@@ -40,7 +40,7 @@ def _axes(task: TaskEntry, path: SampledPath | TimedPath, document: YamlDocument
 
 def _clock(task: TaskEntry, document: YamlDocument, name: str) -> Iterator[Finding]:
     """A trajectory has its own times, its own smoothness and its own place."""
-    for key in OWN_CLOCK:
+    for key in CLOCK_KEYS:
         if getattr(task, key) is not None:
             yield document.key_finding(
                 ("tasks", name, key), "unexpected key, the column t_s of the path's file decides"
@@ -66,7 +66,7 @@ def _end(
     if valid.motion is None or valid.motion.duration_s is None:
         return
     clock, end = valid.motion.duration_s, task.begins_s + task.repeat * path.duration + task.leaving_s
-    if end > clock * (1.0 + TIME_ROOM):
+    if end > clock * (1.0 + TIME_TOL):
         cycles = f"{task.repeat} cycles of " if task.repeat > 1 else ""
         place: KeyPath = ("tasks", name, "path", "csv")
         text = (

@@ -50,7 +50,7 @@ def _configured(cell_folder: Path) -> tuple[Path, ...]:
     path = configuration_file()
     if path is None or _may_have_come_with(cell_folder, path):
         return ()
-    data = _own_content(path)
+    data = _private_content(path)
     if data is None:
         return ()
     document = parse_yaml(data, file=str(path))
@@ -76,15 +76,15 @@ def _may_have_come_with(cell_folder: Path, path: Path) -> bool:
         return True
 
 
-def _own_content(path: Path) -> bytes | None:
+def _private_content(path: Path) -> bytes | None:
     """Content of a regular file that belongs to the user and that no other user may write to; None of any other."""
     with suppress(OSError, ValueError):
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(handle, "rb") as file:
             status = os.fstat(handle)
-            is_own = not hasattr(os, "getuid") or (
+            is_private = not hasattr(os, "getuid") or (
                 status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE
             )
-            if stat.S_ISREG(status.st_mode) and is_own and status.st_size <= SIZE_LIMIT:
+            if stat.S_ISREG(status.st_mode) and is_private and status.st_size <= SIZE_LIMIT:
                 return file.read(SIZE_LIMIT)
     return None

@@ -15,7 +15,7 @@ def parse_json(data: bytes, file: str) -> dict[str, Any]:
         InputError: With file and line, when the text is not one JSON object with finite numbers and each key once.
     """
     try:
-        value = json.loads(data.decode("utf-8"), object_pairs_hook=_each_key_once, parse_constant=_refuse_constant)
+        value = json.loads(data.decode("utf-8"), object_pairs_hook=_unique_keys, parse_constant=_refuse_constant)
     except UnicodeDecodeError as error:
         line = 1 + data.count(b"\n", 0, error.start)
         raise InputError(f"{file}:{line}: expected text in UTF-8, got byte 0x{data[error.start]:02x}") from None
@@ -47,7 +47,7 @@ def required(record: Mapping[str, Any], key: str, kind: type, *, file: str) -> A
 _KINDS = {dict: "an object", list: "a list", str: "a text", int: "a whole number", bool: "true or false"}
 
 
-def _each_key_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object of the file."""
     members = dict(pairs)
     if len(members) != len(pairs):

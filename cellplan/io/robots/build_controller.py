@@ -113,11 +113,11 @@ def sense_findings(
             continue
         senses = entry.sign.get(other, 1) * entry.sign.get(joint, 1)
         if factor != (right := senses * round(along)):
-            way = "the same way" if right > 0 else "against each other"
+            sense = "the same way" if right > 0 else "against each other"
             yield document.finding(
                 (*path, "coupling", joint, other),
                 f"expected {right}, with which the angle of '{joint}' is shown against the level, as '{other}' and "
-                f"'{joint}' turn {way} on the controller, got {factor:g}",
+                f"'{joint}' turn {sense} on the controller, got {factor:g}",
             )
 
 

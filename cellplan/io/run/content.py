@@ -26,7 +26,7 @@ RECOVER: Final = "recover"  # folder of a recovery, inside the run folder that i
 EXPORT: Final = "export.json"  # what was exported, in the folder that holds it
 MANIFEST: Final = "manifest.json"
 LEFT_ALONE: Final = ".DS_Store"  # put into every folder by the file manager of one system
-OWN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # their content is compared file by file
+RUN_FOLDERS: Final = frozenset({PROGRAMS, "plots", "tables", "rejected"})  # their content is compared file by file
 USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hold that lists no files
     r"cell\.yaml|(manifest|series)\.json|view\.html|(still|floor_plan)\.svg|(report|rehearsal|export|fastest|advice)\.(json|html)|map\.(json|html|svg|png|pdf)|curve\.csv|(demand|best)\.yaml"
     r"|plots/[^/]+\.(svg|png|pdf)|(tables|rejected)/([^/]+/)?[^/]+\.csv"
@@ -35,7 +35,7 @@ USUAL: Final = re.compile(  # what a run, a rehearsal or a draft of them may hol
 
 def is_run_folder(path: Path) -> bool:
     """Whether a folder holds a report that cellplan wrote."""
-    return any(_is_own_report(path / name) for name in REPORTS)
+    return any(_is_its_report(path / name) for name in REPORTS)
 
 
 def foreign_entry(path: Path) -> str | None:
@@ -65,7 +65,7 @@ def _foreign(run: Path, above: str) -> Iterator[str]:
             if stat.S_ISDIR(mode):
                 if _is_run_entry(entry) and not _holds_listed(name, listed):
                     yield from _foreign(entry, f"{above}{name}/")
-                elif _holds_listed(name, listed) or PurePosixPath(name).parts[0] in OWN_FOLDERS:
+                elif _holds_listed(name, listed) or PurePosixPath(name).parts[0] in RUN_FOLDERS:
                     waiting.append(entry)
                 else:
                     yield f"{above}{name}"
@@ -99,7 +99,7 @@ def _listed(run: Path) -> frozenset[str] | None:
 
 def _files_of(record: Path) -> list[str] | None:
     """Names of the files that a record lists; None when there is no such record, or none that can be read."""
-    if not _is_own_report(record):
+    if not _is_its_report(record):
         return None
     try:
         files: Any = json.loads(record.read_bytes()[:LIST_LIMIT])["files"]
@@ -108,7 +108,7 @@ def _files_of(record: Path) -> list[str] | None:
         return None
 
 
-def _is_own_report(report: Path) -> bool:
+def _is_its_report(report: Path) -> bool:
     """Whether a file is a report that cellplan wrote."""
     if report.is_symlink() or not report.is_file():
         return False

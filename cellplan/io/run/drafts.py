@@ -44,7 +44,7 @@ def put_right(folder: Path) -> None:
         if match is None or not _is_left_behind(match):
             continue
         with suppress(OSError):
-            if not _is_own_folder(entry):
+            if not _is_cache_folder(entry):
                 continue
             target = folder / match["name"]
             if match["kind"] == OLDER and not target.exists() and not target.is_symlink():
@@ -100,7 +100,7 @@ def _letters(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:LETTERS]
 
 
-def _is_own_folder(entry: Path) -> bool:
+def _is_cache_folder(entry: Path) -> bool:
     """Whether something is a folder, no link, that belongs to the user."""
     status = entry.lstat()
     return stat.S_ISDIR(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())

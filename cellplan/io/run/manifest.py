@@ -45,9 +45,9 @@ class Manifest:
     files: Mapping[str, StoredFile]  # every file of the run but the manifest, by its path in the run folder
 
     @property
-    def own_inputs(self) -> tuple[str, ...]:
+    def user_files(self) -> tuple[str, ...]:
         """Files beside the cell file that the cell names; robots that come with the program are not among them."""
-        return own_inputs(self.inputs, self.cell_file)
+        return user_files(self.inputs, self.cell_file)
 
     @property
     def cell_inputs(self) -> dict[str, str]:
@@ -55,7 +55,7 @@ class Manifest:
         return {name: digest for name, digest in self.inputs.items() if not name.startswith(NEAR)}
 
 
-def own_inputs(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
+def user_files(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
     """Files that a cell names, but for those that come with the program.
 
     Args:

@@ -23,7 +23,7 @@ SERIES: Final = "series.json"
 CELL: Final = "cell.yaml"
 CLOCK: Final = "clock"  # name of the table beside those of the robots: none of them may have it
 TABLE_LIMIT: Final = 500_000_000  # [bytes] of a table that is read only to find where it was changed
-SERIES_ROOM: Final = 1e-6  # [-] series have seven digits
+SERIES_TOL: Final = 1e-6  # [-] series have seven digits
 
 Record = dict[str, Any]
 
@@ -245,7 +245,7 @@ def _first_other_row(table: JointTable, text: str, path: Path, series: list[Reco
         written = np.rad2deg(q) if is_turn else MM_PER_M * q
         if said.shape != written.shape:
             return
-        other = np.flatnonzero(~np.isclose(written, said, rtol=SERIES_ROOM, atol=SERIES_ROOM))
+        other = np.flatnonzero(~np.isclose(written, said, rtol=SERIES_TOL, atol=SERIES_TOL))
         others += [(int(other[0]), joint, float(said[other[0]]), float(written[other[0]]))] if len(other) else []
     if others:
         row, joint, said_there, got = min(others)

@@ -25,16 +25,16 @@ def write_whole(path: Path, content: bytes) -> None:
         raise
 
 
-def refuse_unless_own(target: Path, *, is_own: Callable[[Path], bool], kind: str) -> None:
+def refuse_foreign(target: Path, *, is_of_kind: Callable[[Path], bool], kind: str) -> None:
     """Refuse a place that a file must not be written to; call it early, before any long work.
 
     Args:
-        is_own: Whether a file is of the kind and written by cellplan.
+        is_of_kind: Whether a file is of the kind and written by cellplan.
 
     Raises:
         InputError: The place holds something else, or no file can be there.
     """
-    if target.is_symlink() or (target.exists() and not is_own(target)):
+    if target.is_symlink() or (target.exists() and not is_of_kind(target)):
         raise InputError(f"{target}: holds something that is no {kind}; choose another file with -o")
     refuse_unless_writable(target)
 
@@ -54,17 +54,17 @@ def refuse_unless_writable(path: Path) -> None:
         raise InputError(f"{path}: cannot write the output: no right to write to '{above}'")
 
 
-def replace_own(target: Path, content: bytes, *, is_own: Callable[[Path], bool], kind: str) -> None:
+def replace_older(target: Path, content: bytes, *, is_of_kind: Callable[[Path], bool], kind: str) -> None:
     """Write a file whole or not at all, where there is none or an older one of its kind.
 
     Args:
         target: The file; missing folders above it are made.
-        is_own: Whether a file is of that kind and written by cellplan.
+        is_of_kind: Whether a file is of that kind and written by cellplan.
 
     Raises:
         InputError: The place holds something else, or cannot be written.
     """
-    refuse_unless_own(target, is_own=is_own, kind=kind)
+    refuse_foreign(target, is_of_kind=is_of_kind, kind=kind)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_whole(target, content)

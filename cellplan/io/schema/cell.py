@@ -24,7 +24,7 @@ from cellplan.model.settings.entry import (
     PoseEntry,
     Text,
     by_kind,
-    require_each_once,
+    require_unique,
     rule,
 )
 from cellplan.model.settings.layout import LayoutEntry
@@ -66,9 +66,9 @@ class GraspEntry(Entry):
     )
 
     @model_validator(mode="after")
-    def _names_each_axis_once(self) -> Self:
+    def _has_unique_axes(self) -> Self:
         """Each axis once."""
-        require_each_once(self.axes, "axes")
+        require_unique(self.axes, "axes")
         return self
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Self
 
 from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import Entry, Text, require_each_once, rule
+from cellplan.model.settings.entry import Entry, Text, require_unique, rule
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FINGER_LIMIT: Final = 2  # joints that open a gripper together
@@ -43,5 +43,5 @@ class GripperEntry(Entry):
             raise rule("expected either opening_mm or angle_deg, got both", "angle_deg")
         if self.joints and self.opening_mm is None and self.angle_deg is None:
             raise rule("unexpected key, joints requires opening_mm or angle_deg", "joints")
-        require_each_once(self.joints, "joints")
+        require_unique(self.joints, "joints")
         return self

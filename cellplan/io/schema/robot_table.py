@@ -38,7 +38,7 @@ from cellplan.model.settings.entry import (
 from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
 
 BODY_LIMIT: Final = 200  # solids of one robot
-UNIT_ROOM: Final = 1e-3  # [-] room for axes written with four digits
+UNIT_TOL: Final = 1e-3  # [-] room for axes written with four digits
 
 
 class JointEntry(Entry):
@@ -80,7 +80,7 @@ class JointEntry(Entry):
         if not lower < upper:
             raise rule(f"expected a number above {limits[0]} = {lower:g}, got {upper:g}", limits[1])
         length = sum(component * component for component in self.axis) ** 0.5
-        if abs(length - 1.0) > UNIT_ROOM:
+        if abs(length - 1.0) > UNIT_TOL:
             raise rule(f"expected a vector of length 1, got one of length {length:.6g}", "axis")
         return self
 

@@ -17,7 +17,7 @@ from cellplan.model.settings.entry import (
     SlidingSpeed,
     Vector,
     by_kind,
-    require_each_once,
+    require_unique,
     rule,
 )
 from cellplan.model.settings.robot import JointPosition
@@ -235,7 +235,7 @@ class TaskEntry(Entry):
             ("off_part", self.off_part),
             ("after", self.preceding),
         ):
-            require_each_once(words, name)
+            require_unique(words, name)
         if self.spin_deg and self.free:
             raise rule("unexpected key, the spin is free: leave out one of them", "spin_deg")
         if self.start_s is not None and self.start_s < self.approaching_s:

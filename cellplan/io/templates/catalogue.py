@@ -24,7 +24,7 @@ class Template:
         return f"{self.name.replace('-', '_')}.yaml"
 
 
-OWN_URDF: Final = """\
+USER_URDF: Final = """\
 Put your URDF into `robots/`, with the meshes that it names, and see what it says before you write its path into
 `cell.yaml`:
 
@@ -52,7 +52,7 @@ TEMPLATES: Final = (
         setting="robots.own.base.x_mm=1600",
         meaning="the arm stands 50 mm nearer",
         files=("robots/own_arm.urdf",),
-        more=OWN_URDF,
+        more=USER_URDF,
     ),
     Template(
         name="gripper",

@@ -51,10 +51,10 @@ class Network:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NetworkSpeeds:
+class NetworkVelocities:
     """Speeds of all joints that keep every circuit closed."""
 
-    speeds: Mapping[str, float]  # by joint name, in [rad/s] or [m/s]; the imposed ones as given
+    velocities: Mapping[str, float]  # by joint name, in [rad/s] or [m/s]; the imposed ones as given
     freedom: int  # how many of the sought speeds could still be chosen; 0 when the imposed ones decide all
 
 
@@ -142,7 +142,7 @@ def davies_cooperation_jacobian(
     return np.asarray(J, dtype=np.float64)
 
 
-def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array | None = None) -> NetworkSpeeds:
+def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array | None = None) -> NetworkVelocities:
     """Speeds of all joints when some are imposed (0 locks a joint); a joint that is monitored is simply not imposed.
 
     Where the imposed speeds leave freedom, the sought speeds with the smallest weighted sum of squares are taken.
@@ -164,15 +164,15 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     root = np.sqrt(weights[net.columns(sought)])
     desired = N_p @ np.array(list(imposed.values()))
     y, _, rank, _ = np.linalg.lstsq(N_s / root, desired, rcond=RANK_TOL)
-    speeds = y / root
+    velocities = y / root
     scale = np.abs(N_p) @ np.abs(np.array(list(imposed.values())))
-    if np.abs(N_s @ speeds - desired).max(initial=0.0) > CLOSURE_TOL * scale.max(initial=0.0):
+    if np.abs(N_s @ velocities - desired).max(initial=0.0) > CLOSURE_TOL * scale.max(initial=0.0):
         raise PrimaryChoiceError(
             f"imposed speeds of {', '.join(imposed)}: no speeds of the other joints keep the circuits closed; "
             "impose fewer joints, or consistent speeds"
         )
-    values = {**dict(zip(sought, speeds.tolist(), strict=True)), **imposed}
-    return NetworkSpeeds(speeds={name: values[name] for name in net.joints}, freedom=len(sought) - int(rank))
+    values = {**dict(zip(sought, velocities.tolist(), strict=True)), **imposed}
+    return NetworkVelocities(velocities={name: values[name] for name in net.joints}, freedom=len(sought) - int(rank))
 
 
 def _refuse_world_in_plane(cell: Cell, plane: PlaneName | None) -> None:

@@ -89,7 +89,7 @@ def circuits(graph: CouplingGraph, tree: Iterable[int]) -> tuple[Circuit, ...]:
     fundamental_circuits = []
     for chord, joint in enumerate(graph.joints):
         if chord not in tree_edges:
-            back = _way(neighbours, joint.head, joint.tail)
+            back = _tree_path(neighbours, joint.head, joint.tail)
             fundamental_circuits.append(Circuit(chord=chord, passed=((chord, 1), *back)))
     return tuple(fundamental_circuits)
 
@@ -103,7 +103,7 @@ def circuit_matrix(graph: CouplingGraph, fundamental_circuits: Sequence[Circuit]
     return B
 
 
-def _way(neighbours: dict[str, list[tuple[int, int, str]]], start: str, goal: str) -> list[tuple[int, int]]:
+def _tree_path(neighbours: dict[str, list[tuple[int, int, str]]], start: str, goal: str) -> list[tuple[int, int]]:
     """The only way through a tree from one link to another, as joints with signs."""
     came: dict[str, tuple[int, int, str]] = {}
     open_links, visited = [start], {start}
@@ -114,8 +114,8 @@ def _way(neighbours: dict[str, list[tuple[int, int, str]]], start: str, goal: st
                 visited.add(there)
                 came[there] = (joint, sign, here)
                 open_links.append(there)
-    way: list[tuple[int, int]] = []
+    path: list[tuple[int, int]] = []
     while goal != start:
         joint, sign, goal = came[goal]
-        way.append((joint, sign))
-    return way[::-1]
+        path.append((joint, sign))
+    return path[::-1]

@@ -84,7 +84,7 @@ def require_one(entry: BaseModel, names: Iterable[str]) -> None:
         raise rule(f"expected exactly one of the keys {', '.join(names)}, got {' and '.join(given) or 'none'}")
 
 
-def require_each_once(words: tuple[str, ...], key: str) -> None:
+def require_unique(words: tuple[str, ...], key: str) -> None:
     """Refuse a list that names something twice."""
     for index, word in enumerate(words):
         if word in words[:index]:

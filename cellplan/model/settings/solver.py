@@ -217,7 +217,7 @@ class SolverEntry(Entry):
         return bool(self.secondary.goals) or self.weighting.near_limits > 0.0 or self.weighting.load > 0.0
 
     @property
-    def beside_smallest(self) -> tuple[str, ...]:
+    def nonminimal_keys(self) -> tuple[str, ...]:
         """Keys of these settings by which the motion is another than that of the smallest weighted joint velocities.
 
         Searches and screenings of many cells know only that one, by the weighted pseudo-inverse with constant weights.

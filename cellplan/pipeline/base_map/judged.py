@@ -88,7 +88,7 @@ def finished_record(
         verdicts,
         best=list(zip(best, settings, strict=True)),
         certified=certified,
-        drawn=drawing(job.scene, job.start, ready.schedule),
+        drawing=drawing(job.scene, job.start, ready.schedule),
         versions=versions(),
     )
 

@@ -62,7 +62,7 @@ def map_record(
     *,
     best: Sequence[tuple[int, Mapping[str, Any]]],
     certified: Sequence[Mapping[str, Any]],
-    drawn: Mapping[str, Any],
+    drawing: Mapping[str, Any],
     versions: Mapping[str, str],
 ) -> Record:
     """The map in printed units.
@@ -72,7 +72,7 @@ def map_record(
         verdicts: The verdict of every place.
         best: The best places with their settings, best first.
         certified: What came of the first of them when they were solved.
-        drawn: Outlines and paths.
+        drawing: Outlines and paths.
         versions: Version by package.
     """
     cell, places = job.scene.cell, job.places
@@ -98,7 +98,7 @@ def map_record(
         "counts": {str(verdict): count for verdict, count in counts(verdicts).items()},
         "best": listed,
         "places": [_place(job, verdict, place) for place, verdict in enumerate(verdicts)],
-        "drawing": dict(drawn),
+        "drawing": dict(drawing),
         "inputs": dict(cell.inputs),
         "versions": dict(versions),
     }
@@ -268,14 +268,14 @@ def _places(record: Record, half: float) -> Iterator[Item]:
 
 def _things(record: Record) -> Iterator[Item]:
     """Robots at the start, part, surroundings, paths and the present base."""
-    drawn, robot = record["drawing"], record["robot"]
-    for other in drawn["outlines"]:
+    drawing, robot = record["drawing"], record["robot"]
+    for other in drawing["outlines"]:
         colour = LIMIT if other["robot"] == robot else INK
         width = 1.1 if other["is_at_rest"] or other["kind"] == "part" else 0.45
         yield outline(other["outline_mm"], colour=colour, width=width)
-    for index, other in enumerate(drawn["paths"]):
+    for index, other in enumerate(drawing["paths"]):
         yield line(other["points_mm"], colour=ROBOTS[index % len(ROBOTS)], width=1.6)
-    for other in drawn["robots"]:
+    for other in drawing["robots"]:
         colour = LIMIT if other["name"] == robot else INK
         yield Note(other["x_mm"], other["y_mm"], other["name"], colour, size=8.5, is_bold=True)
 

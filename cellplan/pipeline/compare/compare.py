@@ -288,10 +288,10 @@ def _verified_outcome(job: CompareJob, path: Path) -> TrialOutcome:
     stored = read_stored_run(path)
     status, proof, clearance = TrialStatus.FAILED, "it failed when it was solved", None
     failed = [check["message"] for check in stored.record["checks"] if not check["passed"]]
-    if stored.manifest.status == TrialStatus.PASSED and stored.manifest.own_inputs:
+    if stored.manifest.status == TrialStatus.PASSED and stored.manifest.user_files:
         status = TrialStatus.PASSED
         proof = (
-            f"it depends on files beside its cell file ({listed(stored.manifest.own_inputs)}); "
+            f"it depends on files beside its cell file ({listed(stored.manifest.user_files)}); "
             f"cellplan verify {path} --cell {stored.manifest.cell_file} compares them"
         )
     elif stored.manifest.status == TrialStatus.PASSED:

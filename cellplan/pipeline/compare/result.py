@@ -220,16 +220,16 @@ def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[
         if its
     ]
     solved: dict[str, Any] = dict(zip(ROBOTS, solved_variants, strict=False))
-    robots = drawn_robots(record)
+    robots = plotted_robots(record)
     if not solved or not robots:
         return {}
-    figures = {"joints": _joints(solved, robots), "speeds": _speeds(solved, robots)}
+    figures = {"joints": _joints(solved, robots), "speeds": _speed_figure(solved, robots)}
     if any(variant["curves"]["clearance_mm"] for variant in solved.values()):
         figures["clearance"] = _distances(solved)
     return figures
 
 
-def drawn_robots(record: Record) -> list[str]:
+def plotted_robots(record: Record) -> list[str]:
     """Robots that are drawn, in their order."""
     names = robot_names(record)
     hardest = sorted(names, key=lambda name: -_peak(record, name))[:MAX_ROBOTS]
@@ -277,7 +277,7 @@ def _bars(title: str, values: Mapping[str, Sequence[float]]) -> PlotPanel:
     return PlotPanel(title=title, y=axis, items=items)
 
 
-def _speeds(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
+def _speed_figure(solved: Mapping[str, Any], robots: Sequence[str]) -> Figure:
     """Highest joint speed of every robot over time."""
     end = max(variant["cycle_time_s"] for variant in solved.values())
     title = "highest joint velocity of each robot over time, in % of the limit"
@@ -348,7 +348,7 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
         plots={name: inline_svg(text) for name, text in plots.items()},
         titles=PLOT_TITLES,
         legend=list(zip(ROBOTS, solved, strict=False)) if plots else [],
-        drawn=drawn_robots(record) if len(robots) > MAX_ROBOTS else [],
+        drawn=plotted_robots(record) if len(robots) > MAX_ROBOTS else [],
         statuses=STATUS_TEXTS,
         short=short_value,
         fixed=fixed,

@@ -15,10 +15,10 @@ from cellplan.model.cell import Robot
 from cellplan.model.exported import ExportJob, ProgramRows, RobotRows, Targets
 
 TIME_ROUNDING: Final = 0.5e-3  # [s] formats write times with three decimals or more
-ROUNDING_ROOM: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
+ROUNDING_TOL: Final = 1e-9  # [rad] or [m] arithmetic of units and zeros
 QUANTA: Final = 2.01  # [-] of the last decimal of a degree or millimetre: two axes that are coupled round by one each
-SHARE_ROOM: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
-SOLVED_ROOM: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
+SHARE_TOL: Final = 0.02  # [-] zones are sizes, of segments between rows that are rounded; what is read is judged
+SOLVED_TOL: Final = 1e-4  # [rad] or [m] positions that are worked out again from poses of tools
 
 
 def other_rows(dialect: Dialect, job: ExportJob, read: tuple[ProgramRows, ...]) -> Iterator[str]:
@@ -56,7 +56,7 @@ def _other_rounding(written: RobotRows, read: RobotRows, shares: Array) -> str |
     """The first row that is rounded more than it may be; None also where the format states nothing of it."""
     if read.rounding is None:
         return None
-    beyond = np.all(moves(written), axis=0) & ~(read.rounding <= shares * (1.0 + SHARE_ROOM))
+    beyond = np.all(moves(written), axis=0) & ~(read.rounding <= shares * (1.0 + SHARE_TOL))
     if not np.any(beyond):
         return None
     row = int(np.argmax(beyond))
@@ -103,13 +103,13 @@ def _other_position(dialect: Dialect, job: ExportJob, written: RobotRows, read: 
 def _off(robot: Robot, dialect: Dialect, written: Array, read: Array, *, is_solved: bool) -> Flags:
     """Positions that are farther from those that were written than rounding takes them, shape (N, n)."""
     if is_solved:
-        return np.abs(read - written) > SOLVED_ROOM
+        return np.abs(read - written) > SOLVED_TOL
     decimals = decimals_of(robot, dialect.decimals) if dialect.kinds else dialect.decimals
     units = np.array([joint.display_unit.scale for joint in robot.model.joints])
     off = np.ones(written.shape, dtype=bool)
     for angle, quantum in ((Angle.DEGREES, QUANTA * 10.0**-decimals / units), (Angle.RADIANS, 0.0)):
         expected = _rounded(robot, written, decimals, angle)
-        off &= ~(np.abs(read - expected) <= quantum + ROUNDING_ROOM)
+        off &= ~(np.abs(read - expected) <= quantum + ROUNDING_TOL)
     return off
 
 

@@ -80,7 +80,7 @@ def resting(q: Array) -> Flags:
     return rests
 
 
-def row_speeds(times: Array, q: Array, *, rests: Flags, lower: Array, upper: Array) -> Array:
+def row_velocities(times: Array, q: Array, *, rests: Flags, lower: Array, upper: Array) -> Array:
     """Speeds of rows: central differences, zero at rests, and such that no curve between rows leaves the limits.
 
     The central difference of uneven rows is the derivative of the parabola through three of them. Where the curve
@@ -113,5 +113,5 @@ def row_speeds(times: Array, q: Array, *, rests: Flags, lower: Array, upper: Arr
 
 def _is_monotone(qd: Array, s: Array) -> Flags:
     """Whether speeds lie between zero and three times those of chords."""
-    is_kept: Flags = (qd * s >= 0.0) & (np.abs(qd) <= MONOTONE * np.abs(s))
-    return is_kept
+    is_monotone: Flags = (qd * s >= 0.0) & (np.abs(qd) <= MONOTONE * np.abs(s))
+    return is_monotone

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.export.corners import row_shares
 from cellplan.export.dialect import Dialect
 from cellplan.geometry.arrays import Array
@@ -81,14 +81,14 @@ def judge(
     findings = list(other_rows(dialect, job, read))
     if findings:
         return Judgement(findings=tuple(findings))
-    with nothing_kept():
+    with without_cache():
         shared, deviations, corners = shared or Shared(run), list[Deviation](), list[Deviation]()
         programs = list(played_programs(run, dialect, job, read, lead=lead))
         for played in programs:
-            own_findings, own_deviations, own_corners = _judged_once(played, shared, dialect, job)
-            findings += own_findings
-            deviations += own_deviations
-            corners += own_corners
+            new_findings, new_deviations, new_corners = _judged_once(played, shared, dialect, job)
+            findings += new_findings
+            deviations += new_deviations
+            corners += new_corners
     return Judgement(
         findings=tuple(dict.fromkeys(findings)),
         deviations=_largest(deviations),

@@ -115,7 +115,7 @@ def keeps_tools(rows: PathRows) -> bool:
 def keeps_clearance(rows: PathRows) -> bool:
     """Whether bodies keep the distances that are demanded of them."""
     scene = _demanding(rows)
-    return certify(scene, rows.stacked[rows.is_break], with_minimum=False, with_curves=False).is_kept
+    return certify(scene, rows.stacked[rows.is_break], with_minimum=False, with_curves=False).is_met
 
 
 def _checks(rows: PathRows) -> list[Check]:
@@ -206,11 +206,11 @@ def clearance_findings(rows: PathRows) -> Iterator[str]:
     """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
     scene = _demanding(rows)
     q = stacked_positions(scene.cell, rows.q)[rows.is_break]
-    if certify(scene, q, with_minimum=False, with_curves=False).is_kept:
+    if certify(scene, q, with_minimum=False, with_curves=False).is_met:
         return
     bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs
     for pair in bound.pairs:
-        if pair.is_kept:
+        if pair.is_met:
             continue
         first, second = bound.names(pair)
         sample = min((*pair.touches, *pair.unproved), default=pair.at)

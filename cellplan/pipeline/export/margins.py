@@ -61,8 +61,8 @@ def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
     step = np.clip(np.searchsorted(marks, times, side="right") - 1, 0, len(marks) - 2)
     u = np.clip((times - marks[step]) / np.maximum(np.diff(marks), SHORTEST)[step], 0.0, 1.0)
     before, after = (
-        np.where(share > 0.0, 1.0 - way / np.maximum(share, SHORTEST), 0.0)
-        for share, way in ((shares[step], u), (shares[step + 1], 1.0 - u))
+        np.where(share > 0.0, 1.0 - offset / np.maximum(share, SHORTEST), 0.0)
+        for share, offset in ((shares[step], u), (shares[step + 1], 1.0 - u))
     )
     between: Array = (
         np.maximum(before, 0.0)[:, None] * largest[step] + np.maximum(after, 0.0)[:, None] * largest[step + 1]
@@ -163,8 +163,8 @@ def _twists(scene: Scene, relation: Relation, q: Array, corners: Array) -> list[
 def _changes(arms: LeverArms, scene: Scene, relation: Relation, q: Array, corners: Array) -> Array:
     """What the change of the Jacobian within the steps at each time adds, in [m] and [rad], shape (M, 2)."""
     chain, off = arms.tool(relation.robot, seen_by=holder_of(scene, relation)), axes_off(arms, in_steps(corners))
-    way = arms.steps(q) + off
-    mixed = [0.5 * (bend(way + off) - bend(way) - bend(off)) for bend in (chain.bend, chain.turn_bend)]
+    moved = arms.steps(q) + off
+    mixed = [0.5 * (bend(moved + off) - bend(moved) - bend(off)) for bend in (chain.bend, chain.turn_bend)]
     steps = np.pad(np.stack(mixed, axis=1), ((1, 1), (0, 0)))
     changes: Array = np.maximum(steps[:-1], steps[1:])
     return changes
@@ -206,11 +206,11 @@ def _nearer(arms: LeverArms, pair: ScenePair, reach: Array, axes: Array) -> floa
     if pair.solids is None:
         return float(reach[pair.first].max()) if pair.first < len(reach) else 0.0
     first, second = pair.solids
-    ways = reach[first] + reach[second]
+    approach = reach[first] + reach[second]
     if np.all(reach[first] > 0.0) and np.all(reach[second] > 0.0):
         chains = (arms.chain(first, second), arms.chain(second, first))
-        ways = np.minimum(ways, np.minimum(*(chain.reach(axes) for chain in chains)))
-    return float(ways.max())
+        approach = np.minimum(approach, np.minimum(*(chain.reach(axes) for chain in chains)))
+    return float(approach.max())
 
 
 def _raised(pair: ScenePair, by: float) -> ScenePair:

@@ -143,7 +143,7 @@ def blocked_orders(
                 scene = raised(LeverArms(scene, np.concatenate(ends, axis=1)), scene, off[None], in_step=False)
             times = program.times[[stretch.first, stretch.last]]
             bounds = certify_regions(scene, q, regions)
-            known[key] = [_not_clear(stretch.phase, bound, times) for bound in bounds if not bound.is_kept]
+            known[key] = [_not_clear(stretch.phase, bound, times) for bound in bounds if not bound.is_met]
         yield from ((count, finding) for finding in known[key])
 
 
@@ -174,7 +174,7 @@ class PhaseSearch:
         first = 0
         while first < self._last:
             bounds = self._bounds(first, self._last, pairs)
-            blocked = tuple((bound.first, bound.second) for bound in bounds if not bound.is_kept)
+            blocked = tuple((bound.first, bound.second) for bound in bounds if not bound.is_met)
             last = self._last
             if blocked:
                 last = self._farthest(first, blocked)
@@ -201,13 +201,13 @@ class PhaseSearch:
         low, high = 0, len(rows)  # all before low are clear, none from high on is known to be
         while low < high:
             middle = (low + high) // 2
-            if all(bound.is_kept for bound in self._bounds(first, rows[middle], pairs)):
+            if all(bound.is_met for bound in self._bounds(first, rows[middle], pairs)):
                 low = middle + 1
             else:
                 high = middle
         if low == 0:
             nearest = rows[0] if rows else self._last
-            bounds = [bound for bound in self._bounds(first, nearest, pairs) if not bound.is_kept]
+            bounds = [bound for bound in self._bounds(first, nearest, pairs) if not bound.is_met]
             worst = min(bounds, key=lambda bound: bound.distance)
             raise NotVerifiedError([_not_clear(self._phase.name, worst, self._times[[first, nearest]])])
         return rows[low - 1]

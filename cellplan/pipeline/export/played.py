@@ -11,7 +11,7 @@ from cellplan.export.timed_rows import are_near
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.exported import Interpolation, ProgramRows, RobotRows
 from cellplan.model.verified_run import VerifiedMotion, VerifiedRun
-from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_speeds
+from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_velocities
 from cellplan.pipeline.export.rows import times_of
 
 SAME_TIME: Final = 1e-7  # [s] rows nearer than this are one
@@ -108,7 +108,7 @@ class ExecutedProgram:
         rows, model = self.rows[robot], self.run.cell.robot(robot).model
         qd = rows.qd
         if qd is None:
-            qd = row_speeds(times_of(rows), rows.q, rests=resting(rows.q), lower=model.lower, upper=model.upper)
+            qd = row_velocities(times_of(rows), rows.q, rests=resting(rows.q), lower=model.lower, upper=model.upper)
         return HermiteRows(times=times_of(rows), q=rows.q, qd=qd)
 
     def parts(self, robot: str) -> int:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.checks.verify import verify_motion, with_clearance
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.csv import DECIMALS as CSV_DECIMALS
@@ -121,7 +121,7 @@ def export_program(
     """
     require_format(form)
     refuse_unless_exportable(folder, run.folder)
-    with nothing_kept():  # a proof rests on the files themselves
+    with without_cache():  # a proof rests on the files themselves
         files, record = exported(run, form, choice or Choice(), progress=progress)
     write_export(folder, files, record)
     return tuple(files)

@@ -12,7 +12,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.model.cell import Cell, Robot
 from cellplan.model.exported import ProgramRows, RobotRows
 from cellplan.model.task import TIME_TOLERANCE
-from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_speeds
+from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_velocities
 from cellplan.pipeline.export.rows import times_of
 
 REST: Final = 0.1  # [s] at least, of standstill before and after a program
@@ -95,7 +95,7 @@ def _on_cycle(robot: Robot, rows: RobotRows, cycle: float, *, lead: float, end: 
         stops=(),
         q=resampled_rows,
         times=times,
-        qd=row_speeds(times, resampled_rows, rests=resting(resampled_rows), lower=lower, upper=upper),
+        qd=row_velocities(times, resampled_rows, rests=resting(resampled_rows), lower=lower, upper=upper),
         process=process,
         marks=_marks_on_cycle(rows, times - lead),
     )

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_depths
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
@@ -34,7 +34,7 @@ from cellplan.pipeline.export.shared import Shared
 from cellplan.scene.scene import Scene
 
 SHARES: Final = (0.5, 0.35, 0.25, 0.15, 0.1, 0.05, 0.0)  # [-] of a segment, the largest first
-ROOMS: Final = (0.999, 0.95, 0.8)  # [-] of what is allowed that is used at rows; what lies between them may need more
+MARGINS: Final = (0.999, 0.95, 0.8)  # [-] of what is allowed that is used at rows; what lies between them may need more
 REACHES: Final = (np.inf, 4e-3, 1e-3, 2.5e-4)  # [m] that bodies may move at a corner, the largest first
 SAME: Final = 1e-12  # [rad] or [m] phases that are written alike are rounded alike
 SAME_TIME: Final = 1e-7  # [s] likewise
@@ -58,7 +58,7 @@ def with_rounding(
         orders: Marks of its programs; empty where robots do not wait for one another.
         lead: Time in [s] by which rows are later than those of the run.
     """
-    with nothing_kept():
+    with without_cache():
         rounded = replace(job, blend=LARGEST_SHARE)
         programs, largest = [], 0.0
         played = played_programs(shared.run, dialect, rounded, _plain(read or job.programs), lead=lead)
@@ -143,7 +143,7 @@ class _Choice:
     def _round(self, stretch: ExecutedStretch, scene: Scene, inside: Mapping[str, slice]) -> None:
         """Choose the shares of a phase."""
         begun = {name: self._chosen[name][rows].copy() for name, rows in inside.items()}
-        for margin in ROOMS:
+        for margin in MARGINS:
             for name, rows in inside.items():
                 self._chosen[name][rows] = begun[name]
             if self._keep_tools(stretch, scene, margin):
@@ -207,8 +207,8 @@ class _Choice:
             executed = self._played.rows[name]
             off = np.zeros((len(executed), scene.cell.joint_count))
             off[:, scene.cell.columns(name)] = np.abs(corner_vectors(executed, np.ones(len(executed))))
-            ways = np.sort(body_reach(arms, scene, off), axis=0)[-2:].sum(axis=0)
-            most[name] = reach / np.maximum(ways, 1e-12)
+            approach = np.sort(body_reach(arms, scene, off), axis=0)[-2:].sum(axis=0)
+            most[name] = reach / np.maximum(approach, 1e-12)
         if self._in_step:
             least = np.min(list(most.values()), axis=0)
             most = dict.fromkeys(most, least)

@@ -13,7 +13,7 @@ from cellplan.model.motion import JointTable
 from cellplan.model.plan import Interval, Plan
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.interpolant import resting, row_speeds
+from cellplan.pipeline.export.interpolant import resting, row_velocities
 
 
 class NominalRows(NamedTuple):
@@ -116,13 +116,13 @@ def _robot_rows(cell: Cell, plan: Plan, nominal: NominalRows, *, robot: str) -> 
         robot=robot,
         q=table.q,
         times=table.times,
-        qd=row_speeds(table.times, table.q, rests=rests, lower=model.lower, upper=model.upper),
+        qd=row_velocities(table.times, table.q, rests=rests, lower=model.lower, upper=model.upper),
         process=_in_process(nominal.sigma, [stretch for task in tasks for stretch in plan.process.get(task, ())]),
-        stops=tuple(np.flatnonzero(are_near(nominal.sigma, _own_stops(plan, tasks), TIME_TOLERANCE)).tolist()),
+        stops=tuple(np.flatnonzero(are_near(nominal.sigma, _task_stops(plan, tasks), TIME_TOLERANCE)).tolist()),
     )
 
 
-def _own_stops(plan: Plan, tasks: Sequence[str]) -> list[float]:
+def _task_stops(plan: Plan, tasks: Sequence[str]) -> list[float]:
     """Nominal times at which the tool of some tasks stops on its path: at corners, and at the ends of dwells."""
     return [
         *(stop for task in tasks for stop in plan.stops.get(task, ())),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import did_you_mean, listed
@@ -96,7 +96,7 @@ def export_programs(
     chosen = chosen_formats(formats)
     refuse_unless_writable([folder / form for form in chosen], run.folder)
     _refuse_unknown(run, choice.robots)
-    with nothing_kept():  # a proof rests on the files themselves
+    with without_cache():  # a proof rests on the files themselves
         return tuple(_exports(Shared(run), folder, chosen, choice, progress))
 
 

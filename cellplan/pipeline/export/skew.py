@@ -28,7 +28,7 @@ class ClockPair:
     reason: str  # what more would break
 
     @property
-    def is_kept(self) -> bool:
+    def is_met(self) -> bool:
         """Whether what is stated is allowed, as far as anything is stated."""
         return self.stated is None or self.stated <= self.allowed
 
@@ -47,7 +47,7 @@ class RunSkew:
 
     def broken(self, robots: Collection[str]) -> Iterator[ClockPair]:
         """Pairs of some robots of which more is stated than is allowed, the worst first."""
-        among = [pair for pair in self.pairs if {pair.first, pair.second} <= set(robots) and not pair.is_kept]
+        among = [pair for pair in self.pairs if {pair.first, pair.second} <= set(robots) and not pair.is_met]
         yield from sorted(among, key=lambda pair: pair.allowed)
 
     def shortest_cycle(self, pair: ClockPair) -> str:

@@ -16,12 +16,12 @@ from cellplan.export.corners import switches
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.exported import ProgramRows, RobotRows
 from cellplan.model.units import MM
-from cellplan.pipeline.export.interpolant import row_speeds
+from cellplan.pipeline.export.interpolant import row_velocities
 from cellplan.pipeline.export.part_errors import ToolsOnPart
 from cellplan.pipeline.export.rows import EssentialRows, WorkRows, times_of
 from cellplan.scene.scene import Scene
 
-TIME_ROOM: Final = 1e-9  # [s] rounding of differences of times
+TIME_TOL: Final = 1e-9  # [s] rounding of differences of times
 NO_ROWS: Final = EssentialRows((), ())
 
 
@@ -90,8 +90,8 @@ class _RowGroup:
         self._scaled = self._q / np.array([limits.turn if joint.is_revolute else limits.slide for joint in joints])
         self.times = times_of(rows[0])
         tips = [scene.chains[end_rows.robot].tool_poses(end_rows.q)[:, :3, 3] for end_rows in rows]
-        ways = np.max([np.linalg.norm(np.diff(tip, axis=0), axis=1) for tip in tips], axis=0)
-        self._way = np.concatenate([[0.0], np.cumsum(ways)])
+        lengths = np.max([np.linalg.norm(np.diff(tip, axis=0), axis=1) for tip in tips], axis=0)
+        self._travel = np.concatenate([[0.0], np.cumsum(lengths)])
         self._is_chosen = np.zeros(len(self.times), dtype=bool)
         self._is_chosen[[0, -1, *essential_rows]] = True
         self._is_chosen |= _ends_of_standstill(self._q)
@@ -166,11 +166,11 @@ class _RowGroup:
 
     def _split(self, first: int, last: int, off: Array, what: str) -> int:
         """Choose the row that is off most of those that are far enough from both ends of a stretch."""
-        times, way, least = self.times, self._way, self.limits
+        times, travel, least = self.times, self._travel, self.limits
         inner = slice(first + 1, last)
         nearest = np.minimum(times[inner] - times[first], times[last] - times[inner])
-        moved = np.minimum(way[inner] - way[first], way[last] - way[inner])
-        fits = (nearest >= least.shortest_time - TIME_ROOM) & (moved >= least.shortest_distance)
+        moved = np.minimum(travel[inner] - travel[first], travel[last] - travel[inner])
+        fits = (nearest >= least.shortest_time - TIME_TOL) & (moved >= least.shortest_distance)
         if not np.any(fits):
             names = ", ".join(row.robot for row in self.rows)
             raise InputError(
@@ -207,7 +207,7 @@ def _chosen_rows(scene: Scene, rows: RobotRows, chosen: Indices) -> RobotRows:
     times, q, qd = times_of(rows)[chosen], rows.q[chosen], None
     if rows.qd is not None:
         rests = np.all(rows.qd[chosen] == 0.0, axis=1)
-        qd = row_speeds(times, q, rests=rests, lower=model.lower, upper=model.upper)
+        qd = row_velocities(times, q, rests=rests, lower=model.lower, upper=model.upper)
     return replace(
         rows,
         q=q,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any, Final
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.export.dialect import Dialect
 from cellplan.io.input.findings import shown
@@ -51,7 +51,7 @@ def verify_export(stored: StoredExport, run: VerifiedRun, *, progress: Progress 
     """
     refuse_other_run(stored, run)
     require_format(stored.form)
-    with nothing_kept():  # a proof rests on the files themselves
+    with without_cache():  # a proof rests on the files themselves
         choice = stored.choice if isinstance(EXPORTERS[stored.form], Dialect) else Choice()
         read = _read(stored, run, choice)
         changed = list(stored.changed())

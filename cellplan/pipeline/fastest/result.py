@@ -179,14 +179,14 @@ def _curves(record: Record) -> dict[str, list[Record]]:
     return curves
 
 
-def _marked(record: Record, *, is_drawn: bool = False) -> dict[str, Record]:
+def _marked(record: Record, *, is_plotted: bool = False) -> dict[str, Record]:
     """Figures of the programs beside the curve: as written, at reduced speed, and that of the demand.
 
     A plot leaves one at reduced speed out that is the one of another law.
     """
     marked = {"as_written": record["as_written"]}
     reduced = record["cycles"].get("reduced_speed")
-    if reduced and (reduced["law"] == "reduced_speed" or not is_drawn):
+    if reduced and (reduced["law"] == "reduced_speed" or not is_plotted):
         marked["reduced_speed"] = record["cycles"]["reduced_speed"]["figures"]
     if record["demand"]:
         marked["demand"] = record["demand"]["program"]["figures"]
@@ -280,7 +280,7 @@ def _curve_lines(record: Record) -> Iterator[str]:
 
 def curve_figures(record: Record) -> dict[str, Figure]:
     """A plot over the cycle time for each quantity; none where there is no calmer cycle."""
-    curves, marked = _curves(record), _marked(record, is_drawn=True)
+    curves, marked = _curves(record), _marked(record, is_plotted=True)
     if max(map(len, curves.values()), default=0) < 2:
         return {}
     cycles = [point["cycle_time_s"] for points in curves.values() for point in points]
@@ -312,7 +312,7 @@ def _panel(key: str, curves: Mapping[str, list[Record]], marked: Mapping[str, Re
 
 def fastest_page(record: Record) -> str:
     """The page of the shortest cycles."""
-    drawn = curve_figures(record)
+    figures = curve_figures(record)
     programs = dict(record["cycles"])
     if record["demand"]:
         programs["demand"] = record["demand"]["program"]
@@ -322,8 +322,8 @@ def fastest_page(record: Record) -> str:
         programs=programs,
         titles=TITLES,
         colours=COLOURS,
-        plots=[(SHOWN[key].plot, inline_svg(svg_text(one))) for key, one in drawn.items()],
-        legend=[*_curves(record), *_marked(record, is_drawn=True)] if drawn else [],
+        plots=[(SHOWN[key].plot, inline_svg(svg_text(one))) for key, one in figures.items()],
+        legend=[*_curves(record), *_marked(record, is_plotted=True)] if figures else [],
         saving=_saving_text,
         binding=_binding_lines,
         headings=page_headings(ON_PAGE),

@@ -25,13 +25,13 @@ PAGE: Final = "report.html"
 EXCERPT_LENGTH: Final = 40  # [characters] shown of a page from where it differs
 
 
-def drawn_again(motions: Sequence[VerifiedMotion]) -> Drawings:
+def redrawn(motions: Sequence[VerifiedMotion]) -> Drawings:
     """The pictures of what was found, by the place of the run and by file name."""
     return {motion.name or "": pictures(run_figures(motion.report, cell=motion.cell)) for motion in motions}
 
 
 def page_findings(
-    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], drawn: Drawings, drawings: CellDrawings
+    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], redrawn: Drawings, drawings: CellDrawings
 ) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
@@ -41,7 +41,7 @@ def page_findings(
     yield from foreign_drawings(stored, drawings)
     for motion in motions:
         place = motion.name or ""
-        yield from _foreign_pieces(stored, place, drawn[place])
+        yield from _foreign_pieces(stored, place, redrawn[place])
         record = _of_the_run(
             stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place))
         )
@@ -53,22 +53,22 @@ def page_findings(
         yield from _difference(stored, "", overview_page(record, cell=cell, **_page_files(stored, "")))
 
 
-def other_pictures(stored: StoredRun, drawn: Drawings) -> Iterator[str]:
+def other_pictures(stored: StoredRun, expected: Drawings) -> Iterator[str]:
     """Pictures of a run that are not, to the byte, what is drawn here of what was found.
 
     That may be rounding: curves that show nothing but the noise of the arithmetic look different on each processor.
     """
-    for place, texts in drawn.items():
+    for place, texts in expected.items():
         for name, picture in texts.items():
             if stored.content(place, f"plots/{name}") != picture:
                 yield f"{place}/plots/{name}" if place else f"plots/{name}"
 
 
-def _foreign_pieces(stored: StoredRun, place: str, drawn: Mapping[str, bytes]) -> Iterator[str]:
+def _foreign_pieces(stored: StoredRun, place: str, expected: Mapping[str, bytes]) -> Iterator[str]:
     """Pictures of one run that hold something that cellplan does not draw; missing ones are reported elsewhere."""
     for name, picture in stored.drawings(place).items():
-        if name in drawn:
-            foreign = foreign_piece(picture.decode("utf-8", "replace"), drawn[name].decode())
+        if name in expected:
+            foreign = foreign_piece(picture.decode("utf-8", "replace"), expected[name].decode())
             if foreign is not None:
                 file = stored.file(place, f"plots/{name}")
                 yield f"{file}: unexpected {foreign}, which cellplan does not draw; solve the cell again"

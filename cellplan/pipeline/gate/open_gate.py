@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
 from cellplan.checks.verify import verify
@@ -19,7 +19,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report import Report
 from cellplan.model.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.pipeline.gate.compare_drawings import drawings_again, other_drawings
-from cellplan.pipeline.gate.compare_page import drawn_again, other_pictures, page_findings
+from cellplan.pipeline.gate.compare_page import other_pictures, page_findings, redrawn
 from cellplan.pipeline.gate.compare_report import differences, misshapen_series
 from cellplan.pipeline.gate.stored_cell import load_stored_cell
 from cellplan.pipeline.gate.stored_rows import StoredRows, read_rows
@@ -38,7 +38,7 @@ from cellplan.scene.scene import Scene
 MAX_DIFFERENCES: Final = 10  # of a report that are listed; the rest is counted
 
 
-@nothing_kept()  # a proof rests on the files themselves
+@without_cache()  # a proof rests on the files themselves
 def open_gate(
     folder: Path | str,
     *,
@@ -240,10 +240,10 @@ def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[Verifie
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
         return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
-    drawn = drawn_again(motions)
+    expected = redrawn(motions)
     drawings = drawings_again(cell, motions)
-    _refuse_because(stored, list(page_findings(stored, cell, motions, drawn, drawings)))
-    other = [*other_pictures(stored, drawn), *other_drawings(stored, drawings)]
+    _refuse_because(stored, list(page_findings(stored, cell, motions, expected, drawings)))
+    other = [*other_pictures(stored, expected), *other_drawings(stored, drawings)]
     remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"
     return (remark,) if other else ()
 

@@ -17,14 +17,14 @@ MEASURES: Final = frozenset({"x", "y", "width", "height", "d", "data-y"})  # att
 MEASURE: Final = re.compile(r"[-\d.e MLHVZhvl]*")
 
 
-def foreign_piece(got: str, drawn: str) -> str | None:
+def foreign_piece(got: str, expected: str) -> str | None:
     """The first piece of a picture that cellplan does not draw: an element, an attribute, a word; None without any.
 
     Figures at the axes and the courses of curves are not compared: where a curve shows nothing but the noise of the
     arithmetic, they are others on every processor.
     """
     head, _, body = got.partition(SVG_START)
-    other_head, _, other_body = drawn.partition(SVG_START)
+    other_head, _, other_body = expected.partition(SVG_START)
     if head != other_head:
         return shown(" ".join(head.split()) or "nothing")
     known = frozenset(PIECE.findall(SVG_START + other_body))

@@ -64,9 +64,9 @@ def _change(address: str, value: object) -> str:
 def _without_file(stored: StoredRun) -> StoredCell:
     """The cell from its resolved copy alone."""
     manifest = stored.manifest
-    if manifest.own_inputs:
+    if manifest.user_files:
         raise InputError(
-            f"{stored.folder}: the run depends on files beside its cell file ({listed(manifest.own_inputs)}): name the "
+            f"{stored.folder}: the run depends on files beside its cell file ({listed(manifest.user_files)}): name the "
             f"cell file '{manifest.cell_file}' with --cell, so that they can be compared"
         )
     bundled = [name for name in manifest.cell_inputs if name != manifest.cell_file]

@@ -41,14 +41,14 @@ def margins_missed_at(program: TimedProgram, margin: float, span: float) -> tupl
     return tuple(times)
 
 
-def distances_missed_at(program: TimedProgram, span: float, *, is_own: bool) -> tuple[float, ...]:
+def distances_missed_at(program: TimedProgram, span: float, *, within_robot: bool) -> tuple[float, ...]:
     """Times at which bodies are nearest and nearer than the cell demands, of a robot's own bodies or of all others."""
     required, times = program.solution.cell.checks.clearance_mm.si, list[float]()
     for run in program.solution.runs:
         missed = [
             least.at_s
             for kind, least in run.report.clearance.minima.items()
-            if (kind is ClearanceClass.SELF) == is_own
+            if (kind is ClearanceClass.SELF) == within_robot
             and least.minimum is not None
             and least.at_s is not None
             and least.minimum < required

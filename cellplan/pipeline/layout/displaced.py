@@ -105,6 +105,6 @@ def _is_apart(program: TimedProgram) -> bool:
         q = stacked_positions(scene.cell, one.report.q)
         if not all(check.passed for check in check_mounting(scene, q, one.schedule.times)):
             return False
-        if not certify(scene, q, with_minimum=False).is_kept:
+        if not certify(scene, q, with_minimum=False).is_met:
             return False
     return True

@@ -23,7 +23,7 @@ from cellplan.pipeline.layout.between_nodes import distances_missed_at, exceeded
 from cellplan.pipeline.layout.cycles import draft, is_scaled, load_of, shortest, time_of
 from cellplan.pipeline.layout.limits import Standing, standing_of
 from cellplan.pipeline.layout.misplacement_record import MisplacementRecord
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, kept_demands, prepared, values_of
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, demands_near, prepared, values_of
 from cellplan.pipeline.layout.proposals import choice_of
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
@@ -41,7 +41,7 @@ GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
 MORE_ANGLE: Final = np.radians(0.05)  # [rad] asked for beyond what was missed
 MORE_LENGTH: Final = 0.0005  # [m] likewise
-MORE_OWN: Final = 0.00002  # [m] and of a robot's own bodies
+MORE_WITHIN: Final = 0.00002  # [m] and of a robot's own bodies
 MORE_TIME: Final = 0.002  # [-] likewise
 ROUNDING: Final = 1e-9  # [deg] by which a margin may be missed: of printed numbers
 
@@ -86,7 +86,7 @@ class CandidateResult:
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        return None if self.program is None else clearance_of(self.program, is_own=False)
+        return None if self.program is None else clearance_of(self.program, within_robot=False)
 
 
 @dataclass(slots=True)
@@ -250,7 +250,7 @@ class Finish:
     def _demands(self, x: Array, start: Array) -> Demands:
         """What is demanded of a layout of the search."""
         point = self.ready.coarse.evaluate(x, start)
-        return self.ready.demands() if point is None else kept_demands(self.ready, point)
+        return self.ready.demands() if point is None else demands_near(self.ready, point)
 
     def _problem(self, nodes: int, denser: tuple[float, ...] = ()) -> Any:
         """The layout problem at about so many nodes, and more about some times in [s] on their clock."""
@@ -309,14 +309,14 @@ def _enlarged(reserves: _Reserves, timed: _Timed, program: TimedProgram) -> bool
         reserves.angle += demanded - np.radians(margin) + MORE_ANGLE
         times += margins_missed_at(program, demanded, span)
     required = program.solution.cell.checks.clearance_mm
-    others, own_clearance = (clearance_of(program, is_own=is_own) for is_own in (False, True))
+    others, inner = (clearance_of(program, within_robot=within_robot) for within_robot in (False, True))
     keys = list[float]()
     if others is not None and others < required:
         reserves.length += (required - others) / MM + MORE_LENGTH
-        keys += distances_missed_at(program, span, is_own=False)
-    if own_clearance is not None and own_clearance < required:
-        reserves.within_robot += (required - own_clearance) / MM + MORE_OWN
-        keys += distances_missed_at(program, span, is_own=True)
+        keys += distances_missed_at(program, span, within_robot=False)
+    if inner is not None and inner < required:
+        reserves.within_robot += (required - inner) / MM + MORE_WITHIN
+        keys += distances_missed_at(program, span, within_robot=True)
     if load > 1.0:
         reserves.time += load - 1.0 + MORE_TIME
         times += exceeded_at(program, program.cycle, span)
@@ -335,12 +335,12 @@ def margin_of(program: TimedProgram) -> float | None:
     return DEG * min(margins) if margins else None
 
 
-def clearance_of(program: TimedProgram, *, is_own: bool | None = None) -> float | None:
+def clearance_of(program: TimedProgram, *, within_robot: bool | None = None) -> float | None:
     """Smallest certified distance in [mm], of a robot's own bodies or of others only if asked; None without pairs."""
     distances = [
         minimum.minimum
         for run in program.solution.runs
         for kind, minimum in run.report.clearance.minima.items()
-        if minimum.minimum is not None and is_own in {None, kind is ClearanceClass.SELF}
+        if minimum.minimum is not None and within_robot in {None, kind is ClearanceClass.SELF}
     ]
     return MM * min(distances) if distances else None

@@ -56,18 +56,18 @@ class Standing:
     @property
     def clearance(self) -> float | None:
         """Smallest distance of bodies at the keys in [mm]; None where none are near."""
-        return self._smallest(with_own=True)
+        return self._smallest(with_inner=True)
 
     @property
     def apart(self) -> float | None:
         """The same of bodies that do not belong to one robot."""
-        return self._smallest(with_own=False)
+        return self._smallest(with_inner=False)
 
-    def _smallest(self, *, with_own: bool) -> float | None:
+    def _smallest(self, *, with_inner: bool) -> float | None:
         """Smallest distance of pairs that are to be apart, not only in touch; None where none are near."""
         distances = self.measures.distances
         is_demanded = distances.demands >= min(TOUCHING, float(distances.demands.max(initial=0.0)))
-        values = distances.values[is_demanded & (with_own | ~distances.is_own)]
+        values = distances.values[is_demanded & (with_inner | ~distances.within_robot)]
         return MM * float(values.min()) if len(values) else None
 
     @property
@@ -130,13 +130,13 @@ class Standing:
 
     def _distances(self, tolerance: float) -> Iterator[tuple[float, LimitRecord]]:
         """Pairs nearer to each other than demanded and a little more, each once."""
-        distances, lacks = self.measures.distances, self.measures.lacks
+        distances, violations = self.measures.distances, self.measures.violations
         seen = set[int]()
-        for row in np.argsort(-lacks, kind="stable").tolist():
+        for row in np.argsort(-violations, kind="stable").tolist():
             pair = int(distances.pairs[row])
-            if not lacks[row] > -tolerance:
+            if not violations[row] > -tolerance:
                 return
-            is_shallow = distances.demands[row] < 0.0 and lacks[row] < 0.5 * distances.demands[row]
+            is_shallow = distances.demands[row] < 0.0 and violations[row] < 0.5 * distances.demands[row]
             if pair in seen or is_shallow:  # what may be in each other, as a grip, is not near its demand there
                 continue
             seen.add(pair)
@@ -144,7 +144,7 @@ class Standing:
             names = " and ".join(self.problem.pair_names(pair))
             how = f"{distance:.3g} mm apart" if distance >= 0.0 else f"{-distance:.3g} mm into each other"
             text = f"{names} {how}, {demand:.3g} mm demanded"
-            yield MM * float(lacks[row]), {"kind": "distance", "subject": names, "text": text}
+            yield MM * float(violations[row]), {"kind": "distance", "subject": names, "text": text}
 
     def _bounds(self) -> Iterator[LimitRecord]:
         """Variables at their bounds."""
@@ -161,11 +161,11 @@ def _singular(standing: Standing, tolerance: float) -> Iterator[tuple[float, Lim
     arms, demanded = standing.measures.arms, standing.demands.singular
     if arms is None or demanded is None:
         return
-    lacks = standing.measures.singular.value.max(axis=0)
-    for place in np.flatnonzero(lacks > -tolerance).tolist():
-        name, value = arms.names[place], (1.0 - float(lacks[place])) * float(demanded[place])
+    violations = standing.measures.singular.value.max(axis=0)
+    for place in np.flatnonzero(violations > -tolerance).tolist():
+        name, value = arms.names[place], (1.0 - float(violations[place])) * float(demanded[place])
         text = f"{name} at a smallest singular value of {value:.3g}, {demanded[place]:.3g} demanded"
-        yield 100.0 * float(lacks[place]), {"kind": "singular", "subject": name, "text": text}
+        yield 100.0 * float(violations[place]), {"kind": "singular", "subject": name, "text": text}
 
 
 def reason(violation: LimitRecord) -> str:
@@ -231,9 +231,9 @@ def _of_margin(standing: Standing, by: PointDerivatives) -> Array:
 def _of_distance(standing: Standing, by: PointDerivatives) -> Array:
     """Derivatives of the smallest distance of bodies that do not belong to one robot."""
     distances = standing.measures.distances
-    if not len(distances.values) or distances.is_own.all():
+    if not len(distances.values) or distances.within_robot.all():
         return np.full(by.q.shape[-1], np.nan)
-    values = np.where(distances.is_own, np.inf, distances.values - distances.demands)
+    values = np.where(distances.within_robot, np.inf, distances.values - distances.demands)
     derivatives: Array = standing.problem.distance_derivatives(standing.measures.point, distances, by)
     return derivatives[int(values.argmin())]
 

@@ -65,7 +65,7 @@ class PreparedSearch:
     schedule: Schedule  # the tasks on the common clock
     moving: tuple[str, ...]  # names of the robots that move
     unled: "PreparedSearch | None" = None
-    found_start: Array | None = None
+    solved_start: Array | None = None
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
@@ -93,10 +93,10 @@ class PreparedSearch:
             moving=tuple(phase.moving),
             unled=None if unled is None else cls.of(request, unled),
         )
-        is_found = any(
+        needs_start = any(
             variable.kind is VariableKind.START and variable.given is None for variable in variables.tied.ranges
         )
-        return _with_found_start(prepared) if is_found else prepared
+        return _with_solved_start(prepared) if needs_start else prepared
 
     def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
@@ -157,8 +157,8 @@ class PreparedSearch:
     @cached_property
     def _given_start(self) -> Array | NoSolutionError:
         """See ``given_start``; or why there is none."""
-        if self.found_start is not None:
-            return self.found_start
+        if self.solved_start is not None:
+            return self.solved_start
         try:
             return self.start_of(self.variables.base)
         except NoSolutionError as error:
@@ -196,7 +196,7 @@ class PreparedSearch:
         return Demands(**(values | changes))
 
 
-def kept_demands(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
+def demands_near(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
     """What is demanded of a layout near one that was improved.
 
     The usual share of the singular values is demanded only where the point keeps it, one that the cell states always.
@@ -204,8 +204,8 @@ def kept_demands(ready: PreparedSearch, point: Point, **changes: Any) -> Demands
     demands, layout = ready.demands(**changes), ready.cell.layout
     if demands.singular is None or (layout is not None and layout.singular is not None):
         return demands
-    is_kept = bool(np.all(ready.coarse.arms(point).values >= NEARLY * demands.singular))
-    return demands if is_kept else replace(demands, singular=None)
+    is_met = bool(np.all(ready.coarse.arms(point).values >= NEARLY * demands.singular))
+    return demands if is_met else replace(demands, singular=None)
 
 
 def _singular(ready: PreparedSearch) -> Array | None:
@@ -238,7 +238,7 @@ def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object
     return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
 
 
-def _with_found_start(ready: PreparedSearch) -> PreparedSearch:
+def _with_solved_start(ready: PreparedSearch) -> PreparedSearch:
     """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
     try:
         start = ready.given_start
@@ -247,7 +247,7 @@ def _with_found_start(ready: PreparedSearch) -> PreparedSearch:
     base, variables = ready.variables.base, ready.variables
     robots = [replace(robot, start=start[base.columns(robot.name)]) for robot in base.robots]
     given = variables.read_from(replace(base, robots=tuple(robots)))
-    return replace(ready, variables=replace(variables, given=given), found_start=start)
+    return replace(ready, variables=replace(variables, given=given), solved_start=start)
 
 
 def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> PreparedSearch:

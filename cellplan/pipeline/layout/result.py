@@ -183,21 +183,21 @@ def _trials(count: int) -> str:
 
 def floor_plan(record: Record) -> Figure | None:
     """The given and the best layout from above, to scale; None where nothing is drawn."""
-    drawn = record["drawing"]
-    if not drawn:
+    drawing = record["drawing"]
+    if not drawing:
         return None
-    low, high = _extent(drawn)
+    low, high = _extent(drawing)
     panel = PlotPanel(
         title="",
         y=PlotAxis(low=float(low[1]), high=float(high[1]), label="y in mm, upward", unit="mm"),
-        items=[*_sweep(drawn), *_reach(drawn), *_outlines(drawn), *_bases(drawn)],
+        items=[*_sweep(drawing), *_reach(drawing), *_outlines(drawing), *_bases(drawing)],
     )
     return Figure(
         title=f"{record['cell']} from above",
         x=PlotAxis(low=float(low[0]), high=float(high[0]), label="x in mm", unit="mm"),
         panels=[panel],
         is_plane=True,
-        legend=list(_legend(drawn)),
+        legend=list(_legend(drawing)),
     )
 
 
@@ -266,56 +266,56 @@ def _shown(record: Record) -> Entries:
     return [candidate for candidate in listed.values() if candidate["status"] != "violating"]
 
 
-def _extent(drawn: Record) -> tuple[Any, Any]:
+def _extent(drawing: Record) -> tuple[Any, Any]:
     """Lowest and highest corner of the plan in [mm]."""
     points = [
-        point for item in (*drawn["given"]["outlines"], *drawn["best"]["outlines"]) for point in item["outline_mm"]
+        point for item in (*drawing["given"]["outlines"], *drawing["best"]["outlines"]) for point in item["outline_mm"]
     ]
-    points += [[robot["x_mm"], robot["y_mm"]] for robot in (*drawn["given"]["robots"], *drawn["best"]["robots"])]
-    swept = drawn["swept"]
+    points += [[robot["x_mm"], robot["y_mm"]] for robot in (*drawing["given"]["robots"], *drawing["best"]["robots"])]
+    swept = drawing["swept"]
     points += [[x, row[0]] for rows in swept["robots"].values() for row in rows for x in (row[1], row[2])]
     corners = np.array(points, dtype=float)
     return corners.min(axis=0) - BORDER, corners.max(axis=0) + BORDER
 
 
-def _sweep(drawn: Record) -> Iterator[Item]:
+def _sweep(drawing: Record) -> Iterator[Item]:
     """What the links of each robot cover, in its colour."""
-    half = 0.5 * drawn["swept"]["square_mm"]
-    for index, rows in enumerate(drawn["swept"]["robots"].values()):
+    half = 0.5 * drawing["swept"]["square_mm"]
+    for index, rows in enumerate(drawing["swept"]["robots"].values()):
         for y, first, last in rows:
             yield PlotBox((first - half, last + half), (y - half, y + half), _colour(index), opacity=0.16)
 
 
-def _reach(drawn: Record) -> Iterator[Item]:
+def _reach(drawing: Record) -> Iterator[Item]:
     """The reach of each robot from its new base."""
-    for index, robot in enumerate(drawn["best"]["robots"]):
-        reach = drawn["reach_mm"][robot["name"]]
+    for index, robot in enumerate(drawing["best"]["robots"]):
+        reach = drawing["reach_mm"][robot["name"]]
         circle = np.stack([robot["x_mm"] + reach * np.cos(CIRCLE), robot["y_mm"] + reach * np.sin(CIRCLE)], axis=1)
         yield line(circle, colour=_colour(index), width=0.6, is_dashed=True)
 
 
-def _outlines(drawn: Record) -> Iterator[Item]:
+def _outlines(drawing: Record) -> Iterator[Item]:
     """Bodies of the best layout at the start, what stands of the given one, and the paths."""
-    names = list(drawn["swept"]["robots"])
-    for name, box in drawn["keep_out"].items():
+    names = list(drawing["swept"]["robots"])
+    for name, box in drawing["keep_out"].items():
         yield outline(box, colour=LIMIT, width=0.8, is_dashed=True)
         x, y = np.mean(box, axis=0).tolist()
         yield Note(x, y, name, LIMIT, size=7.0)
-    for item in drawn["given"]["outlines"]:
+    for item in drawing["given"]["outlines"]:
         if item["is_at_rest"] and item["robot"]:
             yield outline(item["outline_mm"], colour=GREY, width=0.9, is_dashed=True)
-    for item in drawn["best"]["outlines"]:
+    for item in drawing["best"]["outlines"]:
         colour = _colour(names.index(item["robot"])) if item["robot"] in names else INK
         width = 1.1 if item["is_at_rest"] or item["kind"] == "part" else 0.5
         yield outline(item["outline_mm"], colour=colour, width=width)
-    for path in drawn["best"]["paths"]:
+    for path in drawing["best"]["paths"]:
         yield line(path["points_mm"], colour=LIMIT, width=1.2)
 
 
-def _bases(drawn: Record) -> Iterator[Item]:
+def _bases(drawing: Record) -> Iterator[Item]:
     """Old and new bases with the move between them."""
-    old = {robot["name"]: robot for robot in drawn["given"]["robots"]}
-    for index, robot in enumerate(drawn["best"]["robots"]):
+    old = {robot["name"]: robot for robot in drawing["given"]["robots"]}
+    for index, robot in enumerate(drawing["best"]["robots"]):
         colour, x, y, was = _colour(index), robot["x_mm"], robot["y_mm"], old[robot["name"]]
         yield line([[was["x_mm"], was["y_mm"]], [x, y]], colour=colour, width=1.4)
         yield PlotMark(was["x_mm"], was["y_mm"], PAPER, size=6.5, edge=colour)
@@ -323,9 +323,9 @@ def _bases(drawn: Record) -> Iterator[Item]:
         yield Note(x, y, robot["name"], colour, size=8.5, is_bold=True, anchor="start", moved=(6.5, 9.0))
 
 
-def _legend(drawn: Record) -> Iterator[LegendKey]:
+def _legend(drawing: Record) -> Iterator[LegendKey]:
     """What the colours and lines mean."""
-    for index, robot in enumerate(drawn["best"]["robots"]):
+    for index, robot in enumerate(drawing["best"]["robots"]):
         yield LegendKey(robot["name"], _colour(index))
     for text in (
         "filled dot: base of the best layout",
@@ -345,8 +345,8 @@ def _colour(index: int) -> str:
 
 def layout_page(record: Record) -> str:
     """The page of a layout search."""
-    drawn = {"plan": floor_plan(record), "front": front_figure(record), "convergence": convergence_figure(record)}
-    plots = {name: inline_svg(svg_text(figure)) for name, figure in drawn.items() if figure is not None}
+    figures = {"plan": floor_plan(record), "front": front_figure(record), "convergence": convergence_figure(record)}
+    plots = {name: inline_svg(svg_text(figure)) for name, figure in figures.items() if figure is not None}
     return template("layout.html").render(
         r=record,
         plots=plots,

@@ -14,7 +14,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.model.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.pipeline.layout.limits import reason, standing_of
-from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, kept_demands, prepared
+from cellplan.pipeline.layout.prepared import NOT_FOLLOWED, PreparedSearch, demands_near, prepared
 from cellplan.pipeline.layout.proposals import SIZE, proposals_of
 from cellplan.pipeline.layout.request import LayoutRequest
 from cellplan.search.programs.improve import Improved, improve
@@ -88,7 +88,7 @@ def _improved(ready: PreparedSearch, begin: _Begin, demands: Demands, effort: Ef
     improved = improve(ready.coarse, begin.x, begin.start, demands, effort)
     if improved is None or improved.is_conforming:
         return improved
-    demands_met = kept_demands(ready, improved.point, clearance=demands.clearance)
+    demands_met = demands_near(ready, improved.point, clearance=demands.clearance)
     if demands_met.singular is not None or demands.singular is None:
         return improved
     return improve(ready.coarse, improved.x, improved.start, demands_met, effort)
@@ -261,7 +261,7 @@ def change_of(ready: PreparedSearch, x: Array) -> float:
 
 def _outcome(ready: PreparedSearch, improved: Improved, unled: Begin | None) -> TrialOutcome:
     """Figures of a local optimum."""
-    standing = standing_of(ready.coarse, improved.point, kept_demands(ready, improved.point), EFFORT)
+    standing = standing_of(ready.coarse, improved.point, demands_near(ready, improved.point), EFFORT)
     figures: dict[str, Any] = {
         "x": improved.x.tolist(),
         "start": improved.start.tolist(),

@@ -15,7 +15,7 @@ from cellplan.model.clock import Clock
 from cellplan.model.motion import ClockTable, JointTable, Motion, Schedule
 from cellplan.model.phase import Hold, Phase
 from cellplan.model.plan import Interval, Plan, rows_of
-from cellplan.model.process_times import kept_rests
+from cellplan.model.process_times import fixed_rests
 from cellplan.model.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks
@@ -198,7 +198,7 @@ def _placed(plan: Plan, placed: Sequence[Phase], schedules: Sequence[Schedule]) 
             working = (begin + task.start, begin + scheduled.end + task.off_delay)
             process[task.name] = (*process.get(task.name, ()), working)
             stops[task.name] = (*stops.get(task.name, ()), *(begin + stop for stop in scheduled.stops))
-        rests = (rest for path in schedule.paths for rest in kept_rests(path.task, path.corners))
+        rests = (rest for path in schedule.paths for rest in fixed_rests(path.task, path.corners))
         dwells |= {(begin + first, begin + last) for first, last in rests}
     return replace(plan, phases=tuple(phases), stops=stops, process=process, dwells=tuple(sorted(dwells)))
 

@@ -131,7 +131,7 @@ def refuse_crowded_homes(scene: Scene, home: Array) -> None:
         HomeNotFoundError: With the bodies and their distance.
     """
     at_rest, cell, alone = home[None].repeat(2, axis=0), scene.cell, scene_of_run(scene, ())
-    if certify(alone, at_rest, with_minimum=False).is_kept:
+    if certify(alone, at_rest, with_minimum=False).is_met:
         return
     words, bodies = nearest_words(alone, at_rest)
     robot = next(

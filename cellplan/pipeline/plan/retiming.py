@@ -16,7 +16,7 @@ from cellplan.model.cell import Cell, Timing
 from cellplan.model.clocked_path import ClockedPath
 from cellplan.model.joint_path import JointPath
 from cellplan.model.motion import Motion, Schedule
-from cellplan.model.process_times import kept_rests
+from cellplan.model.process_times import fixed_rests
 from cellplan.model.progress import Progress, silent
 from cellplan.model.settings.units import si_or_none
 from cellplan.model.task import Task
@@ -198,7 +198,7 @@ class RowLimits:
         within = [
             np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
             for path in self.paths
-            for begin, end in kept_rests(path.task, path.corners)
+            for begin, end in fixed_rests(path.task, path.corners)
         ]
         return float(np.max(within, initial=0.0) - ROUNDING) / self.step
 
@@ -210,7 +210,7 @@ class RowLimits:
                 twists = path.targets(sigma)[1]
                 is_moving = (sigma >= path.start) & (sigma <= path.end)
                 share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
-            for begin, end in kept_rests(path.task, path.corners):
+            for begin, end in fixed_rests(path.task, path.corners):
                 share = np.maximum(share, (sigma >= begin) & (sigma <= end))
         if self.errors is not None:
             share = np.maximum(share, self.errors.steepness(sigma, self.step))
@@ -258,7 +258,7 @@ def fixed_rates(paths: Sequence[ClockedPath]) -> tuple[FixedRate, ...]:
         process = path.task.process
         if process is not None:
             rates.append(FixedRate(begin=path.start, end=path.end, tolerance=process.tolerance))
-        rates += [FixedRate(begin=begin, end=end) for begin, end in kept_rests(path.task, path.corners)]
+        rates += [FixedRate(begin=begin, end=end) for begin, end in fixed_rests(path.task, path.corners)]
     return tuple(rates)
 
 

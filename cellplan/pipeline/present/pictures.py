@@ -19,15 +19,15 @@ def run_pictures(report: Report, cell: Cell) -> Pictures:
     shown = {
         name: figure for name, figure in run_figures(report, cell=cell).items() if name in ("clearance", "margins")
     }
-    return _drawn(shown, cell.name)
+    return _pictures(shown, cell.name)
 
 
 def record_pictures(record: Record) -> Pictures:
     """The pictures that are shown of a record."""
     figures = KINDS[format_of(record)].pictures(record)
-    return _drawn({name: figure for name, figure in figures.items() if figure is not None}, record["cell"])
+    return _pictures({name: figure for name, figure in figures.items() if figure is not None}, record["cell"])
 
 
-def _drawn(figures: Mapping[str, Figure], cell: str) -> Pictures:
+def _pictures(figures: Mapping[str, Figure], cell: str) -> Pictures:
     """Figures as SVG by what they show."""
     return {f"{cell}: {name.replace('_', ' ')}": svg_text(figure) for name, figure in figures.items()}

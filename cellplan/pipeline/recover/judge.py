@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.cache import nothing_kept
+from cellplan.cache import without_cache
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
 from cellplan.certify.growth import ComingApart, certify_growth
@@ -74,7 +74,7 @@ class RecoveryJudgement:
         return min(distances, key=lambda distance: distance.distance, default=None)
 
 
-@nothing_kept()  # a proof rests on the tables themselves
+@without_cache()  # a proof rests on the tables themselves
 def judged(
     texts: Mapping[str, str], phases: Sequence[RecoveryPhase], *, places: RunPlaces, state: StoppedState
 ) -> RecoveryJudgement:
@@ -222,7 +222,7 @@ def _nearest_of(pair: PairBound, bound: Bound, times: Array) -> Nearest:
 
 def _clearance(bound: Bound, times: Array, phase: str) -> Check:
     """Whether every pair keeps what is demanded of it in one phase."""
-    failed = [pair for pair in bound.pairs if not pair.is_kept]
+    failed = [pair for pair in bound.pairs if not pair.is_met]
     nearest = _nearest(bound, times)
     if failed:
         nearest = _nearest_of(min(failed, key=lambda pair: pair.proved - pair.demand), bound, times)

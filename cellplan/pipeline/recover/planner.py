@@ -12,7 +12,7 @@ from cellplan.model.progress import Progress
 from cellplan.pipeline.plan.retiming import transfer_retimer
 from cellplan.pipeline.recover.phases import SAME, RecoveryKind, RecoveryPhase, joints_of, moving
 from cellplan.pipeline.recover.state import RunPlaces, StoppedState
-from cellplan.pipeline.recover.ways_back import WaysBack, holders_back
+from cellplan.pipeline.recover.ways_back import BackwardProgram, holders_back
 from cellplan.planning.recovery.retract import find_retract
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows
 from cellplan.planning.transfer.plan import plan_transfer
@@ -43,7 +43,7 @@ class RecoveryPlanner:
         Raises:
             TransferNotFoundError: No way was found, with what was tried.
         """
-        for back in WaysBack(self._places, self._state, self._fixed, self.refused).ways():
+        for back in BackwardProgram(self._places, self._state, self._fixed, self.refused).options():
             q = back[-1].q[-1] if back else self._state.q
             try:
                 phases = (*back, *self._off_and_home(q))

@@ -47,7 +47,7 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
     record["duration_s"] = recovery.duration
     record["phases"] = [_phase(phase) for phase in judgement.phases]
     record["clearance"] = _nearest(judgement.nearest)
-    record["begins_too_near"] = [_apart(pair, kept_from) for pair, kept_from in judgement.apart]
+    record["begins_too_near"] = [_apart(pair, met_from) for pair, met_from in judgement.apart]
     record["not_taken"] = list(recovery.tried)
     record["checks"] = [
         {"name": check.name, "subject": check.subject, "passed": check.passed, "message": check.message}
@@ -85,14 +85,14 @@ def _phase(phase: TimedPhase) -> dict[str, Any]:
     }
 
 
-def _apart(pair: ComingApart, kept_from: float | None) -> dict[str, Any]:
+def _apart(pair: ComingApart, met_from: float | None) -> dict[str, Any]:
     """A pair that begins too near as data."""
     return {
         "pair": list(pair.names),
         "distance_mm": max(0.0, MM * pair.begin),
         "depth_mm": max(0.0, -MM * pair.begin),
         "demand_mm": MM * pair.demand,
-        "kept_from_s": kept_from,
+        "kept_from_s": met_from,
         "may_fall_back_mm": MM * pair.slack,
     }
 

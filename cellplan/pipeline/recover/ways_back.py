@@ -14,7 +14,7 @@ from cellplan.planning.recovery.rows_path import RowsPath, timed_rows
 from cellplan.scene.scene import Scene
 
 
-class WaysBack:
+class BackwardProgram:
     """The program backwards.
 
     Attributes:
@@ -29,7 +29,7 @@ class WaysBack:
         """
         self._places, self._state, self._fixed, self.refused = places, state, set(fixed), refused
 
-    def ways(self) -> Iterator[tuple[RecoveryPhase, ...]]:
+    def options(self) -> Iterator[tuple[RecoveryPhase, ...]]:
         """What is done before robots leave the part: nothing, or the program backwards, less or more of it."""
         yield ()
         if not self._state.is_on_program:
@@ -75,7 +75,7 @@ class WaysBack:
             return f"the way back along '{name}' moves '{fixed[0]}', which is to stand still"
         scene = self._places.scene_of_phase(place)
         q = timed_rows(path, transfer_retimer(scene))
-        if not certify(scene, q, with_minimum=False).is_kept:
+        if not certify(scene, q, with_minimum=False).is_met:
             return f"the way back along '{name}' is not certified"
         begin = float(self._places.motion.times[self._places.rows(place).start])
         words = f"back along the program to the beginning of '{name}' at {begin:g} s"
@@ -105,7 +105,7 @@ def holders_back(places: RunPlaces, state: StoppedState, scene: Scene, q: Array)
     if path is None or set(state.standing) & set(group):
         raise TransferNotFoundError(f"{named} hold the part together and cannot be moved one by one")
     rows = timed_rows(path, transfer_retimer(scene))
-    if not certify(scene, rows, with_minimum=False).is_kept:
+    if not certify(scene, rows, with_minimum=False).is_met:
         raise TransferNotFoundError(f"{named} cannot go back together while the others stand: a body is in the way")
     words = f"{named} together back along the program"
     return RecoveryPhase(kind=RecoveryKind.HOLDERS_BACK, robots=group, words=words, q=rows)
@@ -123,6 +123,6 @@ def _path_of_group(places: RunPlaces, last: float, q: Array, columns: Flags) -> 
     inner = [row for row in range(rows.start, rows.stop) if motion.times[row] < last - SAME]
     if not inner or np.any(np.abs(motion.q[rows.start] - motion.q[0])[columns] > SAME):
         return None
-    way = np.tile(q, (len(inner) + 1, 1))
-    way[1:, columns] = motion.q[inner][::-1][:, columns]
-    return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), way)
+    path = np.tile(q, (len(inner) + 1, 1))
+    path[1:, columns] = motion.q[inner][::-1][:, columns]
+    return RowsPath(np.concatenate([[0.0], last - motion.times[inner][::-1]]), path)

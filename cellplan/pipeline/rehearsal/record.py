@@ -197,8 +197,8 @@ def _draw_record(cell: Cell, draw: Draw) -> Record:
     """The errors of one trial as they were drawn: joints by name, poses as rows of a matrix with lengths in mm."""
     robots: dict[str, Any] = {}
     for robot in cell.robots:
-        drawn = draw.robots[robot.name]
-        joints = list(zip(robot.model.joints, drawn.joint_offsets, strict=True))
+        sample = draw.robots[robot.name]
+        joints = list(zip(robot.model.joints, sample.joint_offsets, strict=True))
         robots[robot.name] = {
             "joint_offsets": {
                 f"{joint.name}_{joint.display_unit.name}": number(joint.display_unit.scale * value)
@@ -206,10 +206,10 @@ def _draw_record(cell: Cell, draw: Draw) -> Record:
             },
             "link_lengths_mm": {
                 name: number(1e3 * value)
-                for name, value in zip(robot.model.joint_names, drawn.link_lengths, strict=True)
+                for name, value in zip(robot.model.joint_names, sample.link_lengths, strict=True)
             },
-            "base": _pose_rows(drawn.X_base),
-            "tool": _pose_rows(drawn.X_tool),
+            "base": _pose_rows(sample.X_base),
+            "tool": _pose_rows(sample.X_tool),
         }
     return {"robots": robots, "grasp": {name: _pose_rows(X) for name, X in draw.X_grasps.items()}}
 

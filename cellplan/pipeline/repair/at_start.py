@@ -43,13 +43,13 @@ def start_faults(ready: PreparedSearch, point: Point) -> tuple[StartFault, ...]:
         text = f"joint {robot}/{joint} has too little room in the start posture, which this does not change"
         faults.append(StartFault(robots=frozenset({robot, *holder}), text=text))
     near = problem.distances(point, FIRST, 0.0)
-    lacks = near.demands - near.values
-    for row in np.argsort(-lacks, kind="stable").tolist():
-        if lacks[row] > CLEARLY:
+    missing = near.demands - near.values
+    for row in np.argsort(-missing, kind="stable").tolist():
+        if missing[row] > CLEARLY:
             names = problem.pair_names(int(near.pairs[row]))
             robots = frozenset().union(*(_carriers(ready.scene, name) for name in names))
             text = (
-                f"{names[0]} and {names[1]} are {MM * float(lacks[row]):.3g} mm too near in the start posture, which "
+                f"{names[0]} and {names[1]} are {MM * float(missing[row]):.3g} mm too near in the start posture, which "
                 "this does not change"
             )
             faults.append(StartFault(robots=robots | holder, text=text))

@@ -80,8 +80,8 @@ def _refined(
         if improved is None:
             break
         near = problem.distances(improved.point, np.arange(len(problem.times), dtype=np.intp), effort.reserve.distance)
-        lacks = near.demands + SHARE_LEFT * reserves(near, effort.reserve) - near.values
-        worst = {int(near.pairs[row]): int(near.nodes[row]) for row in np.argsort(lacks) if lacks[row] > 0.0}
+        shortfalls = near.demands + SHARE_LEFT * reserves(near, effort.reserve) - near.values
+        worst = {int(near.pairs[row]): int(near.nodes[row]) for row in np.argsort(shortfalls) if shortfalls[row] > 0.0}
         if not worst:
             break
         also_at = {*effort.also_at, *(float(problem.times[node]) for node in worst.values())}
@@ -106,8 +106,8 @@ def _tightened(solved: SolvedCell, demands: Demands, effort: Effort) -> tuple[De
     names = {check.name for check in failed}
     if not names <= JOINT_LIMITS | PASSED_BY_TIME | DISTANCES:
         return None
-    lacks = solved.lacks
-    margin = demands.margin + np.where(lacks > 0.0, lacks + MORE_ANGLE, 0.0)
+    shortfalls = solved.violations
+    margin = demands.margin + np.where(shortfalls > 0.0, shortfalls + MORE_ANGLE, 0.0)
     near = [check for check in failed if check.name in DISTANCES]
     reserve = replace(
         effort.reserve, distance=effort.reserve.distance + _missing(near), time=effort.reserve.time + _late(failed)

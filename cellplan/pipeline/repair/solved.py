@@ -41,7 +41,7 @@ class SolvedCell:
         return [check for check in checks if check.name != MARGIN or check.subject not in beyond]
 
     @property
-    def lacks(self) -> Array:
+    def violations(self) -> Array:
         """What each joint lacks of its demanded margin in [rad] or [m], shape (nq,)."""
         return np.maximum(0.0, self.margin - self._margins)
 

@@ -72,15 +72,17 @@ def _axis(robot: Robot, link: int) -> Record:
 
 def body_records(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> list[Record]:
     """All bodies of a scene in its order."""
-    drawn = {robot.name: {visual.link for visual in geometries.visuals_of(cell, robot.name)} for robot in cell.robots}
+    with_visual = {
+        robot.name: {visual.link for visual in geometries.visuals_of(cell, robot.name)} for robot in cell.robots
+    }
     replaced = {
         f"{robot.name}/{body.name}"
         for robot in cell.robots
         for body in robot.model.bodies
-        if body.link_name in drawn[robot.name]
+        if body.link_name in with_visual[robot.name]
     }
     geometries.announce([body.shape for body in bodies])
-    geometries.announce([visual.shape for robot in drawn for visual in geometries.visuals[robot]])
+    geometries.announce([visual.shape for robot in with_visual for visual in geometries.visuals[robot]])
     return [
         {
             "name": body.name,

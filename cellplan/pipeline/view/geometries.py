@@ -84,17 +84,17 @@ def shape_key(shape: Shape) -> Hashable:
 
 def mesh_record(mesh: Mesh, limit: int) -> Record:
     """A mesh with about as many triangles as a limit says, its points on a grid of 16 bit along each axis."""
-    drawn = decimated(mesh, limit)
-    low = drawn.points.min(axis=0)
-    size = np.maximum(drawn.points.max(axis=0) - low, 1e-9)
-    steps = np.rint((drawn.points - low) / size * STEPS)
+    reduced = decimated(mesh, limit)
+    low = reduced.points.min(axis=0)
+    size = np.maximum(reduced.points.max(axis=0) - low, 1e-9)
+    steps = np.rint((reduced.points - low) / size * STEPS)
     rounding = float(np.linalg.norm(size / STEPS / 2))
     return {
         "low": [float(coordinate) for coordinate in low],
         "size": [float(length) for length in size],
         "points": packed(steps, "<u2"),
-        "triangles": packed(drawn.triangles, "<u2" if len(drawn.points) <= STEPS + 1 else "<u4"),
-        "deviation": point_numbers(np.array([drawn.deviation + rounding]))[0],
+        "triangles": packed(reduced.triangles, "<u2" if len(reduced.points) <= STEPS + 1 else "<u4"),
+        "deviation": point_numbers(np.array([reduced.deviation + rounding]))[0],
     }
 
 

@@ -45,7 +45,7 @@ class ViewedPhase:
     number: int  # number among the phases of one cycle
     times: Array  # times of its rows on the clock of the program in [s], shape (N,)
     q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
-    kept_times: Array  # times on the clock of the program for which the report certifies a distance in [s], shape (M,)
+    gap_times: Array  # times on the clock of the program for which the report certifies a distance in [s], shape (M,)
     distances: Array  # what all pairs keep about each of them in [mm], shape (M,); what is not finite is not known
 
 
@@ -123,7 +123,7 @@ def _played(stored: StoredRun, cell: Cell, labels: Sequence[str]) -> Iterator[Vi
             file = stored.file("", "report.json")
             raise InputError(f"{file}: phases: expected the runs {', '.join(read)}, got '{phase['name']}'")
         begin, read_phase = float(phase["begin_s"]), read[phase["name"]]
-        shifted = {key: begin + read_phase[key] for key in ("times", "kept_times")}
+        shifted = {key: begin + read_phase[key] for key in ("times", "gap_times")}
         number = labels.index(phase["name"]) if phase["name"] in labels else 0
         yield ViewedPhase(name=phase["name"], place=phase["name"], begin=begin, number=number, **(read_phase | shifted))
 
@@ -132,8 +132,8 @@ def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
     """Times and stacked joint positions of one run and what it keeps of distances, from its series."""
     tree, file = stored.series(place), stored.file(place, SERIES)
     times, q = _positions(tree, file, cell)
-    kept_times, distances = _kept_distances(tree.get("clearance", {}), file)
-    return {"times": times, "q": q, "kept_times": kept_times, "distances": distances}
+    gap_times, distances = _certified_distances(tree.get("clearance", {}), file)
+    return {"times": times, "q": q, "gap_times": gap_times, "distances": distances}
 
 
 def stored_series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
@@ -195,12 +195,12 @@ def _part_places(played: Sequence[ViewedPhase], cells: Sequence[Cell]) -> list[R
 
 def _certified(played: Sequence[ViewedPhase]) -> Record:
     """The smallest distance of all classes over time, as the runs certify it."""
-    times = np.round(np.concatenate([one.kept_times for one in played]), TIME_DECIMALS)
+    times = np.round(np.concatenate([one.gap_times for one in played]), TIME_DECIMALS)
     distances = np.round(np.concatenate([one.distances for one in played]), DISTANCE_DECIMALS)
     return {"times": times.tolist(), "distances": [plain(distance) for distance in distances.tolist()]}
 
 
-def _kept_distances(tree: Record, file: str) -> tuple[Array, Array]:
+def _certified_distances(tree: Record, file: str) -> tuple[Array, Array]:
     """Times in [s] and what all pairs keep in [mm], shape (M,) each; what is not finite is not known."""
     try:
         classes = [np.array(values, dtype=np.float64) for name, values in tree.items() if name != "times_s"]

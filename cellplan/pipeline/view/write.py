@@ -10,7 +10,7 @@ from cellplan.io.cell.load import load_cell
 from cellplan.io.run.content import is_run_folder
 from cellplan.io.run.folder import MANIFEST
 from cellplan.io.run.stored import StoredRun, read_stored_run
-from cellplan.io.run.whole_file import refuse_unless_own, replace_own
+from cellplan.io.run.whole_file import refuse_foreign, replace_older
 from cellplan.model.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report import CAUTION
@@ -90,7 +90,7 @@ def view(request: ViewRequest, *, progress: Progress = silent) -> tuple[ViewReco
 def _target(request: ViewRequest, usual: Path) -> Path:
     """Where the page is written."""
     target = request.output or usual
-    refuse_unless_own(target, is_own=is_view_page, kind=PAGE)
+    refuse_foreign(target, is_of_kind=is_view_page, kind=PAGE)
     return target
 
 
@@ -134,7 +134,7 @@ def write_view(record: ViewRecord, target: Path) -> int:
         InputError: The place holds something else, or cannot be written.
     """
     content = view_page(record).encode()
-    replace_own(target, content, is_own=is_view_page, kind=PAGE)
+    replace_older(target, content, is_of_kind=is_view_page, kind=PAGE)
     return len(content)
 
 

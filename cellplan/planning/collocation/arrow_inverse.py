@@ -63,7 +63,7 @@ class ArrowInverse:
         np.einsum("jjb->jb", S)[:] += coupling_weights
         self._S_factor, _ = eliminated(S, S[:, :0])
 
-    def speeds(self, b: Array) -> tuple[Array, Array]:
+    def velocities(self, b: Array) -> tuple[Array, Array]:
         """Smallest weighted joint speeds for twists, shape (6, tasks, batch).
 
         Returns:
@@ -72,7 +72,7 @@ class ArrowInverse:
         y, shared = self._multipliers(b)
         return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
 
-    def refined_speeds(self, b: Array) -> tuple[Array, Array]:
+    def refined_velocities(self, b: Array) -> tuple[Array, Array]:
         r"""`speeds` to the last digits, even where blocks are singular: what is lost there differs by processor.
 
         The multipliers ``y`` of :math:`\dot q = W^{-1} J^T y` are refined by the twists that these very speeds leave.

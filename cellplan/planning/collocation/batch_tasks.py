@@ -48,7 +48,7 @@ class BatchTasks:
         self._is_whole = constraints.is_whole
         self._operator_signs, self._share = constraints.operator_signs[:, None], constraints.carrier_signs[:, None]
         joints = 0 if self._holder is None else len(cell.robots[self._holder].model.joints)
-        self._own_columns = self.chains.columns[:, self._robots]
+        self._operator_columns = self.chains.columns[:, self._robots]
         self._shared_columns = self.chains.columns[:joints, self._holder or 0]
         self._weights = np.concatenate([robot.weights for robot in cell.robots])[:, None]
         self._may_move, self._is_given = constraints.may_move, constraints.follows_path > 0.0
@@ -79,7 +79,7 @@ class BatchTasks:
         arrow = ArrowInverse(
             columns[:, :, :count],
             columns[:, : len(shared), count:] * (self._share * shared),
-            mobility=_padded(mobile[:, None] / weights)[self._own_columns] * self._operator_signs,
+            mobility=_padded(mobile[:, None] / weights)[self._operator_columns] * self._operator_signs,
             coupling_weights=weights[self._shared_columns],
             idle=1.0 - self._constrained + damping * self._constrained,
             is_given=self._is_given[self._shared_columns],
@@ -104,13 +104,13 @@ class BatchTasks:
     def stacked(self, local: Array, shared: Array) -> Array:
         """What belongs to the joints, sorted into the stacked joint vector, shape (nq, batch)."""
         everything = np.zeros((self.joint_count + 1, shared.shape[1]))
-        everything[self._own_columns] = local
+        everything[self._operator_columns] = local
         everything[self._shared_columns] = shared
         return everything[:-1]
 
     def unstacked(self, everything: Array) -> tuple[Array, Array]:
         """The parts of stacked joint vectors, shape (nq, batch), that belong to each task and to all of them."""
-        return _padded(everything)[self._own_columns] * self._operator_signs, everything[self._shared_columns]
+        return _padded(everything)[self._operator_columns] * self._operator_signs, everything[self._shared_columns]
 
     def _seen(self, state: BatchState) -> ToolPoses:
         """The tools as the tasks see them."""
@@ -206,29 +206,29 @@ class Linearisation:
     ) -> None:
         """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
         self._tasks, self._arrow, self._rows, self._desired, self._mobile = tasks, arrow, rows, desired, mobile
-        self._speeds = arrow.refined_speeds if tasks.is_refined else arrow.speeds
+        self._velocities = arrow.refined_velocities if tasks.is_refined else arrow.velocities
         self.errors = errors
 
-    def speeds(self, drift: Array | None = None) -> Array:
+    def velocities(self, drift: Array | None = None) -> Array:
         r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, batch).
 
         The drift has the shape (nq,) or (nq, batch).
         """
         b = self._turned(self._desired)
         if drift is None:
-            return self._tasks.stacked(*self._speeds(b))
+            return self._tasks.stacked(*self._velocities(b))
         u = np.broadcast_to((self._mobile * drift.T).T.reshape(len(drift), -1), (len(drift), b.shape[2]))
-        return u + self._tasks.stacked(*self._speeds(b - self._arrow.twists(*self._tasks.unstacked(u))))
+        return u + self._tasks.stacked(*self._velocities(b - self._arrow.twists(*self._tasks.unstacked(u))))
 
     def null_space_projection(self, u: Array) -> Array:
         """What of joint velocities moves no tool, ``(I - J^# J) u``, shape (nq, batch)."""
         twists = self._arrow.twists(*self._tasks.unstacked(u))
-        return u - self._tasks.stacked(*self._speeds(twists))
+        return u - self._tasks.stacked(*self._velocities(twists))
 
     def correction(self, moved: Array) -> Array:
         """Newton's correction ``J^# (e - J d)`` of configurations that will be moved by ``d``, shape (nq, batch)."""
         b = self._turned(self.errors) - self._arrow.twists(*self._tasks.unstacked(moved))
-        return self._tasks.stacked(*self._speeds(b))
+        return self._tasks.stacked(*self._velocities(b))
 
     def _turned(self, b: Array) -> Array:
         """Errors or twists in the frame of the columns."""

@@ -63,15 +63,15 @@ class Redundancy:
         weights = self._weights.constant[:, None]
         if self._weights.varies:
             damped = self._tasks.linearise(q, desired, placement, mobile=mobile, damping=HEADING_DAMPING)
-            weights = self._weights.along(state, known.T, heading=damped.speeds(drift).T).T
+            weights = self._weights.along(state, known.T, heading=damped.velocities(drift).T).T
         linear = self._tasks.linearise(q, desired, placement, mobile=mobile, weights=weights)
-        speeds = linear.speeds(drift)
+        velocities = linear.velocities(drift)
         if not self._cell.solver.secondary.goals:
-            return linear, speeds
+            return linear, velocities
         stance = self._stance(known.T, state, screws, X=desired[0], signs=self._signs * mobile, weights=weights.T)
-        extra = linear.null_space_projection(self._goals.speeds(times, stance, step=0.0).T)
+        extra = linear.null_space_projection(self._goals.velocities(times, stance, step=0.0).T)
         lowest, highest = self._goals.bounds(known.T)
-        return linear, speeds + share_within(speeds.T, extra.T, lowest=lowest, highest=highest) * extra
+        return linear, velocities + share_within(velocities.T, extra.T, lowest=lowest, highest=highest) * extra
 
     def _state(self, q: Array) -> tuple[CellState, Screws]:
         """Kinematics at stacked joint vectors, shape (K, nq), with the batch as first axis."""

@@ -104,7 +104,7 @@ class AccurateRun:
 
         paced = None if drift is None else _paced(drift, begin, end)
         if self._given is not None:
-            paced = self._given.speeds
+            paced = self._given.velocities
         at = q[:, None].copy()
         for breaks in self._stretches(begin, end):
             mobile = (self._locked_since > 0.5 * (breaks[0] + breaks[-1])).astype(float)
@@ -170,10 +170,10 @@ def _configuration_tol(cell: Cell) -> float | None:
 def _paced(drift: Array, begin: float, end: float) -> Drift:
     """Speeds at times in [s] that begin and end with rest, for mean ones of shape (nq,)."""
 
-    def speeds(times: Array) -> Array:
+    def velocities(times: Array) -> Array:
         return drift[:, None] * drift_pace((times - begin) / (end - begin))
 
-    return speeds
+    return velocities
 
 
 def _settled(cell: Cell, schedule: Schedule, grasps: int) -> Array:

@@ -173,8 +173,8 @@ class Collocation:
         self.sweeps += 1
         self.solves += q.shape[1] * q.shape[2]
         linear, velocities = self._velocities(np.tile(window.times[: window.count], q.shape[1]), q, desired, placement)
-        speeds = velocities.reshape(q.shape)
-        picard = (q0[:, :, None] + speeds @ window.integral.T - q).reshape(len(q), -1)
+        qd = velocities.reshape(q.shape)
+        picard = (q0[:, :, None] + qd @ window.integral.T - q).reshape(len(q), -1)
         moved: Array = (picard + linear.correction(picard)).reshape(q.shape)
         moved[:, :, 0] = 0.0
         return moved, np.abs(linear.errors).max(axis=(0, 1)).reshape(q.shape[1:]).max(axis=1)
@@ -188,7 +188,7 @@ class Collocation:
         if null_space.redundancy is not None:
             return null_space.redundancy.velocities(times, at, desired, placement=placement, mobile=mobile, drift=drift)
         linear = self._tasks.linearise(at, desired, placement, mobile=mobile)
-        return linear, linear.speeds(drift)
+        return linear, linear.velocities(drift)
 
     def _errors(self, window: Window, X: Array, q: Array, placement: Placement) -> Array:
         r"""Bounds of the tool errors at the nodes and between them, by panel, shape (panels, cells).

@@ -30,10 +30,10 @@ def damped_least_squares(problem: TrackingProblem) -> Callable[[int, Array], Ste
         lambda_squared = squared_damping(measure, settings, largest=problem.damping)
         _refuse_undamped(inverse, lambda_squared)
         share = gain_share(measure, settings.region) if settings.shape_gain else 1.0
-        speeds = inverse.speeds(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
+        velocities = inverse.velocities(tasks.twist + share * problem.gain * tasks.error, lambda_squared)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
-        return StepResult(q=q + speeds * problem.step(k))
+            velocities += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=velocities)
+        return StepResult(q=q + velocities * problem.step(k))
 
     return advance
 

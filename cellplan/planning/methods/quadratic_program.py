@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
 from cellplan.planning.methods.support.qp_engine import nearest_to_origin
-from cellplan.planning.methods.support.speed_bounds import JointBounds, SpeedBounds
+from cellplan.planning.methods.support.speed_bounds import JointBounds, VelocityBounds
 from cellplan.planning.tracking.problem import FirstOrder, StepResult, TrackingProblem
 
 STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
@@ -25,30 +25,30 @@ def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], StepRe
     What the slack ``s`` leaves of the tasks is made up for by the feedback as soon as there is room.
     """
     limits = JointBounds(problem.cell)
-    speeds: Array | None = None
+    velocities: Array | None = None
 
     def advance(k: int, q: Array) -> StepResult:
-        nonlocal speeds
-        if speeds is None:
+        nonlocal velocities
+        if velocities is None:
             limits.refuse_outside(q)
-            speeds = np.zeros_like(q)
+            velocities = np.zeros_like(q)
         tasks, dt = problem.first_order(k, q), problem.step(k)
         xdot = tasks.twist + problem.gain * tasks.error
-        bounds = limits.at(q, speeds, dt)
-        speeds = bounded_speeds(
+        bounds = limits.at(q, velocities, dt)
+        velocities = bounded_velocities(
             tasks,
             xdot,
             bounds,
             mobile=problem.mobile(k) > 0.0,
             slack_weight=problem.cell.solver.quadratic_program.slack_weight,
         )
-        return StepResult(q=q + speeds * dt, slack=float(np.linalg.norm(xdot - tasks.J @ speeds)))
+        return StepResult(q=q + velocities * dt, slack=float(np.linalg.norm(xdot - tasks.J @ velocities)))
 
     return advance
 
 
-def bounded_speeds(
-    tasks: FirstOrder, xdot: Array, bounds: SpeedBounds, *, mobile: NDArray[np.bool_], slack_weight: float
+def bounded_velocities(
+    tasks: FirstOrder, xdot: Array, bounds: VelocityBounds, *, mobile: NDArray[np.bool_], slack_weight: float
 ) -> Array:
     r"""Solve the program of one step.
 
@@ -68,11 +68,11 @@ def bounded_speeds(
     Raises:
         NoSolutionError: The program could not be solved.
     """
-    speeds = np.zeros(len(tasks.weights))
+    velocities = np.zeros(len(tasks.weights))
     if not mobile.any():
-        return speeds
+        return velocities
     J, root = tasks.J[:, mobile], np.sqrt(tasks.weights[mobile])
-    desired = speeds[mobile] if tasks.secondary is None else tasks.secondary[mobile]
+    desired = velocities[mobile] if tasks.secondary is None else tasks.secondary[mobile]
     U, s, Vt = np.linalg.svd(J / root, full_matrices=True)
     lambda_squared = max(1.0 / slack_weight, float(s[0]) ** 2 / STEEPEST)
     z_0 = Vt[: len(s)].T @ (s / (s**2 + lambda_squared) * (U[:, : len(s)].T @ (xdot - J @ desired)))
@@ -82,5 +82,5 @@ def bounded_speeds(
     lower, upper = bounds.lower[mobile], bounds.upper[mobile]
     offset = z_0 + root * desired
     y = nearest_to_origin(A, lower=root * lower - offset, upper=root * upper - offset)
-    speeds[mobile] = np.clip((offset + A @ y) / root, lower, upper)
-    return speeds
+    velocities[mobile] = np.clip((offset + A @ y) / root, lower, upper)
+    return velocities

@@ -22,15 +22,15 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
     def advance(k: int, q: Array) -> StepResult:
         tasks = problem.first_order(k, q)
         inverse = WeightedInverse(tasks.J, tasks.weights)
-        speeds = damped_speeds(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
+        velocities = damped_velocities(inverse, tasks.twist + problem.gain * tasks.error, problem.damping)
         if tasks.secondary is not None:
-            speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
-        return StepResult(q=q + speeds * problem.step(k))
+            velocities += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=velocities)
+        return StepResult(q=q + velocities * problem.step(k))
 
     return advance
 
 
-def damped_speeds(inverse: WeightedInverse, xdot: Array, damping: float | None) -> Array:
+def damped_velocities(inverse: WeightedInverse, xdot: Array, damping: float | None) -> Array:
     """Joint speeds with the damping of [Nicolato2007]_ Eq. 2.12.
 
     With ``s`` the smallest singular value of ``J W^-1/2`` and ``eps`` the singular region,
@@ -51,4 +51,4 @@ def damped_speeds(inverse: WeightedInverse, xdot: Array, damping: float | None) 
         raise NoSolutionError("the cooperation Jacobian is singular and solver.damping is 0: allow damping (auto)")
     largest = LARGEST_DAMPING if damping is None else damping
     shortfall = 1.0 - inverse.smallest**2 / SINGULAR_REGION**2
-    return inverse.speeds(xdot, max(shortfall, 0.0) * largest**2)
+    return inverse.velocities(xdot, max(shortfall, 0.0) * largest**2)

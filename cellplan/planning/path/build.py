@@ -30,9 +30,9 @@ def build_toolpath(task: Task, part: Part) -> Toolpath:
         InputError: The path cannot be drawn, misses the part, runs over an edge, leaves the tool's turn open, or is to
             be gone through again and does not come back to its start.
     """
-    drawn = path_curve(task)
-    refuse_path_in_metres(drawn.curve, task=task, part=part)
-    curve = project_path(drawn, task, part)
+    outline = path_curve(task)
+    refuse_path_in_metres(outline.curve, task=task, part=part)
+    curve = project_path(outline, task, part)
     arc = measure(curve.curve)
     refuse_unlikely_path(curve.curve, arc, task=task, part=part)
     orientation = orient_tool(task, curve)

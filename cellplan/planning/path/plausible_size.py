@@ -20,17 +20,17 @@ AROUND: Final = 0.25  # [-] of the size of the part: so far beside it a path may
 LOOKED_AT: Final = 1025  # points of a path, beside its knots
 
 
-def refuse_path_in_metres(drawn: Curve, *, task: Task, part: Part) -> None:
+def refuse_path_in_metres(curve: Curve, *, task: Task, part: Part) -> None:
     """Refuse a path of a few millimetres at the origin of the part that would lie on the part if it were in metres.
 
     Args:
-        drawn: The path as it is listed, in P, before it is projected.
+        curve: The path as it is listed, in P, before it is projected.
 
     Raises:
         InputError: With its length, asking for the unit.
     """
-    first, last = float(drawn.knots[0]), float(drawn.knots[-1])
-    p, _ = drawn.evaluate(np.union1d(drawn.knots, np.linspace(first, last, LOOKED_AT)), (first, last))
+    first, last = float(curve.knots[0]), float(curve.knots[-1])
+    p, _ = curve.evaluate(np.union1d(curve.knots, np.linspace(first, last, LOOKED_AT)), (first, last))
     size = float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum())
     if isinstance(task.path, TimedPath) or task.relative_to is not Frame.PART or size > LONGEST_IN_METRES:
         return

@@ -20,7 +20,7 @@ from cellplan.planning.recovery.lines import Lines, RetractLine
 from cellplan.scene.bodies import Kind
 from cellplan.scene.scene import Scene
 
-ROOMS: Final = (0.05, 0.02, 0.1, 0.005, 0.2)  # [m] beyond the largest demand that a tool goes, in the order of trial
+MARGINS: Final = (0.05, 0.02, 0.1, 0.005, 0.2)  # [m] beyond the largest demand that a tool goes, in the order of trial
 SAMPLES: Final = 31  # configurations of robots that retract together
 
 
@@ -149,10 +149,10 @@ class _RetractSearch:
 
     def _candidates(self, robot: str) -> Iterator[RetractLine]:
         """Lines of a robot, the best first."""
-        longest = self._demand + max(ROOMS)
+        longest = self._demand + max(MARGINS)
         for direction, words in self._lines.directions(robot, self._at_work.get(robot, ())):
             line = self._lines.line(robot, direction, words, longest=longest)
-            lengths = dict.fromkeys(line.up_to(self._demand + margin).lengths[-1] for margin in ROOMS) if line else {}
+            lengths = dict.fromkeys(line.up_to(self._demand + margin).lengths[-1] for margin in MARGINS) if line else {}
             for length in lengths:
                 if line is not None and length > 0.0:
                     yield line.up_to(float(length))
@@ -168,10 +168,10 @@ def _fault(growth: Growth, scene: Scene, q: Array, near: Sequence[int]) -> str:
     if growth.faults:
         (first, second), what = growth.faults[0]
         return f"is not free: '{first}' to '{second}' {what}"
-    if not growth.bound.is_kept:
+    if not growth.bound.is_met:
         others = [row for row in range(len(scene.pairs)) if row not in set(near)]
         bound = certify(scene_of_rows(scene, others), q, with_curves=False)
-        pairs = [pair for pair in bound.pairs if not pair.is_kept]
+        pairs = [pair for pair in bound.pairs if not pair.is_met]
         if pairs:
             worst = min(pairs, key=lambda pair: pair.proved - pair.demand)
             first, second = bound.names(worst)

@@ -88,7 +88,7 @@ def _configurations_of_holder(search: StartSearch, holder: Robot) -> Array:
         if operator.start is not None and relation.relative_to is Frame.PART:
             return _configurations_meeting(search, relation, operator.start)
     for relation in cell.relations:
-        if relation.relative_to is Frame.PART and _lacks_axes(search, relation):
+        if relation.relative_to is Frame.PART and _is_deficient(search, relation):
             configurations = _configurations_of_pairs(search, holder, relation)
             if len(configurations):
                 return configurations
@@ -231,7 +231,7 @@ def _configurations_meeting(search: StartSearch, relation: Relation, operator_st
     return _configurations_at(search, holder, cell.part.held_by[0], X_W_holder)
 
 
-def _lacks_axes(search: StartSearch, relation: Relation) -> bool:
+def _is_deficient(search: StartSearch, relation: Relation) -> bool:
     """Whether a robot alone has too few axes for its task, so that hardly any place of the part suits it."""
     robot, X_PT = search.cell.robot(relation.robot), search.X_PT_start(relation)
     q = random_configurations(robot.model, SEEDS_PER_HOLDER, np.random.default_rng(search.cell.solver.seed))
@@ -243,8 +243,8 @@ def _configurations_of_pairs(search: StartSearch, holder: Robot, relation: Relat
     operator = search.cell.robot(relation.robot)
     lower, upper = finite_limits(operator.model)
     middle = 0.5 * (lower + upper)
-    drawn = middle + HOLDER_RANGE * (search.random_configurations(operator, HOLDER_POSTURES) - middle)
-    met = [_configurations_meeting(search, relation, q)[:1] for q in drawn]
+    samples = middle + HOLDER_RANGE * (search.random_configurations(operator, HOLDER_POSTURES) - middle)
+    met = [_configurations_meeting(search, relation, q)[:1] for q in samples]
     return np.concatenate([*met, np.empty((0, len(holder.model.joints)))])
 
 

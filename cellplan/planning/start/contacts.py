@@ -44,13 +44,13 @@ def contacts_of(
     Args:
         cell: The cell in the order of names.
     """
-    among = _own_pairs(trials, cell, robot)
+    among = _robot_pairs(trials, cell, robot)
     counts: Counter[tuple[str, str]] = Counter()
     for q, holder_configuration in tried:
         counts.update(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among))
     bodies = {body.name: body for body in trials.bodies}
     contacts = [
-        StartContact(robot=robot.name, bodies=_own_first(robot, bodies, pair), count=count, of=len(tried))
+        StartContact(robot=robot.name, bodies=_robot_first(robot, bodies, pair), count=count, of=len(tried))
         for pair, count in counts.items()
     ]
     return sorted(contacts, key=lambda contact: (-contact.count, [body.name for body in contact.bodies]))
@@ -62,9 +62,9 @@ def touches_anywhere(
     """Whether two bodies touch at configurations from the whole range of their robot's joints as well."""
     robot = cell.robot(contact.robot)
     names = {body.name for body in contact.bodies}
-    among = _own_pairs(trials, cell, robot) & np.array([set(pair) == names for pair in trials.pair_names], dtype=bool)
-    drawn = random_configurations(robot.model, ANYWHERE, generator(f"{robot.name} anywhere", cell.solver.seed))
-    return all(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among) for q in drawn)
+    among = _robot_pairs(trials, cell, robot) & np.array([set(pair) == names for pair in trials.pair_names], dtype=bool)
+    samples = random_configurations(robot.model, ANYWHERE, generator(f"{robot.name} anywhere", cell.solver.seed))
+    return all(trials.contacts(_placed(cell, robot, q, holder_configuration), among=among) for q in samples)
 
 
 def contacts_between(trials: StartTrials, tried: Sequence[Array]) -> list[tuple[tuple[str, str], int]]:
@@ -76,18 +76,18 @@ def contacts_between(trials: StartTrials, tried: Sequence[Array]) -> list[tuple[
     return sorted(ordered, key=lambda entry: (-entry[1], entry[0]))
 
 
-def _own_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
+def _robot_pairs(trials: StartTrials, cell: Cell, robot: Robot) -> Flags:
     """Pairs of a body that the robot moves and one of its own or one that stands where it stands, shape (pairs,)."""
     given = {robot.name for robot in cell.robots if robot.start is not None} | {robot.name, *cell.positioners[:1]}
 
-    def is_own(body: SceneBody) -> bool:
+    def is_of_robot(body: SceneBody) -> bool:
         return body.robot == robot.name and not body.is_at_rest
 
     def is_settled(body: SceneBody) -> bool:
         return body.is_at_rest or body.robot in given
 
     pairs = [(trials.bodies[pair.first], trials.bodies[pair.second]) for pair in trials.pairs]
-    flags = [(is_own(a) and is_settled(b)) or (is_own(b) and is_settled(a)) for a, b in pairs]
+    flags = [(is_of_robot(a) and is_settled(b)) or (is_of_robot(b) and is_settled(a)) for a, b in pairs]
     return np.array(flags, dtype=bool) & trials.open_pairs
 
 
@@ -102,7 +102,7 @@ def _placed(cell: Cell, robot: Robot, q: Array, holder_configuration: Array | No
     return whole
 
 
-def _own_first(robot: Robot, bodies: dict[str, SceneBody], pair: tuple[str, str]) -> tuple[SceneBody, SceneBody]:
+def _robot_first(robot: Robot, bodies: dict[str, SceneBody], pair: tuple[str, str]) -> tuple[SceneBody, SceneBody]:
     """Two bodies by name, that of the robot first; of two of its own a link after what it carries."""
     a, b = sorted((bodies[name] for name in pair), key=lambda body: body.name)
     if a.robot == b.robot:

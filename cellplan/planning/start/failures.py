@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell import Relation
 
-MOST_KEPT: Final = 24  # configurations of a robot, or of the cell, that are considered again
+MOST_CANDIDATES: Final = 24  # configurations of a robot, or of the cell, that are considered again
 MOST_GOALS: Final = 6  # goals of a robot that are considered again
 
 
@@ -41,7 +41,7 @@ class Failures:
     def reached(self, robot: str, q: Array, holder_configuration: Array | None) -> None:
         """Keep configurations of a robot, shape (K, n), that reach its goal with the positioner at one of its own."""
         arrived = self.arrived.setdefault(robot, [])
-        arrived += [(configuration, holder_configuration) for configuration in q[: MOST_KEPT - len(arrived)]]
+        arrived += [(configuration, holder_configuration) for configuration in q[: MOST_CANDIDATES - len(arrived)]]
 
     def unreached(self, robot: str, goal: MissedGoal, *, beyond: Array) -> None:
         """Keep a goal that a robot does not reach, and configurations that do outside its limits, shape (K, n)."""
@@ -50,7 +50,7 @@ class Failures:
         if len(goals) < MOST_GOALS:
             goals.append(goal)
         outside = self.beyond.setdefault(robot, [])
-        outside += list(beyond[: MOST_KEPT - len(outside)])
+        outside += list(beyond[: MOST_CANDIDATES - len(outside)])
 
     def off_path(self, robot: str, distance: tuple[float, float]) -> None:
         """Keep the distance of a given start from its task if it is the smallest so far."""
@@ -59,5 +59,5 @@ class Failures:
 
     def touched(self, q: Array) -> None:
         """Keep a configuration of the whole cell, shape (nq,), in which something touches."""
-        if len(self.touching) < MOST_KEPT:
+        if len(self.touching) < MOST_CANDIDATES:
             self.touching.append(q)

@@ -41,7 +41,7 @@ def home_candidates(model: RobotModel, chain: ScrewChain, start: Array, rng: np.
         inside,
         *_retreats(chain, inside),
         *_single_joints(inside, lower, upper),
-        *_drawn(inside, lower, upper, rng),
+        *_random_homes(inside, lower, upper, rng),
     ]
     q = np.clip(np.array(configurations), lower, upper)
     rank = np.round(displacements(model, inside, q) / SAME)
@@ -59,12 +59,12 @@ def _retreats(chain: ScrewChain, start: Array) -> Iterator[Array]:
     to_foot = chain.axis_points(start[None])[0, 0] - X_WT[:3, 3]
     to_foot[2] = 0.0
     length = np.linalg.norm(to_foot)
-    ways = [-X_WT[:3, 2], *([to_foot / length] if length > 0.0 else []), np.array([0.0, 0.0, 1.0])]
-    for way in ways:
+    directions = [-X_WT[:3, 2], *([to_foot / length] if length > 0.0 else []), np.array([0.0, 0.0, 1.0])]
+    for direction in directions:
         q = start
         for distance in RETREATS:
             goal = X_WT.copy()
-            goal[:3, 3] += distance * way
+            goal[:3, 3] += distance * direction
             q = _towards(chain, q, goal)
             yield q
 
@@ -92,7 +92,7 @@ def _single_joints(start: Array, lower: Array, upper: Array) -> Iterator[Array]:
                     yield q
 
 
-def _drawn(start: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Iterator[Array]:
+def _random_homes(start: Array, lower: Array, upper: Array, rng: np.random.Generator) -> Iterator[Array]:
     """Configurations drawn from growing boxes round the start."""
     for share in BOXES:
         half = share * (upper - lower)

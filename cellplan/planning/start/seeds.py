@@ -94,7 +94,7 @@ def with_seeds(
         if not is_off(cell, relation, off):
             continue
         is_of_run = robot.name in of_run
-        lead = _kept_branch if is_of_run else seeded
+        lead = _same_branch if is_of_run else seeded
         q = lead(chain, relation, robot, X_PT, X_WR=X_WR)
         if q is None and is_of_run:
             raise NoSolutionError(_lost_words(cell, relation, robot, off, run))
@@ -120,7 +120,7 @@ def _nearer_goal(
     return goals[nearest], offs[nearest]
 
 
-def _kept_branch(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
+def _same_branch(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
     """The start on the branch of an earlier one, shape (n,), however far; None where that leads beyond a limit."""
     q = led_to(chain, relation, np.asarray(robot.start), X_PT, X_WR=X_WR)
     return q if q is not None and _is_inside(robot, q) else None

@@ -148,7 +148,7 @@ class StartTrials:
             start=start + turns,
             ranges=np.min([ranges for ranges, _ in shares], axis=0),
             speeds=np.min([speeds for _, speeds in shares], axis=0),
-            contact=next(filter(None, map(self._contact_on_the_way, self._phases, motions)), ""),
+            contact=next(filter(None, map(self._contact_on_path, self._phases, motions)), ""),
         )
 
     def looked_at_closely(self, trials: Sequence[StartTrial]) -> list[StartTrial]:
@@ -202,7 +202,7 @@ class StartTrials:
         ranges, speeds = _shares_left_free(cell, motions[0] + turns, self._step)
         return np.sort(np.concatenate([ranges[chosen], speeds[chosen]]))
 
-    def _contact_on_the_way(self, phase: Phase, q: Array) -> str:
+    def _contact_on_path(self, phase: Phase, q: Array) -> str:
         """What collides in the motion of a run, shape (N, nq), judged at a few samples; empty where nothing does.
 
         A grip that leaves components free and is too deep in the part at the start counts as well.

@@ -150,8 +150,8 @@ def _backward(lines: _Lines, step: Array, allowed: Array) -> Array:
             if -x * per_u > floor:
                 floor, floor_slope = -x * per_u, -per_u
             gap, fall = ceiling - floor, ceiling_slope - floor_slope
-            is_kept = gap >= -ROUNDING * (abs(ceiling) + abs(floor))
-            if is_kept and (number > 0 or x >= allowed[i]):
+            is_feasible = gap >= -ROUNDING * (abs(ceiling) + abs(floor))
+            if is_feasible and (number > 0 or x >= allowed[i]):
                 break
             x = max(0.0, min(allowed[i], x - gap / fall)) if fall < 0.0 else allowed[i]
         reach[i] = x

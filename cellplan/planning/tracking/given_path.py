@@ -45,11 +45,11 @@ class GivenPath:
         shares = np.clip(np.asarray(sigma) / self.end, 0.0, 1.0)
         return self.spline.at(shares, derivative) / self.end**derivative
 
-    def speeds(self, sigma: Array) -> Array:
+    def velocities(self, sigma: Array) -> Array:
         """Speeds of all joints of the cell, those of the others zero, shape (nq, N)."""
-        speeds = np.zeros((self.joint_count, len(sigma)))
-        speeds[self.columns] = self.at(sigma, 1).T
-        return speeds
+        velocities = np.zeros((self.joint_count, len(sigma)))
+        velocities[self.columns] = self.at(sigma, 1).T
+        return velocities
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -57,7 +57,7 @@ class JointWeights:
         heading = np.zeros_like(q)
         if self._near_limits > 0.0:
             inverse = WeightedInverse(J, self.constant)
-            heading = inverse.speeds(xdot, HEADING_DAMPING)
+            heading = inverse.velocities(xdot, HEADING_DAMPING)
             if secondary is not None:
                 heading += inverse.null_space_projection(secondary)
         return self.along(state, q, heading=heading)

@@ -212,7 +212,7 @@ class TrackingProblem:
             signs=signs,
             mobility=np.any(signs != 0.0, axis=0) / first.weights,
         )
-        secondary = self._goals.speeds(self.times[k], stance, step=self._goal_step)
+        secondary = self._goals.velocities(self.times[k], stance, step=self._goal_step)
         if first.secondary is not None:
             secondary = secondary + first.secondary
         return replace(first, secondary=secondary, bounds=self._goals.bounds(q))

@@ -92,7 +92,7 @@ class SecondaryGoals:
         """Times in [s] at which the goals set in, are in full, begin to leave off and have left off."""
         return np.concatenate([self._rests - self._length, self._rests, self._rests + self._length])
 
-    def speeds(self, t: Array, stance: Stance, *, step: float) -> Array:
+    def velocities(self, t: Array, stance: Stance, *, step: float) -> Array:
         r"""Joint speeds that the goals ask for at times in [s], shape of ``stance.q``, in [rad/s] or [m/s].
 
         The gain of each goal is taken as in an implicit step of length ``h``, with the curvature ``c`` of ``-w``,
@@ -111,8 +111,10 @@ class SecondaryGoals:
         for gain, pull in self._pulls:
             slope = pull(stance)
             implicit = gain / (1.0 + gain * step * slope.curvature)
-            speeds = implicit[..., None] * slope.gradient * stance.mobility
-            total += speeds / np.maximum(1.0, np.max(np.abs(speeds) / self._limits, axis=-1, initial=0.0))[..., None]
+            velocities = implicit[..., None] * slope.gradient * stance.mobility
+            total += (
+                velocities / np.maximum(1.0, np.max(np.abs(velocities) / self._limits, axis=-1, initial=0.0))[..., None]
+            )
         return self._fade(t)[..., None] * total
 
     def _fade(self, t: Array) -> Array:
@@ -136,13 +138,13 @@ def rests_of(cell: Cell, schedule: Schedule) -> Array:
     return ends if bounds is None else np.unique(np.concatenate([ends, bounds]))
 
 
-def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) -> Array:
+def share_within(velocities: Array, extra: Array, *, lowest: Array, highest: Array) -> Array:
     """Largest share of extra joint speeds, at most 1, that takes no joint beyond its bounds.
 
     A joint that is beyond them already, on behalf of the tasks, is not taken farther.
 
     Args:
-        speeds: Joint speeds that the tasks need, shape (..., nq).
+        velocities: Joint speeds that the tasks need, shape (..., nq).
         extra: Joint speeds to add, shape (..., nq).
         lowest: Lowest allowed speeds, shape (..., nq).
         highest: Highest allowed speeds, shape (..., nq).
@@ -151,7 +153,7 @@ def share_within(speeds: Array, extra: Array, *, lowest: Array, highest: Array) 
         Shape (...).
     """
     moves = extra != 0.0
-    margin = np.where(extra > 0.0, highest - speeds, lowest - speeds) / np.where(moves, extra, 1.0)
+    margin = np.where(extra > 0.0, highest - velocities, lowest - velocities) / np.where(moves, extra, 1.0)
     return np.clip(np.min(np.where(moves, margin, 1.0), axis=-1, initial=1.0), 0.0, 1.0)
 
 

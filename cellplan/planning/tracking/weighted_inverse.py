@@ -35,7 +35,7 @@ class WeightedInverse:
         self.manipulability = float(np.prod(np.sqrt(np.maximum(self._s_squared, 0.0))))
         self.is_singular = bool(self._s_squared[0] <= ROUNDING * self._s_squared[-1])
 
-    def speeds(self, xdot: Array, lambda_squared: float) -> Array:
+    def velocities(self, xdot: Array, lambda_squared: float) -> Array:
         r"""Joint speeds ([Ribeiro2010]_ Eqs. D.28-D.30, damped as in [Nicolato2007]_ Eq. 2.11).
 
         .. math:: \dot q = W^{-1} J^T (J W^{-1} J^T + \lambda^2 I)^{-1} \dot x
@@ -49,7 +49,7 @@ class WeightedInverse:
         """
         return self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
 
-    def null_space_projection(self, speeds: Array) -> Array:
+    def null_space_projection(self, velocities: Array) -> Array:
         r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
 
         .. math:: (I - J^\# J) \dot q_0
@@ -57,8 +57,8 @@ class WeightedInverse:
         Damping has no place here: it would let the speeds leak into the tasks. Lost rows count as no task.
 
         Args:
-            speeds: Any joint speeds, shape (nq,).
+            velocities: Any joint speeds, shape (nq,).
         """
         significant = self._s_squared > ROUNDING * self._s_squared[-1]
         U = self._U[:, significant]
-        return speeds - self._JW.T @ (U @ ((U.T @ (self._J @ speeds)) / self._s_squared[significant]))
+        return velocities - self._JW.T @ (U @ ((U.T @ (self._J @ velocities)) / self._s_squared[significant]))

@@ -71,13 +71,13 @@ class BlockedTransferError(TransferNotFoundError):
 
 def best_try(scene: Scene, tries: Iterable[Try]) -> BlockedTry:
     """The try whose worst pair falls short of its demand least; the first of equal ones."""
-    return min((in_the_way(scene, attempt) for attempt in tries), key=lambda blocked: round(blocked.missing, 6))
+    return min((blocked_try(scene, attempt) for attempt in tries), key=lambda blocked: round(blocked.missing, 6))
 
 
-def in_the_way(scene: Scene, tried: Try) -> BlockedTry:
+def blocked_try(scene: Scene, tried: Try) -> BlockedTry:
     """The pair that falls short of its demand most in a try, and by how much."""
     bound = certify(scene, tried.q, with_curves=False)
-    short = [_shortfall(bound, pair) for pair in bound.pairs if not pair.is_kept]
+    short = [_shortfall(bound, pair) for pair in bound.pairs if not pair.is_met]
     if not short:  # free at last: only more rows were refused
         return BlockedTry(scene=scene, tried=tried, bodies=("", ""), missing=0.0, row=0, words="nothing is in the way")
     missing, depth, row, pair = max(short, key=lambda entry: entry[0])
@@ -123,16 +123,16 @@ def rows_through(via: Array, velocity: Array) -> Array:
     return np.concatenate(rows)
 
 
-def one_by_one(start: Array, ways: Sequence[tuple[slice, Array]]) -> Array:
+def one_by_one(start: Array, paths: Sequence[tuple[slice, Array]]) -> Array:
     """Via points of robots that move one after the other, shape (K, nq).
 
     Args:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
-        ways: Columns of each robot in their order, and its via points, shape (k, n).
+        paths: Columns of each robot in their order, and its via points, shape (k, n).
     """
     via, q = [start], start
-    for columns, way in ways:
-        for point in way[1:]:
+    for columns, path in paths:
+        for point in path[1:]:
             q = q.copy()
             q[columns] = point
             via.append(q)

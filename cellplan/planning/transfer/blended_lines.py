@@ -64,9 +64,9 @@ class BlendedLine:
     def at(self, times: Array) -> Array:
         """Positions at nominal times in [s], shape (N, n)."""
         positions = np.column_stack([np.interp(times, self.times, column) for column in self.q.T])
-        speeds = np.diff(self.q, axis=0) / np.diff(self.times)[:, None]
+        velocities = np.diff(self.q, axis=0) / np.diff(self.times)[:, None]
         rest = np.zeros((1, self.q.shape[1]))
-        changes = np.diff(np.concatenate([rest, speeds, rest]), axis=0)
+        changes = np.diff(np.concatenate([rest, velocities, rest]), axis=0)
         for middle, half, change in zip(self.times, self.halves, changes, strict=True):
             u = np.clip((times - middle) / half, -1.0, 1.0)
             cut = u * (0.5 + u * (0.375 - 0.0625 * u * u)) + 0.1875 - np.maximum(u, 0.0)

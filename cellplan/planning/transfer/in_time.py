@@ -19,13 +19,13 @@ from cellplan.planning.transfer.blended_lines import BlendedLine
 from cellplan.planning.transfer.move_check import MoveCheck, Others
 from cellplan.planning.transfer.query import STAGE, TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.timed_trees import TICK, TimedWay, connected_in_time, moves_at, shortened_in_time
+from cellplan.planning.transfer.timed_trees import TICK, SpaceTimePath, connected_in_time, moves_at, shortened_in_time
 
 SPANS: Final = (2.5, 5.0)  # [-] of the time that the slowest robot takes straight at top speed
 DELAYS: Final = 9  # waits before a straight move that are tried
 LEAST_SPAN: Final = 0.5  # [s]
 MOST_ORDERS: Final = 6  # orders of the robots that are tried
-DRAWN: Final = 800  # configurations drawn for one robot
+SAMPLES: Final = 800  # configurations drawn for one robot
 HALVINGS: Final = 5  # of what is cut off at corners, until it is free
 
 
@@ -70,10 +70,10 @@ class InTime:
             q = np.tile(self._query.start, (len(times), 1))
             for line in lines:
                 q[:, line.columns] = line.at(times)
-            line_found = self._line(robot, order[place + 1 :], q, times)
-            if line_found is None:
+            move = self._line(robot, order[place + 1 :], q, times)
+            if move is None:
                 return None
-            lines.append(line_found)
+            lines.append(move)
         return lines
 
     def _line(self, robot: str, later: tuple[str, ...], q: Array, times: Array) -> BlendedLine | None:
@@ -105,18 +105,20 @@ class InTime:
         start, goal = self._query.ends_of(check.robot)
         margin = len(times) // 10  # in which the robot gains and loses its speed
         ends = (start, margin), (goal, len(times) - 1 - margin)
-        way = connected_in_time(check, ends, box=self._query.box(check.robot), drawn=DRAWN, rng=rng, tick=self._tick)
-        if isinstance(way, TimedWay):
-            return self._rounded(check, shortened_in_time(check, way, rng), times)
-        self.tried.failed(check.robot, DRAWN, way)
+        path = connected_in_time(
+            check, ends, box=self._query.box(check.robot), samples=SAMPLES, rng=rng, tick=self._tick
+        )
+        if isinstance(path, SpaceTimePath):
+            return self._rounded(check, shortened_in_time(check, path, rng), times)
+        self.tried.failed(check.robot, SAMPLES, path)
         return None
 
-    def _rounded(self, check: MoveCheck, way: TimedWay, times: Array) -> BlendedLine | None:
+    def _rounded(self, check: MoveCheck, path: SpaceTimePath, times: Array) -> BlendedLine | None:
         """A way with its corners rounded off as far as that is free; None where even the least rounding is not."""
-        moving = np.flatnonzero(moves_at(way))
+        moving = np.flatnonzero(moves_at(path))
         first, last = int(moving[0]), int(moving[-1]) + 1  # it stands before and after
         columns = self._query.scene.cell.columns(check.robot)
-        at, via, share = times[way.ticks[first : last + 1]], way.q[first : last + 1], 1.0
+        at, via, share = times[path.ticks[first : last + 1]], path.q[first : last + 1], 1.0
         for _ in range(HALVINGS):
             line = BlendedLine.through(columns, at, via, shares=share)
             is_within = line.begin >= 0.0 and line.end <= times[-1]

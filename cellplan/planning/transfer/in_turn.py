@@ -23,7 +23,7 @@ from cellplan.planning.transfer.shortened import rounded_line, shortened
 from cellplan.planning.transfer.trees import connected
 
 MOST_ORDERS: Final = 120  # orders of the robots that are tried
-DRAWN: Final = 1000  # configurations drawn for one robot among others that stand
+SAMPLES: Final = 1000  # configurations drawn for one robot among others that stand
 MOST_SHOWN: Final = 24  # orders of which the best is shown where none is free
 MOST_FAILED: Final = 6  # searches by trees that fail before no further one is begun
 
@@ -77,15 +77,15 @@ class InTurn:
         velocity = np.concatenate([robot.model.velocity for robot in cell.robots])
         for order in list(permutations(query.movers))[:MOST_SHOWN]:
             legs = [(robot, frozenset(order[:place])) for place, robot in enumerate(order)]
-            ways = [(cell.columns(robot), self._known_way(robot, moved)) for robot, moved in legs]
+            paths = [(cell.columns(robot), self._known_path(robot, moved)) for robot, moved in legs]
             names = [f"'{robot}'{self._manner(robot, moved)}" for robot, moved in legs]
-            yield Try(words=" then ".join(names), q=rows_through(one_by_one(query.start, ways), velocity))
+            yield Try(words=" then ".join(names), q=rows_through(one_by_one(query.start, paths), velocity))
 
     def _known_move(self, robot: str, moved: frozenset[str]) -> RobotMove | None:
         """The move that was found for a robot after some others have moved; None where none was."""
         return self._known.get((robot, moved, True)) or self._known.get((robot, moved, False))
 
-    def _known_way(self, robot: str, moved: frozenset[str]) -> Array:
+    def _known_path(self, robot: str, moved: frozenset[str]) -> Array:
         """Via points of a robot after some others have moved: those that were found, over the gap, or straight."""
         move = self._known_move(robot, moved)
         straight = np.array(self.query.ends_of(robot))
@@ -124,19 +124,19 @@ class InTurn:
         if self.tried.searches >= MOST_FAILED:
             return None
         rng = generator(f"transfer of {robot} after {sorted(moved)}", query.seed)
-        connection = connected(check, ends, box=box, drawn=DRAWN, rng=rng, tick=self._tick)
-        if connection.way is None:
-            self.tried.failed(robot, DRAWN, connection.reached)
+        connection = connected(check, ends, box=box, samples=SAMPLES, rng=rng, tick=self._tick)
+        if connection.path is None:
+            self.tried.failed(robot, SAMPLES, connection.reached)
             if connection.over_gap is not None:
                 self._over_gaps[robot, moved] = connection.over_gap
             return None
-        return self._rounded(check, shortened(check, connection.way, box.velocity, rng))
+        return self._rounded(check, shortened(check, connection.path, box.velocity, rng))
 
-    def _rounded(self, check: MoveCheck, way: Array) -> RobotMove:
+    def _rounded(self, check: MoveCheck, path: Array) -> RobotMove:
         """A way through via points, shape (K, n), as a smooth move."""
         cell = self.query.scene.cell
         velocity = cell.robot(check.robot).model.velocity
-        return RobotMove(robot=check.robot, line=rounded_line(check, way, cell.columns(check.robot), velocity))
+        return RobotMove(robot=check.robot, line=rounded_line(check, path, cell.columns(check.robot), velocity))
 
     def _check(self, robot: str, moved: frozenset[str]) -> MoveCheck | None:
         """The check among robots that stand; None where an end of the move is blocked by one of them."""

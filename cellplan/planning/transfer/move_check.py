@@ -66,7 +66,7 @@ class MoveCheck:
         moved = rows_moved_by(scene, robot)
         self._rows = [row for row in moved if scene.pairs[row].is_ground or scene.pairs[row].solids is not None]
         self._ends = np.array([_ends(scene, row) for row in self._rows], dtype=np.intp).reshape(-1, 2)
-        self._robot_bodies = _own_bodies(scene, robot)
+        self._robot_bodies = _robot_bodies(scene, robot)
         self._demands = np.array([_demand(scene, row) for row in self._rows])
         self._needs = self._demands + reserve
         self._levers = lever_matrix(scene, robot, self._ends)
@@ -90,9 +90,9 @@ class MoveCheck:
         share = np.linspace(0.0, 1.0, self.samples(np.array([first, second])))[:, None]
         return self.are_free(first + share * (second - first))
 
-    def samples(self, way: Array) -> int:
+    def samples(self, path: Array) -> int:
         """How many configurations along straight lines through via points, shape (K, n), lie near enough together."""
-        farthest = float((np.abs(np.diff(way, axis=0)) @ self._levers.T).sum(axis=0).max(initial=0.0))
+        farthest = float((np.abs(np.diff(path, axis=0)) @ self._levers.T).sum(axis=0).max(initial=0.0))
         return 1 + int(np.clip(np.ceil(farthest / (SPREAD * self._reserve)), 1, MOST_SAMPLES))
 
     def are_free(self, q: Array, moments: Indices | None = None) -> bool:
@@ -102,16 +102,16 @@ class MoveCheck:
         the others.
         """
         at = np.zeros(len(q), dtype=np.intp) if moments is None else moments
-        way = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
+        swept = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
         few = np.unique(np.append(np.arange(0, len(q), STRIDE), len(q) - 1))
         everything = np.arange(len(self._rows))
-        spare = self._spare(q[few], at[few], everything, self._travel(way[few], at[few], everything))
+        spare = self._spare(q[few], at[few], everything, self._travel(swept[few], at[few], everything))
         if spare is None or len(few) == len(q):
             return spare is not None
-        places, between = _not_cleared(spare, self._travel(way[few], at[few], everything))
+        places, between = _not_cleared(spare, self._travel(swept[few], at[few], everything))
         if not places.size:
             return True
-        travel = self._travel(way, at, places)
+        travel = self._travel(swept, at, places)
         is_clear = np.zeros(travel.shape, dtype=bool)
         for k, sample in enumerate(few):
             is_clear |= np.abs(travel - travel[:, sample, None]) <= spare[places, k, None]
@@ -120,9 +120,9 @@ class MoveCheck:
             return True
         return self._spare(q[left], at[left], places, travel[:, left], is_clear=is_clear[:, left]) is not None
 
-    def _travel(self, way: Array, moments: Indices, places: Indices) -> Array:
+    def _travel(self, moved: Array, moments: Indices, places: Indices) -> Array:
         """How far the bodies of some pairs have come at most in [m], shape (pairs, K)."""
-        travel = self._levers[places] @ way.T
+        travel = self._levers[places] @ moved.T
         for side in self._ends[places].T:
             travel = travel + np.where(side[:, None] >= 0, self._others.travel[side][:, moments], 0.0)
         return travel
@@ -239,8 +239,8 @@ def lever_matrix(scene: Scene, robot: str, pairs: Indices) -> Array:
     steps = arms.steps(unit)[::2]
     levers = np.empty((len(pairs), n))
     for place, (first, second) in enumerate(pairs.tolist()):
-        ways = [(None, first)] if second < 0 else [(first, second), (second, first)]
-        tried = [arms.chain(*way).reach(steps) for way in ways]
+        sides = [(None, first)] if second < 0 else [(first, second), (second, first)]
+        tried = [arms.chain(*ends).reach(steps) for ends in sides]
         levers[place] = min(tried, key=lambda reach: float(reach.sum()))
     return levers
 
@@ -257,7 +257,7 @@ def _not_cleared(spare: Array, travel: Array) -> tuple[Indices, Flags]:
     return np.flatnonzero(open_.any(axis=1)), np.append(open_.any(axis=0), True)
 
 
-def _own_bodies(scene: Scene, robot: str) -> dict[int, tuple[int, Array]]:
+def _robot_bodies(scene: Scene, robot: str) -> dict[int, tuple[int, Array]]:
     """The engine's bodies on moving links of a robot: the place of the link among the displacements, and ``X_BS``."""
     carriers = [scene.carrier(index) for index in range(len(scene.engine.bodies))]
     return {

@@ -22,7 +22,7 @@ from cellplan.planning.transfer.blended_lines import joint_path
 from cellplan.planning.transfer.in_time import InTime
 from cellplan.planning.transfer.in_turn import InTurn, RobotMove
 from cellplan.planning.transfer.query import STAGE, TransferQuery
-from cellplan.planning.transfer.reasons import Tried, not_found, require_free_ends
+from cellplan.planning.transfer.reasons import Tried, blocked_error, require_free_ends
 from cellplan.planning.transfer.straight_time import straight_rows
 from cellplan.scene.scene import Scene
 
@@ -72,7 +72,7 @@ def plan_transfer(
         return PlannedTransfer(times=np.array([0.0, retimer.step]), q=np.array([start, goal]), rungs={})
     share = np.linspace(0.0, 1.0, STRAIGHT_ROWS)[:, None]
     straight = start + share * (goal - start)
-    if certify(scene, straight, with_minimum=False).is_kept:
+    if certify(scene, straight, with_minimum=False).is_met:
         rows = straight_rows(start, goal, retimer)
         transfer = _in_rows(query, rows, retimer, dict.fromkeys(query.movers, Rung.STRAIGHT))
         if transfer is not None:
@@ -84,7 +84,7 @@ def plan_transfer(
         transfer = _in_time(query, retimer, in_time, progress)
     if transfer is None:
         tries = [Try(words="all at once, straight" if in_time else "straight", q=straight), *search.tries()]
-        raise not_found(query, tries, in_turn, in_time)
+        raise blocked_error(query, tries, in_turn, in_time)
     return transfer
 
 
@@ -139,7 +139,7 @@ def _in_time(query: TransferQuery, retimer: Retimer, tried: Tried, progress: Pro
 def _in_rows(query: TransferQuery, q: Array, retimer: Retimer, rungs: Mapping[str, Rung]) -> PlannedTransfer | None:
     """Rows, shape (N, nq), as a transfer move; None where they are not certified to keep what is demanded."""
     q[0], q[-1] = query.start, query.goal
-    if not certify(query.scene, q, with_minimum=False).is_kept:
+    if not certify(query.scene, q, with_minimum=False).is_met:
         return None
     times = np.round(np.arange(len(q)) * retimer.step, TIME_DECIMALS)
     return PlannedTransfer(times=times, q=q, rungs=rungs)

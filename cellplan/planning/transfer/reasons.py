@@ -9,7 +9,7 @@ from cellplan.certify.certify import certify
 from cellplan.geometry.arrays import Array
 from cellplan.model.report import ClearanceClass
 from cellplan.model.units import MM
-from cellplan.planning.transfer.best_try import BlockedTransferError, Try, best_try, in_the_way
+from cellplan.planning.transfer.best_try import BlockedTransferError, Try, best_try, blocked_try
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.scene.scene import Scene
 
@@ -27,15 +27,15 @@ class Tried:
 
     orders: int = 0  # orders of the robots
     searches: int = 0  # searches by trees that failed
-    drawn: int = 0  # configurations drawn in them
+    samples: int = 0  # configurations drawn in them
     reached: dict[str, tuple[int, int]] = field(default_factory=dict)
     refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     uncertified: int = 0  # moves that were found but are not certified between their rows
 
-    def failed(self, robot: str, drawn: int, reached: tuple[int, int]) -> None:
+    def failed(self, robot: str, samples: int, reached: tuple[int, int]) -> None:
         """Count a search that found no way."""
         self.searches += 1
-        self.drawn += drawn
+        self.samples += samples
         self.reached[robot] = reached
 
 
@@ -47,8 +47,8 @@ def require_free_ends(query: TransferQuery) -> None:
     """
     for name, q in (("start", query.start), ("goal", query.goal)):
         at_rest = q[None].repeat(2, axis=0)
-        if not certify(query.scene, at_rest, with_minimum=False).is_kept:
-            blocked = in_the_way(query.scene, Try(words=f"at its {name}", q=at_rest))
+        if not certify(query.scene, at_rest, with_minimum=False).is_met:
+            blocked = blocked_try(query.scene, Try(words=f"at its {name}", q=at_rest))
             raise BlockedTransferError(
                 query.place,
                 f"the {name} of the transfer move of {query.named} comes too close: {blocked.words}: let approach and "
@@ -57,7 +57,7 @@ def require_free_ends(query: TransferQuery) -> None:
             )
 
 
-def not_found(
+def blocked_error(
     query: TransferQuery, tries: Sequence[Try], in_turn: Tried, in_time: Tried | None
 ) -> BlockedTransferError:
     """The error of a query for which no way was found.
@@ -93,7 +93,7 @@ def _tried_words(tried: Tried) -> str:
         reached = [
             f"{a} reached from the start of '{name}' and {b} from its goal" for name, (a, b) in tried.reached.items()
         ]
-        words.append(f"{tried.drawn} configurations drawn ({', '.join(reached)})")
+        words.append(f"{tried.samples} configurations drawn ({', '.join(reached)})")
     if tried.uncertified:
         words.append(f"{tried.uncertified} found that could not be certified between their rows")
     return " ".join(words) or "a robot that stands blocks an end of the move"
@@ -102,7 +102,7 @@ def _tried_words(tried: Tried) -> str:
 def nearest_words(scene: Scene, q: Array) -> tuple[str, tuple[str, str]]:
     """Which pair falls short of its demand most over some rows, shape (K, nq), and by how much; and its names."""
     bound = certify(scene, q)
-    pairs = [pair for kind in ClearanceClass for pair in bound.of_class(kind) if not pair.is_kept]
+    pairs = [pair for kind in ClearanceClass for pair in bound.of_class(kind) if not pair.is_met]
     worst = min(pairs, key=lambda pair: (pair.proved - pair.demand, pair.row))
     first, second = bound.names(worst)
     held = "touches" if worst.touches else f"is {worst.proved * MM:.3g} mm from"

@@ -48,17 +48,17 @@ class TimedTree:
         self.parents.append(parent)
         return len(self.x) - 1
 
-    def way_to(self, index: int) -> list[int]:
+    def path_to(self, index: int) -> list[int]:
         """Indices of the nodes from one of them to the root."""
-        way = [index]
+        path = [index]
         while index:
             index = self.parents[index]
-            way.append(index)
-        return way
+            path.append(index)
+        return path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TimedWay:
+class SpaceTimePath:
     """A way in joint space and time."""
 
     ticks: Indices  # ticks of the via points, increasing, shape (K,)
@@ -77,16 +77,16 @@ def connected_in_time(
     ends: tuple[tuple[Array, int], tuple[Array, int]],
     *,
     box: JointBox,
-    drawn: int,
+    samples: int,
     rng: np.random.Generator,
     tick: Callable[[float], object],
-) -> TimedWay | tuple[int, int]:
+) -> SpaceTimePath | tuple[int, int]:
     """A way from a configuration at a tick to another one at a later tick.
 
     Args:
         check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each, with their ticks.
-        drawn: How many of them at most.
+        samples: How many of them at most.
 
     Returns:
         The way; or the numbers of configurations reached from the start and from the goal where none was found.
@@ -97,8 +97,8 @@ def connected_in_time(
         TimedTree(sign=1, x=[start / box.velocity], ticks=[begin]),
         TimedTree(sign=-1, x=[goal / box.velocity], ticks=[end]),
     ]
-    for number in range(drawn):
-        tick(number / drawn)
+    for number in range(samples):
+        tick(number / samples)
         mine, other = trees[number % 2], trees[1 - number % 2]
         q = box.draw(rng, number, start, goal)
         if number // 2 % STANDING == 0:
@@ -112,27 +112,27 @@ def connected_in_time(
     return len(trees[0].x), len(trees[1].x)
 
 
-def shortened_in_time(check: MoveCheck, way: TimedWay, rng: np.random.Generator) -> TimedWay:
+def shortened_in_time(check: MoveCheck, path: SpaceTimePath, rng: np.random.Generator) -> SpaceTimePath:
     """A way with straight lines in joint space and time in place of several edges, each in the same time as these.
 
     Args:
         check: Which moves are free.
     """
     for _ in range(SHORTCUTS):
-        if len(way.ticks) == 2:
+        if len(path.ticks) == 2:
             break
-        first, last = np.sort(rng.integers(way.ticks[0], way.ticks[-1] + 1, 2)).tolist()
-        inner = (way.ticks > first) & (way.ticks < last)
+        first, last = np.sort(rng.integers(path.ticks[0], path.ticks[-1] + 1, 2)).tolist()
+        inner = (path.ticks > first) & (path.ticks < last)
         if not inner.any():
             continue
-        a, b = (np.array([np.interp(at, way.ticks, column) for column in way.q.T]) for at in (first, last))
+        a, b = (np.array([np.interp(at, path.ticks, column) for column in path.q.T]) for at in (first, last))
         if is_free_in_time(check, (a, first), (b, last)):
-            before, after = way.ticks < first, way.ticks > last
-            way = TimedWay(
-                ticks=np.concatenate([way.ticks[before], [first, last], way.ticks[after]]),
-                q=np.concatenate([way.q[before], [a, b], way.q[after]]),
+            before, after = path.ticks < first, path.ticks > last
+            path = SpaceTimePath(
+                ticks=np.concatenate([path.ticks[before], [first, last], path.ticks[after]]),
+                q=np.concatenate([path.q[before], [a, b], path.q[after]]),
             )
-    return way
+    return path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,15 +170,15 @@ def _joined(
     back: int,
     ends: tuple[tuple[Array, int], tuple[Array, int]],
     velocity: Array,
-) -> TimedWay:
+) -> SpaceTimePath:
     """The way along both trees to the nodes where they met."""
-    there, home = trees[0].way_to(ahead)[::-1], trees[1].way_to(back)[1:]
+    there, home = trees[0].path_to(ahead)[::-1], trees[1].path_to(back)[1:]
     ticks = np.array([trees[0].ticks[k] for k in there] + [trees[1].ticks[k] for k in home])
     q = np.array([trees[0].x[k] for k in there] + [trees[1].x[k] for k in home]) * velocity
     q[0], q[-1] = ends[0][0], ends[1][0]
-    return TimedWay(ticks=ticks, q=q)
+    return SpaceTimePath(ticks=ticks, q=q)
 
 
-def moves_at(way: TimedWay) -> Flags:
+def moves_at(path: SpaceTimePath) -> Flags:
     """Whether the robot moves on each edge of a way, shape (K - 1,)."""
-    return np.any(np.diff(way.q, axis=0) != 0.0, axis=1)
+    return np.any(np.diff(path.q, axis=0) != 0.0, axis=1)

@@ -48,20 +48,20 @@ class Tree:
         self.count += 1
         return self.count - 1
 
-    def way_to(self, index: int) -> list[Array]:
+    def path_to(self, index: int) -> list[Array]:
         """Nodes from the root to one of them."""
-        way = [self.nodes[index]]
+        path = [self.nodes[index]]
         while index:
             index = self.parents[index]
-            way.append(self.nodes[index])
-        return way[::-1]
+            path.append(self.nodes[index])
+        return path[::-1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Connection:
     """What a search came to."""
 
-    way: Array | None  # via points in [rad] or [m] from start to goal, shape (K, n); None where none was found
+    path: Array | None  # via points in [rad] or [m] from start to goal, shape (K, n); None where none was found
     reached: tuple[int, int]  # configurations reached from the start and from the goal
     over_gap: Array | None = None  # where none was found, the way along both trees and straight from one to the other
 
@@ -71,7 +71,7 @@ def connected(
     ends: tuple[Array, Array],
     *,
     box: "JointBox",
-    drawn: int,
+    samples: int,
     rng: np.random.Generator,
     tick: Callable[[float], object],
 ) -> Connection:
@@ -80,12 +80,12 @@ def connected(
     Args:
         check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each.
-        drawn: How many of them at most.
+        samples: How many of them at most.
     """
     scale, (start, goal) = box.velocity, ends
     trees = [Tree.at(start / scale, capacity=256), Tree.at(goal / scale, capacity=256)]
-    for number in range(drawn):
-        tick(number / drawn)
+    for number in range(samples):
+        tick(number / samples)
         mine, other = trees[number % 2], trees[1 - number % 2]
         new = _extended(check, mine, box.draw(rng, number, start, goal) / scale, scale)
         if new is None:
@@ -93,11 +93,11 @@ def connected(
         met = _run(check, other, mine.nodes[new], scale)
         if met is not None:
             ahead, back = (new, met) if number % 2 == 0 else (met, new)
-            way = trees[0].way_to(ahead) + trees[1].way_to(back)[-2::-1]
-            path = np.array(way) * scale
+            vertices = trees[0].path_to(ahead) + trees[1].path_to(back)[-2::-1]
+            path = np.array(vertices) * scale
             path[0], path[-1] = start, goal
-            return Connection(way=path, reached=(trees[0].count, trees[1].count))
-    return Connection(way=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
+            return Connection(path=path, reached=(trees[0].count, trees[1].count))
+    return Connection(path=None, reached=(trees[0].count, trees[1].count), over_gap=_over_gap(trees) * scale)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -121,7 +121,7 @@ def _over_gap(trees: list[Tree]) -> Array:
     ahead, back = (tree.nodes[: tree.count] for tree in trees)
     nearest = [trees[1].nearest(x) for x in ahead]
     node = int(np.argmin(np.linalg.norm(ahead - back[nearest], axis=1)))
-    return np.array(trees[0].way_to(node) + trees[1].way_to(nearest[node])[::-1])
+    return np.array(trees[0].path_to(node) + trees[1].path_to(nearest[node])[::-1])
 
 
 def _extended(check: MoveCheck, tree: Tree, x: Array, scale: Array) -> int | None:

@@ -24,7 +24,7 @@ SCALES: Final = (1, 2, 5, 10, 15, 20, 25, 30, 40, 50, 60, 75, 100, 125, 150, 200
 BARS: Final = (100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)  # [mm] lengths of a scale bar
 LONGEST_BAR: Final = 480  # units
 TEXT: Final = 34  # units between lines of the table
-NAME_BESIDE, NAME_ABOVE, NAME_IN_PLAN = 7, 32, 16  # letters of names beside and above their numbers, and in the plan
+NAME_IN_LINE, NAME_ABOVE, NAME_IN_PLAN = 7, 32, 16  # letters of names beside and above their numbers, and in the plan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -172,7 +172,7 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
         yield _text("head" if not offset else "head right", left + offset, y, word)
     yield f'<path class="rule" d="M{left} {y + 12}h{COLUMN}"/>'
     y += 6
-    shown = _with_room(plan.robots, y)
+    shown = _fitting(plan.robots, y)
     for robot in shown:
         y += TEXT
         yield f'<rect class="swatch n{numbers[robot.name]}" x="{left}" y="{y - 17}" width="16" height="16"/>'
@@ -193,10 +193,10 @@ def _table(plan: FloorPlan, sheet: Sheet, numbers: dict[str, int]) -> Iterator[s
 
 def _lines(robot: PlanRobot) -> int:
     """Lines of the table that a robot takes: a long name has one for itself."""
-    return 2 if len(robot.name) > NAME_BESIDE else 1
+    return 2 if len(robot.name) > NAME_IN_LINE else 1
 
 
-def _with_room(robots: Sequence[PlanRobot], top: float) -> Sequence[PlanRobot]:
+def _fitting(robots: Sequence[PlanRobot], top: float) -> Sequence[PlanRobot]:
     """The robots that the table has room for."""
     count = int((UNIT * HEIGHT_MM - MARGIN - top - 330) / TEXT) - 1
     taken = np.cumsum([_lines(robot) for robot in robots])

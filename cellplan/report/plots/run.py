@@ -19,7 +19,7 @@ from cellplan.report.plots.placing import SUPERSCRIPTS, number_sign
 from cellplan.report.record.common import shortened
 
 JOINT_COLUMNS: Final = 3
-LEAST_PLAIN, SMALLEST_DRAWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
+LEAST_PLAIN, SMALLEST_SHOWN = 1e-2, 1e-200  # [-] of a manipulability: below, in powers of ten; below, as zero
 MAX_TITLE_LETTERS: Final = 29  # [-] letters beside which the whole note has room in one of three columns
 CLASS_TITLES: Final[Mapping[ClearanceClass, str]] = {
     ClearanceClass.ROBOT_ROBOT: "robot to robot",
@@ -122,14 +122,14 @@ def _joint_panel(
 ) -> PlotPanel:
     """One panel that shows the whole allowed range and whatever lies outside it."""
     lower, upper = limits
-    drawn = [limit for limit in limits if math.isfinite(limit)]
-    items: list[Item] = [Limit(limit, number_sign(f"{limit:.6g}"), is_upper=limit == upper) for limit in drawn]
+    finite = [limit for limit in limits if math.isfinite(limit)]
+    items: list[Item] = [Limit(limit, number_sign(f"{limit:.6g}"), is_upper=limit == upper) for limit in finite]
     items.append(curve)
     if worst_at_s is not None:
         worst = int(np.argmin(np.abs(curve.x - worst_at_s)))
         value = float(curve.y[worst])
         items.append(PlotMark(float(curve.x[worst]), value, INK if lower <= value <= upper else LIMIT))
-    span = (min([float(curve.y.min()), *drawn]), max([float(curve.y.max()), *drawn]))
+    span = (min([float(curve.y.min()), *finite]), max([float(curve.y.max()), *finite]))
     return PlotPanel(title=f"{curve.name}, in {unit}", note=note, y=value_axis(*span, unit=unit), items=items)
 
 
@@ -191,7 +191,7 @@ def _power_of_ten(largest: float) -> tuple[str, float]:
     """Label and factor that make small values readable; what is too small for that becomes zero."""
     if largest >= LEAST_PLAIN:
         return "", 1.0
-    if largest < SMALLEST_DRAWN:
+    if largest < SMALLEST_SHOWN:
         return "", 0.0
     exponent = math.floor(math.log10(largest))
     return f", in 10{str(exponent).translate(SUPERSCRIPTS)}", 10.0**-exponent

@@ -15,10 +15,10 @@ from cellplan.geometry.arrays import Array
 from cellplan.report.plots.figure import Figure, Limit, PlotBox, PlotCurve, PlotMark
 from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, LIMIT, PAPER, dark_rules
 from cellplan.report.plots.placing import SWATCH, TICK, PlacedFigure, PlacedPanel, Words, gaps, placed
-from cellplan.report.plots.thinning import peaks_kept, straightened
+from cellplan.report.plots.thinning import peak_samples, straightened
 
 FINE: Final = 100  # coordinates to a point
-POINTS_DRAWN: Final = 1.5  # of a curve in a point of width: one per pixel, more would only enlarge the files
+POINT_DENSITY: Final = 1.5  # of a curve in a point of width: one per pixel, more would only enlarge the files
 THINNING_TOL: Final = 0.12 * FINE  # that a curve may lie beside its points: a tenth of its width
 FARTHEST: Final = 1e7  # of coordinates: what lies far outside its box
 FONT: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
@@ -186,7 +186,7 @@ def _curve(box: PlacedPanel, curve: PlotCurve) -> Iterator[str]:
 def _stretch(box: PlacedPanel, x: Array, y: Array, is_function: bool) -> str:
     """The path of a stretch without gaps: its first point, and from each point to the next."""
     if is_function:
-        selected = peaks_kept(y, round(POINTS_DRAWN * box.width))
+        selected = peak_samples(y, round(POINT_DENSITY * box.width))
         x, y = x[selected], y[selected]
     points = np.stack([FINE * box.across(x), FINE * box.down(y)], axis=-1)
     points = np.rint(np.clip(points, -FARTHEST, FARTHEST))

@@ -11,7 +11,7 @@ from cellplan.geometry.arrays import Array, Indices
 ROUND_SHARES: Final = tuple(4.0**k / 341.0 for k in range(5))
 
 
-def peaks_kept(values: Array, points: int) -> Indices:
+def peak_samples(values: Array, points: int) -> Indices:
     """Indices of some samples, among them the first, the last, and the extremes of every interval.
 
     Args:

@@ -223,8 +223,8 @@ def energy_proxy(report: Report) -> float:
         report: The report of one phase.
     """
     total, steps = 0.0, np.diff(report.times)
-    for robot, speeds in report.qd.items():
+    for robot, velocities in report.qd.items():
         limits = np.array([use.velocity_limit for use in report.joints if use.robot == robot])
         turns = limits > 0.0
-        total += float(steps @ np.sum((speeds[:, turns] / limits[turns]) ** 2, axis=1))
+        total += float(steps @ np.sum((velocities[:, turns] / limits[turns]) ** 2, axis=1))
     return total

@@ -208,7 +208,7 @@ def _drifts_by_joint(drifts: Repeatability) -> dict[str, dict[str, JointDriftRec
 def locked_joints_record(report: Report, cell: Cell) -> list[LockedJointRecord]:
     """Joints that fail: when, at which position, and whether all tasks stay within their tolerances."""
     accuracy = ("position_error", "orientation_error")
-    are_tasks_kept = all(check.passed for check in report.checks if check.name in accuracy)
+    are_tasks_met = all(check.passed for check in report.checks if check.name in accuracy)
     records: list[LockedJointRecord] = []
     for lock in cell.motion.locked:
         model = cell.robot(lock.robot).model
@@ -222,7 +222,7 @@ def locked_joints_record(report: Report, cell: Cell) -> list[LockedJointRecord]:
                 "from_s": number(lock.since),
                 "position": number(scale * positions[0]) if len(positions) else None,
                 "unit": unit,
-                "tasks_kept": are_tasks_kept,
+                "tasks_kept": are_tasks_met,
             }
         )
     return records

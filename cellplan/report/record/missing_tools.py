@@ -20,7 +20,7 @@ def missing_tools(cell: Cell) -> Iterator[tuple[str, str]]:
     at_work = {task.robot for task in cell.tasks}
     holders = {grasp.robot for grasp in cell.part.held_by}
     for robot in cell.robots:
-        if robot.tool.bodies or robot.name not in at_work | holders or _has_own_tool(robot):
+        if robot.tool.bodies or robot.name not in at_work | holders or _has_tool(robot):
             continue
         if not robot.tool.is_bare:
             text = f"the tool of {robot.name} has no body: state tool.geometry or tool.bodies, so that it is checked"
@@ -30,7 +30,7 @@ def missing_tools(cell: Cell) -> Iterator[tuple[str, str]]:
             yield f"robots.{robot.name}", text
 
 
-def _has_own_tool(robot: Robot) -> bool:
+def _has_tool(robot: Robot) -> bool:
     """Whether the robot's own file has something in front of the flange, such as a gripper."""
     X_FB = inverse(robot.model.X_BF)
     reaches = [

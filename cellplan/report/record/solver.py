@@ -152,7 +152,7 @@ def solver_record(
         "accuracy_mm": number(solver.accuracy_mm),
         "gain_per_s": number(solver.gain),
         "damping": "auto" if solver.damping == "auto" else number(solver.damping),
-        "settings": _own_settings(solver),
+        "settings": _method_settings(solver),
         "secondary": {name: entry_record(goal, without={"at"}) for name, goal in solver.secondary.goals.items()},
         "weighting": entry_record(solver.weighting),
         "iterations": None if motion is None else _iterations_record(motion),
@@ -178,7 +178,7 @@ def moved_start_record(moved: MovedStart) -> MovedStartRecord:
     }
 
 
-def _own_settings(solver: SolverEntry) -> SettingsRecord:
+def _method_settings(solver: SolverEntry) -> SettingsRecord:
     """Settings of the method itself; only the recursive search has a sequence."""
     match solver.method:
         case "damped_least_squares":

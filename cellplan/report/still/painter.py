@@ -53,7 +53,7 @@ class Painter:
     def paths(self, solids: Sequence[ShownSolid], lines: Sequence[ShownLine]) -> str:
         """SVG of solids and lines."""
         mesh = self._mesh(solids)
-        edges = drawn_edges(mesh)
+        edges = sheet_edges(mesh)
         depths = [mesh.corners[:, :, 2].mean(axis=1) if self.focus is None else depths_near(mesh.corners, self.focus)]
         pieces = [piece for line in lines for piece in self._pieces(line)]
         depths.append(np.array([depth for depth, _ in pieces]))
@@ -190,7 +190,7 @@ def _polygons(corners: Indices) -> list[str]:
     ]
 
 
-def drawn_edges(mesh: Mesh2D) -> Mapping[int, list[tuple[int, int]]]:
+def sheet_edges(mesh: Mesh2D) -> Mapping[int, list[tuple[int, int]]]:
     """Edges where a solid ends on the sheet or has a crease: by facet, the numbers of both corners."""
     if not len(mesh.corners):
         return {}

@@ -59,7 +59,7 @@ def _pair_line(pair: PairSkew) -> str:
     least, stated = pair.least, ""
     why = "" if least is None or not least.subject else f" ({demand_text(least.limit, least.subject)})"
     if pair.stated is not None:
-        stated = f", stated {1e3 * pair.stated:g} ms: {'kept' if pair.is_kept else 'NOT KEPT'}"
+        stated = f", stated {1e3 * pair.stated:g} ms: {'kept' if pair.is_met else 'NOT KEPT'}"
     return f"{pair.first} - {pair.second}: {_skew(pair.allowed)}{why}{stated}"
 
 

@@ -68,14 +68,14 @@ def _worst(scene: Scene, robot: str, X_WB: Array, q: Array) -> dict[int, PlaceCo
     near = table.find(scene.engine, D, float(demands.max(initial=0.0)))
     short, motions = near.distances - demands[near.rows], near.samples // nodes
     worst = dict[int, PlaceContact]()
-    for query in _first_of_each(short, motions).tolist():
+    for query in _worst_pairs(short, motions).tolist():
         pair = scene.names(scene.pairs[near.rows[query]])
         node = int(near.samples[query] % nodes)
         worst[int(motions[query])] = PlaceContact(pair=pair, distance=float(near.distances[query]), node=node)
     return worst
 
 
-def _first_of_each(short: Array, motions: Indices) -> Indices:
+def _worst_pairs(short: Array, motions: Indices) -> Indices:
     """Of each motion the pair that falls short by most, of those that do."""
     below = np.flatnonzero(short < 0.0)
     order = below[np.lexsort((short[below], motions[below]))]

@@ -59,7 +59,7 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
         their distance from the present start. They may be out of limits.
     """
     X_WR = X_WB @ inverse(places.X_WB) @ goal.X_WR  # as if the part moved the other way
-    drawn = np.vstack([goal.given, random_configurations(model, SEEDS - 1, generator(model.name, seed))])
+    seeds = np.vstack([goal.given, random_configurations(model, SEEDS - 1, generator(model.name, seed))])
 
     def solved(at: Indices, seeds: Array) -> tuple[Array, Indices]:
         configurations, rows = reached_by_rows(goal.chain, goal.relation, goal.X_RT, X_WP=X_WR[at], seeds=seeds)
@@ -68,7 +68,7 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
     stride = _first_stride(places)
     coarse = places.coarse(stride)
     coarse = coarse[_within_reach(goal, places.X_WB[coarse])]
-    q, at = solved(np.repeat(coarse, SEEDS), np.tile(drawn, (len(coarse), 1)))
+    q, at = solved(np.repeat(coarse, SEEDS), np.tile(seeds, (len(coarse), 1)))
     while stride := stride // 2:
         among = np.isin(np.arange(len(places)), places.coarse(stride))
         q, at = _carried_on(q, at, places.neighbours(stride), among, solved)

@@ -96,12 +96,12 @@ def verdicts_at_start(job: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVer
     model = job.scene.cell.robot(job.robot).model
     margins = np.minimum(q - model.lower, model.upper - q)
     verdicts = [PlaceVerdict(verdict=Verdict.OUT_OF_REACH) for _ in range(len(job.places))]
-    for start, place, rooms in zip(q, at.tolist(), margins, strict=True):
-        tight = int(np.argmin(rooms))
+    for start, place, spare in zip(q, at.tolist(), margins, strict=True):
+        tight = int(np.argmin(spare))
         worst = verdicts[place].margin
-        if rooms[tight] < 0.0 and (worst is None or rooms[tight] > worst):
+        if spare[tight] < 0.0 and (worst is None or spare[tight] > worst):
             joint = (job.robot, model.joint_names[tight])
-            margin = float(rooms[tight])
+            margin = float(spare[tight])
             verdicts[place] = PlaceVerdict(verdict=Verdict.LIMIT, start=start, joint=joint, margin=margin, at=0.0)
     return verdicts, np.flatnonzero(margins.min(axis=1) >= 0.0)
 

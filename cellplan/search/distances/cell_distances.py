@@ -24,7 +24,14 @@ from cellplan.scene.body_table import BodyTable
 from cellplan.scene.near_table import NearbyPairs, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
-from cellplan.search.distances.layout_pairs import LayoutPair, among, are_own, demands_of, layout_pairs, with_areas
+from cellplan.search.distances.layout_pairs import (
+    LayoutPair,
+    among,
+    are_within_robot,
+    demands_of,
+    layout_pairs,
+    with_areas,
+)
 from cellplan.search.distances.moving_bodies import LayoutVariables, MovingBodies, PlacedBody, far_away, reaches
 
 STEP: Final = (
@@ -42,7 +49,7 @@ class LayoutDistances:
     keys: Indices  # at which configuration, shape (M,); the first one for bodies without a joint between them
     distances: Array  # signed distances in [m], negative where bodies overlap by so much, shape (M,)
     demands: Array  # what is demanded of them in [m], shape (M,)
-    is_own: Flags  # whether both bodies belong to one robot, shape (M,)
+    within_robot: Flags  # whether both bodies belong to one robot, shape (M,)
     normals: Array  # unit directions from the first body to the second in W, shape (M, 3)
     first: Array  # nearest points of the first bodies in W in [m], shape (M, 3)
     second: Array  # nearest points of the second bodies, shape (M, 3)
@@ -98,7 +105,7 @@ class CellDistances:
             pairs=among(watched, _concerned(self.pairs, changed)),
             is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
-        self._demands, self._within_robot = demands_of(self.pairs), are_own(self.pairs)
+        self._demands, self._within_robot = demands_of(self.pairs), are_within_robot(self.pairs)
         self.most_demanded = float(self._demands.max(initial=0.0))
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array(
@@ -144,7 +151,7 @@ class CellDistances:
             keys=nearby.samples,
             distances=nearby.distances,
             demands=self._demands[nearby.rows],
-            is_own=self._within_robot[nearby.rows],
+            within_robot=self._within_robot[nearby.rows],
             normals=nearby.normals,
             first=nearby.first,
             second=nearby.second,
@@ -254,7 +261,7 @@ def _displaced(X: Array, component: int, step: float) -> Array:
 
 def _concerned(pairs: Sequence[LayoutPair], changed: Set[int]) -> Flags:
     """Which pairs a layout can change: not those of one robot without a joint between them, unless it changes one."""
-    is_free = [not (pair.is_own and pair.is_fixed) or not changed.isdisjoint(pair.ends) for pair in pairs]
+    is_free = [not (pair.within_robot and pair.is_fixed) or not changed.isdisjoint(pair.ends) for pair in pairs]
     return np.array(is_free, dtype=bool)
 
 

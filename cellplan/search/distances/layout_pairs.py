@@ -19,7 +19,7 @@ class LayoutPair:
     names: tuple[str, str]  # their names
     ends: tuple[int, int]  # their places in ``Scene.bodies``
     demand: float  # distance in [m] that is demanded; negative where they may reach into each other by so much
-    is_own: bool  # whether both belong to one robot: no layout gives them more room than the robot's design has
+    within_robot: bool  # whether both belong to one robot: no layout gives them more room than the robot's design has
     is_fixed: bool  # whether no joint is between them
 
 
@@ -35,7 +35,7 @@ def layout_pairs(scene: Scene) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
             names=(a.name, b.name),
             ends=(first, second),
             demand=demand,
-            is_own=a.robot is not None and a.robot == b.robot,
+            within_robot=a.robot is not None and a.robot == b.robot,
             is_fixed=carriers[first] == carriers[second],
         )
 
@@ -65,7 +65,8 @@ def with_areas(
 ) -> tuple[tuple[LayoutPair, ...], WatchedPairs]:
     """The pairs, and those of areas and what keeps out of them, by their places among the bodies of the given names."""
     added = [
-        LayoutPair(names=(names[a], names[b]), ends=(a, b), demand=0.0, is_own=False, is_fixed=True) for a, b in ends
+        LayoutPair(names=(names[a], names[b]), ends=(a, b), demand=0.0, within_robot=False, is_fixed=True)
+        for a, b in ends
     ]
     count, first = len(watched.solids), len(pairs)
     return (*pairs, *added), replace(
@@ -82,24 +83,24 @@ def demands_of(pairs: Sequence[LayoutPair]) -> Array:
     return np.array([pair.demand for pair in pairs])
 
 
-def are_own(pairs: Sequence[LayoutPair]) -> Flags:
+def are_within_robot(pairs: Sequence[LayoutPair]) -> Flags:
     """Which pairs belong to one robot, shape (P,)."""
-    return np.array([pair.is_own for pair in pairs], dtype=bool)
+    return np.array([pair.within_robot for pair in pairs], dtype=bool)
 
 
 def among(pairs: WatchedPairs, is_selected: Flags) -> WatchedPairs:
     """Some of the pairs, by what they are called: ``is_selected`` has an entry for each row."""
     count = len(pairs.solids)
-    is_kept = is_selected[pairs.rows]
-    solids, above = is_kept[:count], is_kept[count:]
+    is_chosen = is_selected[pairs.rows]
+    solids, above = is_chosen[:count], is_chosen[count:]
     return replace(
         pairs,
-        rows=pairs.rows[is_kept],
+        rows=pairs.rows[is_chosen],
         solids=pairs.solids[solids],
         above=pairs.above[above],
         planes=pairs.planes[above],
-        demands=pairs.demands[is_kept],
-        once=pairs.once[is_kept],
+        demands=pairs.demands[is_chosen],
+        once=pairs.once[is_chosen],
     )
 
 

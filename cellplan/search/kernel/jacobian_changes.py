@@ -27,9 +27,9 @@ class JacobianChanges:
             at_tips: Whether all twists are taken at the tips.
         """
         self._screws, self._nq, constraints = screws, job.cell.joint_count, job.constraints
-        self._has_own = (constraints.operator_signs > 0.0) | (constraints.carrier_signs > 0.0)
+        self._has_local = (constraints.operator_signs > 0.0) | (constraints.carrier_signs > 0.0)
         self._is_carried = constraints.carrier_signs < 0.0
-        self._ways, self._holder = ways(job)
+        self._axes, self._holder = flange_axes(job)
         self._is_whole = constraints.is_whole and not at_tips
         self.idle = (1.0 - constraints.constrained).ravel()
         if not self._is_whole:
@@ -42,9 +42,9 @@ class JacobianChanges:
     @classmethod
     def of(cls, job: Job, screws: TaskScrews, qd: Array) -> "JacobianChanges":
         """Those at joint speeds at the nodes, shape (N, nq)."""
-        local, holder = ways(job)
+        local, holder = flange_axes(job)
         shared = np.zeros(screws.shared.shape[:2]) if holder is None else holder.axis_rates(qd)
-        return cls(job, screws, np.stack([way.axis_rates(qd) for way in local], axis=1), shared)
+        return cls(job, screws, np.stack([axes.axis_rates(qd) for axes in local], axis=1), shared)
 
     @property
     def jacobian(self) -> Array:
@@ -77,33 +77,33 @@ class JacobianChanges:
         held = (y * self._is_carried[:, None]).sum(axis=1)
         held_power = screws.shared @ power_matrix(held)
         below = np.tril(np.ones((power.shape[2],) * 2), -1)
-        by_own = (power @ np.swapaxes(screws.operators, -1, -2)) * below
+        by_local = (power @ np.swapaxes(screws.operators, -1, -2)) * below
         by_shared, by_layout = -power @ np.swapaxes(screws.shared, -1, -2)[:, None], _products(power, screws.based)
         shared = (held_power @ np.swapaxes(screws.shared, -1, -2)) * below.T, _products(held_power, screws.held)
         forces = np.zeros((nodes, self._nq, self._nq + screws.held.shape[1]))
         tips = None if self._is_whole else self._tips()
-        for place, way in enumerate(self._ways):
-            blocks = [by_own[:, place], by_shared[:, place], by_layout[:, place]]
+        for place, axes in enumerate(self._axes):
+            blocks = [by_local[:, place], by_shared[:, place], by_layout[:, place]]
             if tips is not None:
                 pull = cross(y[:, place, None, :3], screws.operators[:, place, :, 3:])
                 blocks = [block + _products(pull, part[:, place]) for block, part in zip(blocks, tips, strict=True)]
-            if self._has_own[place]:
-                self._put(forces, way, place, blocks)
+            if self._has_local[place]:
+                self._put(forces, axes, place, blocks)
             if tips is not None and self._is_carried[place] and self._holder is not None:
                 pull = -cross(y[:, place, None, :3], screws.shared[..., 3:])
                 self._put(forces, self._holder, place, [_products(pull, part[:, place]) for part in tips])
         if self._holder is not None:
-            way = self._holder
-            forces[:, way.columns, way.columns] += way.to_joints.T @ shared[0] @ way.to_joints
-            forces[:, way.columns, self._nq :] += way.to_joints.T @ shared[1]
+            axes = self._holder
+            forces[:, axes.columns, axes.columns] += axes.to_joints.T @ shared[0] @ axes.to_joints
+            forces[:, axes.columns, self._nq :] += axes.to_joints.T @ shared[1]
         return forces
 
     def _put(self, changes: Array, rows: "FlangeAxes", place: int, blocks: list[Array]) -> None:
         """Add blocks by the own axes, the shared axes and the directions to the rows of a robot's joints."""
         local, shared, layout = (rows.to_joints.T @ block for block in blocks)
-        if self._has_own[place]:
-            way = self._ways[place]
-            changes[:, rows.columns, way.columns] += local @ way.to_joints
+        if self._has_local[place]:
+            axes = self._axes[place]
+            changes[:, rows.columns, axes.columns] += local @ axes.to_joints
         if self._is_carried[place] and self._holder is not None:
             changes[:, rows.columns, self._holder.columns] += shared @ self._holder.to_joints
         changes[:, rows.columns, self._nq :] += layout
@@ -111,10 +111,10 @@ class JacobianChanges:
     def _columns(self, local: Array, shared: Array, layout: Array) -> Array:
         """Twists by own axes and shared axes, (N, T, levels, 6), and directions, (N, T, p, 6), as (N, 6 T, nq + p)."""
         nodes, count = layout.shape[0], layout.shape[2]
-        columns = np.zeros((nodes, len(self._ways), 6, self._nq + count))
-        for place, way in enumerate(self._ways):
-            if self._has_own[place]:
-                columns[:, place, :, way.columns] += np.swapaxes(local[:, place], 1, 2) @ way.to_joints
+        columns = np.zeros((nodes, len(self._axes), 6, self._nq + count))
+        for place, axes in enumerate(self._axes):
+            if self._has_local[place]:
+                columns[:, place, :, axes.columns] += np.swapaxes(local[:, place], 1, 2) @ axes.to_joints
             if self._is_carried[place] and self._holder is not None:
                 columns[:, place, :, self._holder.columns] += (
                     np.swapaxes(shared[:, place], 1, 2) @ self._holder.to_joints
@@ -153,7 +153,7 @@ class FlangeAxes:
         return qd[:, self.columns] @ self.to_joints.T
 
 
-def ways(job: Job) -> tuple[list[FlangeAxes], FlangeAxes | None]:
+def flange_axes(job: Job) -> tuple[list[FlangeAxes], FlangeAxes | None]:
     """Those of the robot of each relation, and of the positioner."""
     constraints = job.constraints
     return [FlangeAxes.of(job, int(robot)) for robot in constraints.operators], (

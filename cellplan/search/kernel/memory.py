@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-KEPT_BYTES: Final = (
+CACHE_BYTES: Final = (
     24_000_000  # more than all arrays of one call, less than the 32 MB beyond which glibc learns nothing
 )
 
@@ -17,4 +17,4 @@ def keep_freed_memory() -> None:
     The largest block that was freed decides up to which size it takes blocks from its heap, and how much of that it
     keeps. Nothing is touched, so nothing is used; other allocators do as they always do.
     """
-    np.empty(KEPT_BYTES, dtype=np.uint8)
+    np.empty(CACHE_BYTES, dtype=np.uint8)

@@ -109,7 +109,7 @@ class _March:
             at, self._desired(node), self._placement, mobile=self._mobile, weights=self._weights
         )
         errors = np.abs(linear.errors).max(axis=(0, 1))
-        return at + linear.correction(np.zeros_like(at)), linear.speeds(), errors
+        return at + linear.correction(np.zeros_like(at)), linear.velocities(), errors
 
     def _desired(self, node: int) -> Desired:
         """The desired motion at a node, the same for all."""
@@ -146,12 +146,12 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
             rates=rates,
         )
         for _ in range(MOST_PASSES):
-            change, speeds, errors = passes.once(at)
+            change, velocities, errors = passes.once(at)
             at = at + change
             is_settled = np.abs(change).max(axis=(0, 2)) <= PASSED
             if is_settled.all():
                 break
-    return _completed(job, layouts, at, speeds, is_settled=is_settled & arrived & (errors <= LOST))
+    return _completed(job, layouts, at, velocities, is_settled=is_settled & arrived & (errors <= LOST))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -171,15 +171,15 @@ class _Passes:
         linear = self.job.tasks.linearise(
             at.reshape(nq, -1), self.desired, self.placement, mobile=np.ones(nq), weights=self.weights
         )
-        speeds = linear.speeds().reshape(at.shape)
-        picard = (self.start + speeds @ self.job.integral.T - at).reshape(nq, -1)
+        velocities = linear.velocities().reshape(at.shape)
+        picard = (self.start + velocities @ self.job.integral.T - at).reshape(nq, -1)
         change = picard + linear.correction(picard)
         if self.rates is not None:
             change = _with_consequences(self.job, change.reshape(at.shape), self.rates).reshape(nq, -1)
             change += linear.correction(change)
         return (
             change.reshape(at.shape),
-            speeds,
+            velocities,
             np.abs(linear.errors).max(axis=(0, 1)).reshape(count, nodes).max(axis=1),
         )
 
@@ -200,9 +200,9 @@ def _with_consequences(job: Job, change: Array, rates: Array) -> Array:
     return np.moveaxis(changed, 0, 2)
 
 
-def _completed(job: Job, layouts: Layouts, at: Array, speeds: Array, *, is_settled: NDArray[np.bool_]) -> Motions:
+def _completed(job: Job, layouts: Layouts, at: Array, velocities: Array, *, is_settled: NDArray[np.bool_]) -> Motions:
     """The motions that passes settled, shape (nq, K, N), and the others run from node to node."""
-    q, qd, lost_at = np.moveaxis(at, 0, 2).copy(), np.moveaxis(speeds, 0, 2).copy(), np.full(len(layouts), np.inf)
+    q, qd, lost_at = np.moveaxis(at, 0, 2).copy(), np.moveaxis(velocities, 0, 2).copy(), np.full(len(layouts), np.inf)
     others = np.flatnonzero(~is_settled)
     if others.size:
         again = run(job, layouts.of_places(others))

@@ -18,7 +18,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.planning.start.inverse_kinematics import finite_limits
-from cellplan.search.kernel.jacobian_changes import JacobianChanges, constrained_rows, ways
+from cellplan.search.kernel.jacobian_changes import JacobianChanges, constrained_rows, flange_axes
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.screws import Directions, TaskScrews, unit_screws
 
@@ -71,7 +71,7 @@ class SingularValues:
         directions, nq = self.directions(), self.q.shape[1]
         job = replace(self.job, X=self.job.X[..., nodes])
         screws = TaskScrews.of(job, self.layout, self.q[nodes], directions)
-        local, _ = ways(job)
+        local, _ = flange_axes(job)
         left, rates = np.zeros((*screws.tip.shape[:2], 6)), np.zeros(screws.operators.shape[:3])
         for place, (J, is_constrained) in zip(arms(job), _jacobians(job, screws), strict=True):
             last = _count(J, is_constrained) - 1
@@ -101,7 +101,7 @@ def usual_values(job: Job) -> Array:
     state = chains.state(np.ascontiguousarray(q.T), Layouts.of([cell], np.zeros((1, cell.joint_count))).placement(job))
     axes, points, tips = (np.ascontiguousarray(part.T) for part in (state.axes, state.points, state.p_WT))
     R_WT, turning = np.swapaxes(state.R_WT.T, -1, -2), chains.is_turning.T[:, :, None]
-    local, _ = ways(job)
+    local, _ = flange_axes(job)
     values = []
     for place in arms(job):
         robot = int(job.constraints.operators[place])
@@ -114,7 +114,7 @@ def usual_values(job: Job) -> Array:
 
 def _jacobians(job: Job, screws: TaskScrews) -> list[tuple[Array, Flags]]:
     """The Jacobian of each arm, the rows that are left open 0, shape (N, 6, n), and which rows are constrained."""
-    rows, (local, _) = constrained_rows(job, screws.tip), ways(job)
+    rows, (local, _) = constrained_rows(job, screws.tip), flange_axes(job)
     return [
         (
             rows[:, place] @ (np.swapaxes(screws.operators[:, place], 1, 2) @ local[place].to_joints),

@@ -60,14 +60,14 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
 
 def _lost(problem: GuardedProblem, d: Array, start: Array) -> Corner:
     """A layout in which a tool cannot follow."""
-    margins, rooms = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
-    return Corner(d=d, start=start, cycle=np.inf, margins=margins, spare_distances=rooms, first="a tool loses its path")
+    margins, spare = np.full(len(start), -np.inf), np.full(problem.pair_count, -np.inf)
+    return Corner(d=d, start=start, cycle=np.inf, margins=margins, spare_distances=spare, first="a tool loses its path")
 
 
 def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
     """A layout whose motion is known."""
-    rooms = np.full(problem.pair_count, np.inf)
-    np.minimum.at(rooms, measures.distances.pairs, -measures.lacks)
+    spare = np.full(problem.pair_count, np.inf)
+    np.minimum.at(spare, measures.distances.pairs, -measures.violations)
     beyond = np.maximum(measures.lower.value.max(axis=0), measures.upper.value.max(axis=0))
     point = measures.point
     return Corner(
@@ -75,18 +75,18 @@ def _measured(problem: GuardedProblem, measures: Measures) -> Corner:
         start=point.start,
         cycle=measures.cycle,
         margins=-beyond,
-        spare_distances=rooms,
-        first=_first(problem, measures, beyond, rooms),
+        spare_distances=spare,
+        first=_first(problem, measures, beyond, spare),
     )
 
 
-def _first(problem: GuardedProblem, measures: Measures, beyond: Array, rooms: Array) -> str:
+def _first(problem: GuardedProblem, measures: Measures, beyond: Array, spare: Array) -> str:
     """What is missed most, of margins and distances; else the joint that decides the cycle."""
-    scores: Sequence[float] = (float(beyond.max()) / np.radians(1.0), -float(rooms.min(initial=np.inf)) / 0.01)
+    scores: Sequence[float] = (float(beyond.max()) / np.radians(1.0), -float(spare.min(initial=np.inf)) / 0.01)
     if max(scores) <= 0.0:
         speeds, rates = measures.speeds.value.max(axis=0), np.sqrt(measures.accelerations.value.max(axis=0))
         loads, kind = (speeds, "velocity") if speeds.max() >= rates.max() else (rates, "acceleration")
         return f"{kind} of {' '.join(problem.joint_names(int(loads.argmax())))}"
     if scores[0] >= scores[1]:
         return f"margin of {' '.join(problem.joint_names(int(beyond.argmax())))}"
-    return f"distance of {' and '.join(problem.pair_names(int(rooms.argmin())))}"
+    return f"distance of {' and '.join(problem.pair_names(int(spare.argmin())))}"

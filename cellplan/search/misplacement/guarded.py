@@ -85,7 +85,7 @@ class GuardedProblem(LayoutProblem):
             nodes=np.append(bodies.nodes, at).astype(np.intp),
             values=np.append(bodies.values, LENGTH * measured.arms.values[at, subjects]),
             demands=np.append(bodies.demands, np.zeros(len(at))),
-            is_own=np.append(bodies.is_own, np.ones(len(at), dtype=bool)).astype(bool),
+            within_robot=np.append(bodies.within_robot, np.ones(len(at), dtype=bool)).astype(bool),
             detail=measured,
         )
 
@@ -107,7 +107,7 @@ class GuardedProblem(LayoutProblem):
         relation = self.job.relations[arms(self.job)[self.guards[place]]]
         return relation.robot, "a singular configuration"
 
-    def kept_from_fold(self, taken: Array, values: Array, pairs: Indices) -> Array:
+    def away_from_fold(self, taken: Array, values: Array, pairs: Indices) -> Array:
         """What rows ask for: what displacements take, shape (M,), of arms enough to keep off the fold."""
         is_arm = pairs >= len(self.bodies.pairs)
         return np.where(is_arm, np.sqrt(FOLDS * taken * np.maximum(values, 0.0)), taken)

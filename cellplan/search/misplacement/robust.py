@@ -53,7 +53,7 @@ class Robust:
     displacements: BaseDisplacements  # these
 
     @property
-    def is_kept(self) -> bool:
+    def is_met(self) -> bool:
         """Whether all corners keep all demands in ``cycle``."""
         return all(corner.keeps(self.cycle) for corner in self.corners)
 
@@ -145,14 +145,14 @@ class RobustSearch:
         followed = [corner for corner in corners if np.isfinite(corner.cycle)]
         if len(followed) < len(corners):  # only further from singular configurations helps
             self._beyond[len(self.problem.bodies.pairs) :] += MORE_REACH
-        lacks = -np.min([corner.spare_distances for corner in followed], axis=0) if followed else np.zeros(0)
-        if (lacks > 0.0).any():
-            self._beyond += np.where(lacks > 0.0, np.minimum(lacks, MOST_LENGTH) + MORE_LENGTH, 0.0)
+        violations = -np.min([corner.spare_distances for corner in followed], axis=0) if followed else np.zeros(0)
+        if (violations > 0.0).any():
+            self._beyond += np.where(violations > 0.0, np.minimum(violations, MOST_LENGTH) + MORE_LENGTH, 0.0)
         most = robust.improved.cycle
         if self.demands.objective is not Objective.CYCLE and self.demands.duration is not None:
             most = self.demands.duration
         added = self._add(sorted(followed, key=lambda scenario: -_missed(scenario, most)), most)
-        return added or len(followed) < len(corners) or bool((lacks > 0.0).any())
+        return added or len(followed) < len(corners) or bool((violations > 0.0).any())
 
     def _begin(self, of: GuardedProblem, worst_case: Worst, start: Array) -> None:
         """Take the layout in place and the worst corners as scenarios, as far as tools can follow there."""
@@ -207,4 +207,4 @@ def _missed(corner: Corner, most: float) -> float:
 def _rank(robust: Robust, demands: Demands) -> tuple[bool, int, float]:
     """What makes one better than another."""
     is_late = demands.duration is not None and robust.cycle > demands.duration
-    return is_late or not robust.is_kept, len(robust.corners) - robust.passing, robust.cycle
+    return is_late or not robust.is_met, len(robust.corners) - robust.passing, robust.cycle

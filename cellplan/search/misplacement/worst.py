@@ -46,7 +46,7 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
     q, qd = (np.abs(part) @ amounts for part in (by.q, by.qd))
     qdd = np.zeros_like(qd) if by.qdd is None else np.abs(by.qdd) @ amounts
     rows = measures.distances
-    taken = problem.kept_from_fold(np.abs(apart) @ amounts, rows.values, rows.pairs)
+    taken = problem.away_from_fold(np.abs(apart) @ amounts, rows.values, rows.pairs)
     worst_case = Worst(
         margins=q,
         speeds=qd / problem.limits.velocity,
@@ -62,7 +62,7 @@ def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effor
 def _of_pairs(problem: GuardedProblem, measures: Measures, taken: Array) -> Array:
     """What is taken from each pair where that leaves least; from pairs that are not near the median of the others."""
     distances, rows = np.full(problem.pair_count, np.median(taken) if len(taken) else 0.0), measures.distances
-    for row in np.argsort(measures.lacks + taken, kind="stable").tolist():
+    for row in np.argsort(measures.violations + taken, kind="stable").tolist():
         distances[rows.pairs[row]] = taken[row]
     return distances
 
@@ -91,7 +91,7 @@ def _leading(value: Array, gradients: Array) -> Iterator[Array]:
 def _of_distances(measures: Measures, apart: Array, taken: Array) -> Iterator[Array]:
     """Signs of the displacements that bring bodies nearest, each pair once."""
     seen = set[int]()
-    for row in np.argsort(-(measures.lacks + taken), kind="stable").tolist():
+    for row in np.argsort(-(measures.violations + taken), kind="stable").tolist():
         pair = int(measures.distances.pairs[row])
         if pair not in seen and len(seen) < MOST:
             seen.add(pair)

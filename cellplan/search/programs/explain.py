@@ -58,8 +58,8 @@ def explain(problem: Problem, point: Point, demands: Demands, effort: Effort) ->
     solved, unit = step.solved, _unit(measures, demands)
     binding, gradient, at = list[BindingRow](), np.zeros(len(point.x)), 0
     for rows in program.rows:
-        multipliers = solved.multipliers[at : at + len(rows.lacks)]
-        at += len(rows.lacks)
+        multipliers = solved.multipliers[at : at + len(rows.violations)]
+        at += len(rows.violations)
         if rows.aim or isinstance(rows, PacedRows):
             gradient += (multipliers @ rows.gradients)[: len(gradient)]
         binding += _bound(problem, measures, rows, multipliers, unit)

@@ -16,7 +16,7 @@ ANGLE: Final = 0.01  # [rad] of a lack that weighs as much as
 LENGTH: Final = 0.003  # [m] and as
 SHARE: Final = 0.01  # [-] of the duration
 SINGULAR: Final = 0.1  # [-] of a singular value that is demanded
-IN_ROOM: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
+IN_RESERVE: Final = 0.02  # [-] of the price of a lack where only the room is missed that counts as kept
 FARTHEST: Final = 1e3  # [-] beyond a singular value that is not demanded
 ROUNDING: Final = 1e-6  # [-] usual units: 3 nm
 
@@ -53,7 +53,9 @@ class Measures:
     speeds: PeakValues
     accelerations: PeakValues
     distances: Distances  # near pairs at the keys
-    lacks: Array  # by how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,)
+    violations: (
+        Array  # by how much pairs miss what is demanded of them, in [m], negative where they keep it, shape (M,)
+    )
     within: float  # distance in [m] beyond what is demanded, from which on pairs are not near
     factor: float  # how many times as long as the nodes the motion must last for all speeds and accelerations
     cycle: float  # shortest cycle in [s]
@@ -73,7 +75,7 @@ class Measures:
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
         most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
         distances = problem.distances(point, key_nodes(problem, effort), effort.within + most)
-        added = np.where(distances.is_own, 0.0, demands.clearance)
+        added = np.where(distances.within_robot, 0.0, demands.clearance)
         if beyond is not None:
             added = added + beyond[distances.pairs]
         arms = None if demands.singular is None else problem.arms(point)
@@ -88,7 +90,7 @@ class Measures:
             speeds=speeds,
             accelerations=accelerations,
             distances=distances,
-            lacks=distances.demands + added - distances.values,
+            violations=distances.demands + added - distances.values,
             within=effort.within,
             factor=factor,
             cycle=factor * float(times[-1] - times[0]),
@@ -101,24 +103,24 @@ class Measures:
         """What every joint and pair misses at its worst."""
         units = np.where(problem.limits.is_revolute, ANGLE, LENGTH)
         joints = (np.stack([self.lower.value.max(axis=0), self.upper.value.max(axis=0)]) + reserve.margin) / units
-        lacks, allowed = [joints.ravel()], [np.tile(0.5 * reserve.margin / units, 2)]
+        violations, allowed = [joints.ravel()], [np.tile(0.5 * reserve.margin / units, 2)]
         worst = np.full(int(self.distances.pairs.max(initial=-1)) + 1, -np.inf)
         reserved = reserves(self.distances, reserve)
-        np.maximum.at(worst, self.distances.pairs, (self.lacks + reserved) / LENGTH)
+        np.maximum.at(worst, self.distances.pairs, (self.violations + reserved) / LENGTH)
         most = np.zeros_like(worst)
         most[self.distances.pairs] = 0.5 * reserved / LENGTH
-        lacks.append(worst)
+        violations.append(worst)
         allowed.append(most)
-        lacks.append((self.singular.value.max(axis=0) + reserve.singular) / SINGULAR)
-        allowed.append(np.full(len(lacks[-1]), 0.5 * reserve.singular / SINGULAR))
+        violations.append((self.singular.value.max(axis=0) + reserve.singular) / SINGULAR)
+        allowed.append(np.full(len(violations[-1]), 0.5 * reserve.singular / SINGULAR))
         if demands.duration is not None and demands.objective is not Objective.CYCLE:
             whole = demands.duration / self.span / (1.0 + reserve.time)
             loads = np.array([self.factor])
             if self.pace is None:
                 loads = np.concatenate([self.speeds.value.max(axis=0), np.sqrt(self.accelerations.value.max(axis=0))])
-            lacks.append((loads / whole - 1.0) / SHARE)
+            violations.append((loads / whole - 1.0) / SHARE)
             allowed.append(np.full(len(loads), 0.5 * reserve.time / SHARE))
-        return Missed(lacks=np.concatenate(lacks), allowed=np.concatenate(allowed))
+        return Missed(violations=np.concatenate(violations), allowed=np.concatenate(allowed))
 
     def values(self, kind: MeasureKind, subjects: Indices, nodes: Indices) -> Array:
         """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
@@ -138,7 +140,7 @@ class Measures:
             case _:
                 distances = self.distances
                 places = zip(distances.pairs.tolist(), distances.nodes.tolist(), strict=True)
-                known = dict(zip(places, self.lacks.tolist(), strict=True))
+                known = dict(zip(places, self.violations.tolist(), strict=True))
                 queries = zip(subjects.tolist(), nodes.tolist(), strict=True)
                 return np.array([known.get(key, np.nan) for key in queries])
 
@@ -156,8 +158,8 @@ class Measures:
 
     @property
     def nearest(self) -> float:
-        """The largest of ``lacks`` but those of a robot's own bodies in [m]: bodies are so much too near each other."""
-        return float(self.lacks[~self.distances.is_own].max(initial=-self.within))
+        """The largest of ``violations`` but those within a robot in [m]: bodies are so much too near each other."""
+        return float(self.violations[~self.distances.within_robot].max(initial=-self.within))
 
     @property
     def span(self) -> float:
@@ -169,18 +171,18 @@ class Measures:
 class Missed:
     """What joints and pairs miss at their worst, in usual units."""
 
-    lacks: Array  # with the whole room, negative where kept, shape (F,)
+    violations: Array  # with the whole room, negative where kept, shape (F,)
     allowed: Array  # what of it counts as kept, shape (F,)
 
     @property
     def violation(self) -> float:
         """Sum of what does not count as kept; what is left of rounding does."""
-        total = float(np.maximum(self.lacks - self.allowed, 0.0).sum())
+        total = float(np.maximum(self.violations - self.allowed, 0.0).sum())
         return total if total > ROUNDING else 0.0
 
     def cost(self, price: float) -> float:
         """What it costs in the merit of a point, at the price of one unit: little where it counts as kept."""
-        return price * (self.violation + IN_ROOM * float(np.clip(self.lacks, 0.0, self.allowed).sum()))
+        return price * (self.violation + IN_RESERVE * float(np.clip(self.violations, 0.0, self.allowed).sum()))
 
 
 def _crests(problem: Problem, values: Array, *, in_magnitude: bool = False) -> PeakValues:
@@ -208,16 +210,16 @@ def _missing(arms: ArmValues | None, demands: Demands, nodes: int) -> Array:
 def _paced(problem: Problem, point: Point, pace: Pace) -> tuple[PeakValues, PeakValues, float]:
     """The same of a retimed motion: at its nodes, as nothing is an extreme between them."""
     factor = pace.seconds / float(problem.times[-1] - problem.times[0])
-    speeds, accelerations = (
+    velocities, accelerations = (
         PeakValues.at_nodes(share * factor**order)
         for order, share in enumerate(pace.reached(point.qd, point.qdd), start=1)
     )
-    return speeds, accelerations, factor
+    return velocities, accelerations, factor
 
 
 def reserves(distances: Distances, reserve: Reserve) -> Array:
     """What is asked of near pairs beyond their demands in [m], shape (M,)."""
-    return np.where(distances.is_own, reserve.within_robot, reserve.distance)
+    return np.where(distances.within_robot, reserve.within_robot, reserve.distance)
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:

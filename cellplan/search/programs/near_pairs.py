@@ -41,6 +41,6 @@ def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, with
         nodes=nodes[near.keys],
         values=near.distances,
         demands=near.demands,
-        is_own=near.is_own,
+        within_robot=near.within_robot,
         detail=PairsAtNodes(near=near, nodes=nodes),
     )

@@ -127,8 +127,8 @@ class Pace:
         inner, before, after = self.inner, squares[left], squares[left + 1]
         u, halves = (after - before) / (2.0 * steps), np.stack([-before, after], axis=1) / (2.0 * steps[:, None])
         none, speeds = np.zeros(len(left)), np.sqrt(squares[inner])
-        of_speeds = np.zeros((len(inner), 2, 2))
-        of_speeds[:, 0, 0] = 0.5 * speeds
+        by_speed = np.zeros((len(inner), 2, 2))
+        by_speed[:, 0, 0] = 0.5 * speeds
         at_left = np.stack([halves, np.stack([before, none], axis=1)], axis=1)
         at_right = np.stack([halves, np.stack([none, after], axis=1)], axis=1)
         around = np.stack([left, left + 1], axis=1)
@@ -138,7 +138,7 @@ class Pace:
             by_direction=np.concatenate([speeds, u, u]),
             by_curvature=np.concatenate([np.zeros(len(inner)), before, after]),
             around=np.concatenate([np.stack([inner, inner], axis=1), around, around]),
-            changes=np.concatenate([of_speeds, at_left, at_right]),
+            changes=np.concatenate([by_speed, at_left, at_right]),
         )
 
     def shapes(self, qd: Array, qdd: Array | None) -> tuple[Array, Array]:
@@ -200,13 +200,13 @@ class Pace:
 
 def _stretches(times: Array, point: Point, velocity: Array) -> tuple[PacedStretch, ...]:
     """The stretches of a path between rests of all joints and corners that are passed at speed."""
-    speeds, accelerations = point.qd / velocity, point.qdd / velocity
-    rates = np.linalg.norm(speeds, axis=1)
+    velocities, accelerations = point.qd / velocity, point.qdd / velocity
+    rates = np.linalg.norm(velocities, axis=1)
     rests = rates <= REST_SHARE * rates.max(initial=0.0)
     safe = np.where(rests, 1.0, rates)
-    bends = np.where(rests, 0.0, (speeds * accelerations).sum(axis=1) / safe)
+    bends = np.where(rests, 0.0, (velocities * accelerations).sum(axis=1) / safe)
     twice = np.append(np.diff(times) == 0.0, False)
-    turned = np.linalg.norm(np.diff(speeds / safe[:, None], axis=0, append=0.0), axis=1) > KINK
+    turned = np.linalg.norm(np.diff(velocities / safe[:, None], axis=0, append=0.0), axis=1) > KINK
     is_corner = twice & np.append(~rests[1:] & ~rests[:-1], False) & turned
     ends = np.unique([0, *np.flatnonzero(rests), *(np.flatnonzero(is_corner) + 1), len(times) - 1])
     stretches = []

@@ -27,8 +27,8 @@ def perturbed(
         The point; None where no draw has a motion.
     """
     for _ in range(draws):
-        drawn = x + size * problem.scale * rng.normal(size=len(x))
-        point = problem.evaluate(np.clip(drawn, problem.lower, problem.upper), start)
+        candidate = x + size * problem.scale * rng.normal(size=len(x))
+        point = problem.evaluate(np.clip(candidate, problem.lower, problem.upper), start)
         if point is not None:
             return point
     return None

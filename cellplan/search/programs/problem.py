@@ -42,7 +42,7 @@ class Distances:
     nodes: Indices  # nodes of the motion, shape (M,)
     values: Array  # signed distances in [m], shape (M,)
     demands: Array  # what the cell demands of them in [m], shape (M,)
-    is_own: Flags  # whether both bodies belong to one robot, so that its design may set the distance, shape (M,)
+    within_robot: Flags  # whether both bodies belong to one robot, so that its design may set the distance, shape (M,)
     detail: object  # what the problem needs for their derivatives
 
 

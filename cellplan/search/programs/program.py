@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.search.programs.measures import IN_ROOM
+from cellplan.search.programs.measures import IN_RESERVE
 from cellplan.search.programs.objective import Demands, Objective, Reserve
 from cellplan.search.programs.rows import ConstraintRows, Linear
 from cellplan.search.programs.solver import ProgramSolution, least
@@ -93,19 +93,19 @@ class LinearProgram:
         Args:
             corrections: Added to the lacks of all rows, shape (M,): what a step was seen to miss beyond its rows.
         """
-        count, lacks = len(self.box[0]), self._stacked([row.lacks for row in self.rows])
+        count, violations = len(self.box[0]), self._stacked([row.violations for row in self.rows])
         gradients = np.concatenate([np.zeros((0, count)), *(row.gradients for row in self.rows)])
-        aims = np.repeat([row.aim for row in self.rows], [len(row.lacks) for row in self.rows])
-        family, most, free = self._families((lacks > 0.0) & (aims == 0.0), lacks)
+        aims = np.repeat([row.aim for row in self.rows], [len(row.violations) for row in self.rows])
+        family, most, free = self._families((violations > 0.0) & (aims == 0.0), violations)
         slacks, costs = len(most), self._costs
-        A = np.zeros((len(lacks) + 2 * costs, count + 1 + 2 * slacks + costs))
-        A[: len(lacks), :count], A[: len(lacks), count] = gradients, -aims
+        A = np.zeros((len(violations) + 2 * costs, count + 1 + 2 * slacks + costs))
+        A[: len(violations), :count], A[: len(violations), count] = gradients, -aims
         is_loose = np.flatnonzero(family >= 0)
         for first in (count + 1, count + 1 + slacks):
             A[is_loose, first + family[is_loose]] = -1.0
-        targets = lacks if corrections is None else lacks + corrections
-        top = np.concatenate([-targets, *self._changes(A[len(lacks) :], count + 1 + 2 * slacks)])
-        prices = np.repeat([IN_ROOM * self.price, self.price, 1.0], [slacks, slacks, costs])
+        targets = violations if corrections is None else violations + corrections
+        top = np.concatenate([-targets, *self._changes(A[len(violations) :], count + 1 + 2 * slacks)])
+        prices = np.repeat([IN_RESERVE * self.price, self.price, 1.0], [slacks, slacks, costs])
         cost = np.concatenate([np.zeros(count), [self._weight], prices])
         lower = np.concatenate([self.box[0], [-FARTHEST], np.zeros(2 * slacks + costs)])
         upper = np.concatenate([self.box[1], [FARTHEST], free, most - free, np.full(costs, FARTHEST)])
@@ -138,19 +138,19 @@ class LinearProgram:
         """Number of variables that stand for the costs of changes."""
         return len(self.changed[0]) if self.demands.objective is Objective.CHANGE else 0
 
-    def _families(self, is_loose: Flags, lacks: Array) -> tuple[Indices, Array, Array]:
+    def _families(self, is_loose: Flags, violations: Array) -> tuple[Indices, Array, Array]:
         """Which slack each row has, -1 for none; what is missed now of each, and how much of it counts as kept.
 
         Rows about one joint or one pair share theirs.
         """
-        kinds = np.repeat(np.arange(len(self.rows)), [len(row.lacks) for row in self.rows])
+        kinds = np.repeat(np.arange(len(self.rows)), [len(row.violations) for row in self.rows])
         subjects = np.concatenate([np.zeros(0, dtype=np.intp), *(row.subjects for row in self.rows)])
-        family = np.full(len(lacks), -1, dtype=np.intp)
+        family = np.full(len(violations), -1, dtype=np.intp)
         labels = np.stack([kinds, subjects], axis=1)[is_loose]
         families, which = np.unique(labels, axis=0, return_inverse=True) if len(labels) else (labels, np.zeros(0, int))
         family[is_loose] = which
         most, free = np.zeros(len(families)), np.zeros(len(families))
-        np.maximum.at(most, which, lacks[is_loose])
+        np.maximum.at(most, which, violations[is_loose])
         free[which] = self._stacked([row.allowed for row in self.rows])[is_loose]
         return family, most, np.minimum(free, most)
 

@@ -24,7 +24,9 @@ class ConstraintRows:
     kind: MeasureKind  # what they are about
     subjects: Indices  # columns of joints, or numbers of pairs, shape (M,)
     nodes: Indices  # nodes of the motion, shape (M,)
-    lacks: Array  # by how much the demand and the room are missed now, in usual units, negative where kept, shape (M,)
+    violations: (
+        Array  # by how much the demand and the room are missed now, in usual units, negative where kept, shape (M,)
+    )
     gradients: Array  # derivatives of the lacks by z, shape (M, n)
     allowed: Array  # what of the lacks counts as kept at a point, shape (M,)
     units: Array  # usual units of what is measured, see ``Measures.values``, shape (M,)
@@ -33,8 +35,8 @@ class ConstraintRows:
     def that_can_bind(self, box: Array) -> Self:
         """Those that a step within ``+-box`` can bring to their bounds."""
         reach = np.abs(self.gradients) @ box
-        highest = self.lacks + reach
-        return self.of(highest > (float((self.lacks - reach).max(initial=-np.inf)) if self.aim else 0.0))
+        highest = self.violations + reach
+        return self.of(highest > (float((self.violations - reach).max(initial=-np.inf)) if self.aim else 0.0))
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
         """By how much more than the rows say a step z was seen to change the lacks, shape (M,); 0 where not seen."""
@@ -47,7 +49,7 @@ class ConstraintRows:
             self,
             subjects=self.subjects[is_selected],
             nodes=self.nodes[is_selected],
-            lacks=self.lacks[is_selected],
+            violations=self.violations[is_selected],
             gradients=self.gradients[is_selected],
             allowed=self.allowed[is_selected],
             units=self.units[is_selected],
@@ -72,7 +74,7 @@ class PacedRows(ConstraintRows):
         squares = pace.squares.copy()
         squares[inner] *= 1.0 + z[count:]
         loads = pace.loads(there.point.qd, there.point.qdd, squares)[self.places, self.subjects]
-        return (self.signs * loads - 1.0) / self.units - (self.lacks + self.gradients @ z)
+        return (self.signs * loads - 1.0) / self.units - (self.violations + self.gradients @ z)
 
     def of(self, is_selected: Flags) -> Self:
         """See ``ConstraintRows``."""
@@ -120,7 +122,7 @@ class Linear:
         else:
             parts = [rows.widened(len(box) - count) for rows in parts]
             first = [] if duration is None else [self._lasting(pace, duration, demands, reserve), *self._paced(pace)]
-        return [rows.that_can_bind(box) for rows in (*first, *parts) if len(rows.lacks)]
+        return [rows.that_can_bind(box) for rows in (*first, *parts) if len(rows.violations)]
 
     def _duration(self, demands: Demands, reserve: Reserve) -> float | None:
         """How many times as long as the nodes the motion may last; None where it may last as long as it takes."""
@@ -138,7 +140,7 @@ class Linear:
             kind=MeasureKind.DURATION,
             subjects=np.zeros(1, dtype=np.intp),
             nodes=np.zeros(1, dtype=np.intp),
-            lacks=np.array([(share - 1.0) / unit]),
+            violations=np.array([(share - 1.0) / unit]),
             gradients=np.concatenate([np.zeros(count), -saved])[None],
             allowed=np.full(1, 0.0 if is_aim else 0.5 * reserve.time / unit),
             units=np.full(1, whole * unit),
@@ -162,7 +164,7 @@ class Linear:
                 kind=kind,
                 subjects=joints,
                 nodes=pace.nodes[places.at[rows]],
-                lacks=np.minimum(np.abs(loads[rows, joints]) - 1.0, 0.0) / unit,
+                violations=np.minimum(np.abs(loads[rows, joints]) - 1.0, 0.0) / unit,
                 gradients=gradients * signs[:, None] / unit,
                 allowed=np.zeros(len(rows)),
                 units=np.full(len(rows), unit),
@@ -192,7 +194,7 @@ class Linear:
                 kind=kind,
                 subjects=columns,
                 nodes=nodes,
-                lacks=(at / whole - 1.0) / unit,
+                violations=(at / whole - 1.0) / unit,
                 gradients=gradients * problem.scale / (whole * unit),
                 allowed=np.full(len(at), 0.0 if is_aim else 0.5 * reserve.time / unit),
                 units=np.full(len(at), whole * unit),
@@ -215,7 +217,7 @@ class Linear:
                 kind=kind,
                 subjects=columns,
                 nodes=nodes,
-                lacks=(crests.value[nodes, columns] + reserve.margin) / units[columns],
+                violations=(crests.value[nodes, columns] + reserve.margin) / units[columns],
                 gradients=gradients * problem.scale,
                 allowed=0.5 * reserve.margin / units[columns],
                 units=units[columns],
@@ -228,7 +230,7 @@ class Linear:
             kind=MeasureKind.DISTANCE,
             subjects=distances.pairs,
             nodes=distances.nodes,
-            lacks=(self.measures.lacks + reserves(distances, reserve)) / LENGTH,
+            violations=(self.measures.violations + reserves(distances, reserve)) / LENGTH,
             gradients=-self.distances * self.problem.scale / LENGTH,
             allowed=0.5 * reserves(distances, reserve) / LENGTH,
             units=np.full(len(distances.pairs), LENGTH),
@@ -249,7 +251,7 @@ class Linear:
             kind=MeasureKind.SINGULAR,
             subjects=subjects,
             nodes=nodes,
-            lacks=(crests.value[nodes, subjects] + reserve.singular) / SINGULAR,
+            violations=(crests.value[nodes, subjects] + reserve.singular) / SINGULAR,
             gradients=-gradients * self.problem.scale / (demands.singular[subjects, None] * SINGULAR),
             allowed=np.full(len(nodes), 0.5 * reserve.singular / SINGULAR),
             units=np.full(len(nodes), SINGULAR),
@@ -257,5 +259,5 @@ class Linear:
 
     def _aimed_apart(self) -> ConstraintRows:
         """Distances of near pairs but those of a robot's own bodies, as bounds of the objective."""
-        rows = self._apart(Reserve(distance=0.0)).of(~self.measures.distances.is_own)
-        return replace(rows, lacks=rows.lacks - self.measures.nearest / LENGTH, aim=1.0)
+        rows = self._apart(Reserve(distance=0.0)).of(~self.measures.distances.within_robot)
+        return replace(rows, violations=rows.violations - self.measures.nearest / LENGTH, aim=1.0)

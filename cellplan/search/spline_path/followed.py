@@ -44,9 +44,9 @@ def followed(nodes: PathNodes, placement: Placement, coefficients: Array, q: Arr
                 break
         else:
             return None
-        qd = linear.speeds(drift)
-    positions, speeds = np.ascontiguousarray(at.T), np.ascontiguousarray(qd.T)
-    return (positions, speeds) if _is_one_motion(job.times, positions, speeds) else None
+        qd = linear.velocities(drift)
+    positions, velocities = np.ascontiguousarray(at.T), np.ascontiguousarray(qd.T)
+    return (positions, velocities) if _is_one_motion(job.times, positions, velocities) else None
 
 
 def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start: Array) -> Array | None:
@@ -82,7 +82,7 @@ def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start
                 return None
             positions[node] = at[:, 0]
             if node + 1 < len(times):
-                at = at + (times[node + 1] - times[node]) * linear.speeds(drift)
+                at = at + (times[node + 1] - times[node]) * linear.velocities(drift)
     return positions
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.units import MM
 from cellplan.search.distances.keep_out import in_areas
-from cellplan.search.starts.freedom import FIXED, drawn_within
+from cellplan.search.starts.freedom import FIXED, random_within
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.starts.reaching import FreeArm, Goal, PlacedDraws, followed, matched, reached
 
@@ -66,7 +66,7 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     cell, drops = problem.cell, Counter[str]()
     if cell.carrier is None:
         return _part_settings(problem, rng, count), drops
-    x = _drawn_settings(problem, rng)
+    x = _random_settings(problem, rng)
     layouts = problem.variables.layouts(x, np.tile(problem.start, (len(x), 1)))
     columns, arm = cell.columns(cell.robots[cell.carrier].name), problem.arms[cell.carrier]
     placed = PlacedDraws(
@@ -101,7 +101,7 @@ def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) 
     """Places for a part that no robot holds: the given one, where it may lie elsewhere drawn ones."""
     variables, places = problem.variables, problem.freedom.part
     layouts = variables.layouts(variables.given[None], problem.start[None])
-    x = drawn_within(variables, places, MATCHED if len(places) else 1, rng)
+    x = random_within(variables, places, MATCHED if len(places) else 1, rng)
     x[0] = variables.given
     settings = [
         Setting(x=row, start=problem.start, X_WB=layouts.X_WB[0], X_WP=variables.placed(row).part.X_CP) for row in x
@@ -111,16 +111,16 @@ def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) 
     return [settings[i] for i in np.argsort(-_abilities(problem, settings, rng), kind="stable")[:count].tolist()]
 
 
-def _drawn_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
+def _random_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
     """Variables with those of the holder, and those that place several robots, drawn, the given ones first."""
     cell, variables = problem.cell, problem.variables
     holder = 0 if cell.carrier is None else cell.carrier
-    x = drawn_within(variables, np.append(problem.freedom.by_robot[holder], problem.freedom.shared), SETTINGS, rng)
+    x = random_within(variables, np.append(problem.freedom.by_robot[holder], problem.freedom.shared), SETTINGS, rng)
     places = problem.freedom.columns[cell.columns(cell.robots[holder].name)]
     joints = places[places != FIXED]
     middle = 0.5 * (np.maximum(variables.lower, -np.pi) + np.minimum(variables.upper, np.pi))[joints]
     x[:, joints] = middle + HOLDER_RANGE * (x[:, joints] - middle)
-    base = np.append(problem.drawn_columns(holder), problem.freedom.shared)
+    base = np.append(problem.sampled_columns(holder), problem.freedom.shared)
     stays = rng.uniform(size=SETTINGS) < GIVEN_BASE
     x[np.ix_(stays, base)] = variables.given[base]
     x[0] = variables.given
@@ -150,9 +150,9 @@ def _draws(
 ) -> tuple[Array, PlacedDraws]:
     """Variables, shape (count, n), and configurations, bases and tools of an operator drawn within their bounds."""
     arm, model = problem.arms[robot], problem.cell.robots[robot]
-    columns = problem.drawn_columns(robot)
+    columns = problem.sampled_columns(robot)
     x = np.tile(setting.x, (TEMPLATES, 1))
-    x[:, columns] = drawn_within(problem.variables, columns, TEMPLATES, rng)[:, columns]
+    x[:, columns] = random_within(problem.variables, columns, TEMPLATES, rng)[:, columns]
     layouts = problem.placed_layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
     row = np.arange(count) % TEMPLATES
     margin = problem.margin[problem.cell.columns(model.name)]
@@ -177,11 +177,11 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     X_WB, miss = matched(goal, bounds, arm.flanges(draws.q) @ draws.X_FT, draws.X_WB)
     best = np.argsort(miss, kind="stable")[:DRAWS]
     drops = Counter[str]()
-    x, drawn = x[best], draws.X_WB[best]
+    x, initial = x[best], draws.X_WB[best]
     at, has_arrived = reached(arm, goal, bounds, replace(draws, X_WB=X_WB).of_places(best))
     drops[_unreached(goal, arm, at)] = int(np.sum(~has_arrived))
-    x, drawn, at = x[has_arrived], drawn[has_arrived], at.of_places(has_arrived)
-    x = _with_bases(problem, robot, x, at.X_WB, drawn)
+    x, initial, at = x[has_arrived], initial[has_arrived], at.of_places(has_arrived)
+    x = _with_bases(problem, robot, x, at.X_WB, initial)
     inside = _within(problem, robot, x)
     drops["base out of bounds"] = int(np.sum(~inside))
     x, at = x[inside], at.of_places(inside)
@@ -222,10 +222,10 @@ def _costs(problem: StartProblem, robot: int, q: Array, margins: Array) -> Array
     if not len(q):
         return np.zeros(0)
     columns, rates = problem.cell.columns(problem.cell.robots[robot].name), problem.at_rest.rates
-    speeds = rates @ q
+    velocities = rates @ q
     shares = (
-        np.abs(speeds / problem.arms[robot].velocity),
-        np.sqrt(np.abs(rates @ speeds) / problem.acceleration[columns]),
+        np.abs(velocities / problem.arms[robot].velocity),
+        np.sqrt(np.abs(rates @ velocities) / problem.acceleration[columns]),
     )
     longest = np.maximum(*(share.max(axis=(1, 2)) for share in shares))
     costs: Array = np.log(np.maximum(longest, 1e-9)) + np.maximum(0.0, 1.0 - margins.min(axis=(1, 2)) / ROOMY)
@@ -256,13 +256,13 @@ def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: A
     return np.array(indices[:MOST_BASES], dtype=np.intp)
 
 
-def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, drawn: Array) -> Array:
+def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, initial: Array) -> Array:
     """Variables of bases that were moved from where they were drawn, shape (B, n)."""
     changed, columns = x.copy(), problem.freedom.base[robot]
     for component in np.flatnonzero(columns[:3] != FIXED).tolist():
-        changed[:, columns[component]] += X_WB[:, component, 3] - drawn[:, component, 3]
+        changed[:, columns[component]] += X_WB[:, component, 3] - initial[:, component, 3]
     if columns[3] != FIXED:
-        turn = X_WB[:, :3, :3] @ np.swapaxes(drawn[:, :3, :3], 1, 2)
+        turn = X_WB[:, :3, :3] @ np.swapaxes(initial[:, :3, :3], 1, 2)
         angle = changed[:, columns[3]] + np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
         lower, upper = problem.variables.lower[columns[3]], problem.variables.upper[columns[3]]
         middle = 0.5 * (lower + upper) if np.isfinite(lower + upper) else 0.0

@@ -105,14 +105,14 @@ def _by_joints(problem: StartProblem, motions: Motions) -> tuple[Array, Array, C
     job, drops = problem.job, Counter[str]()
     with np.errstate(all="ignore"):  # what lost its path is no number
         figures = MotionFigures.of(job, motions)
-        lack = np.maximum(0.0, problem.margin - figures.margins).max(axis=1)
+        shortfall = np.maximum(0.0, problem.margin - figures.margins).max(axis=1)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / problem.acceleration), in_magnitude=True).value
         times = np.maximum(figures.speeds.value, np.sqrt(rates)).max(axis=1)
     excess = np.maximum(0.0, times - 1.0)
-    violation = np.where(motions.is_followed, lack / ANGLE + excess / SPEED, np.inf)
+    violation = np.where(motions.is_followed, shortfall / ANGLE + excess / SPEED, np.inf)
     violation = np.where(np.isnan(violation), np.inf, violation)
     drops["loses a path"] = int(np.sum(np.isinf(violation)))
-    drops["joint limit"] = int(np.sum(np.isfinite(violation) & (lack > 0.0)))
+    drops["joint limit"] = int(np.sum(np.isfinite(violation) & (shortfall > 0.0)))
     drops["too fast"] = int(np.sum(np.isfinite(violation) & (excess > 0.0)))
     return violation, float(job.times[-1]) * times, drops
 

@@ -50,7 +50,7 @@ class Contacts:
         ]
         owners = [{anyone[name] for name in pair.names} for pair in self._pairs]
         is_watched = [
-            not design and not (pair.is_own and pair.is_fixed) and known >= owner and bool(members & owner)
+            not design and not (pair.within_robot and pair.is_fixed) and known >= owner and bool(members & owner)
             for pair, design, owner in zip(self._pairs, is_design, owners, strict=True)
         ]
         watched = among(watched, np.array(is_watched, dtype=bool))

@@ -111,7 +111,7 @@ def _base_columns(robot: str, names: Sequence[str], columns: Indices) -> list[in
     return [places.get(f"robots.{robot}.base.{component}", FIXED) for component in COMPONENTS]
 
 
-def drawn_within(variables: StartVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
+def random_within(variables: StartVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
     """Values of some variables drawn evenly within their bounds, shape (count, n); ten steps where these are infinite.
 
     Args:

@@ -18,7 +18,7 @@ from cellplan.planning.start.inverse_kinematics import SAME_POSTURE
 from cellplan.search.kernel.run import run
 from cellplan.search.starts.at_rest import settings
 from cellplan.search.starts.combined import Judged, combined, judged
-from cellplan.search.starts.freedom import drawn_within
+from cellplan.search.starts.freedom import random_within
 from cellplan.search.starts.pools import pools, words
 from cellplan.search.starts.postures import branch_starts
 from cellplan.search.starts.problem import StartProblem
@@ -140,11 +140,11 @@ class StartGenerator:
             return Starts(starts=(), reason=f"no configuration of the holder can be used: {words(drops)}")
         for setting in places:
             here = problem.with_part(setting.x)
-            found_bases, reason = pools(here, setting, rng)
+            bases, reason = pools(here, setting, rng)
             if reason:
                 reasons.append(reason)
                 continue
-            judgement = judged(here, *combined(here, setting, found_bases, rng))
+            judgement = judged(here, *combined(here, setting, bases, rng))
             if len(judgement.x):
                 text = f"sampled with the part at rest, draw {number}"
                 return Starts(starts=self._starts(StartOrigin.SAMPLED, text, judgement), reason="".join(reasons[:1]))
@@ -155,8 +155,8 @@ class StartGenerator:
         """Layouts drawn within the bounds, with all branches of inverse kinematics."""
         problem = self._problem
         everything = np.arange(len(problem.variables.names))
-        drawn = drawn_within(problem.variables, everything, RANDOM, rng)
-        parts = [branch_starts(problem, x, problem.start, rng) for x in drawn]
+        samples = random_within(problem.variables, everything, RANDOM, rng)
+        parts = [branch_starts(problem, x, problem.start, rng) for x in samples]
         x, start = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
         if not len(x):
             return Starts(starts=(), reason=_most_frequent([part[2] for part in parts]))

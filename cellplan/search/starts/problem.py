@@ -156,7 +156,7 @@ class StartProblem:
         lower, upper = (np.append(part, 0.0)[columns[:3]] for part in (self.variables.lower, self.variables.upper))
         return BaseBounds(is_free=columns != FIXED, lower=lower, upper=upper)
 
-    def drawn_columns(self, robot: int) -> Indices:
+    def sampled_columns(self, robot: int) -> Indices:
         """Columns of what is drawn for an operator: all its own but the positions of its joints at the start."""
         columns = self.freedom.by_robot[robot]
         return columns[~np.isin(columns, self.freedom.columns)]

@@ -67,7 +67,7 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     return values, tuple(remarks)
 
 
-def with_room_below(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0.0) -> tuple[VaryRange, ...]:
+def leaving_columns(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0.0) -> tuple[VaryRange, ...]:
     """Ranges of heights narrowed so that a column below a base, or above one that hangs, does not vanish.
 
     Args:

@@ -15,7 +15,7 @@ COSTLY_FACTOR: Final = math.log(10.0)  # [-] logarithm of the factor of a weight
 USUAL_FACTOR: Final = math.log(1.5)  # [-] logarithm of the factor of a weight that is a step
 STEPS: Final = 4.0  # [-] steps that a range has at least
 FULL_TURN: Final = 2.0 * math.pi
-TURN_ROOM: Final = 1e-9  # [rad] by which a range of a full turn may be short of it: rounding
+TURN_TOL: Final = 1e-9  # [rad] by which a range of a full turn may be short of it: rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,8 +93,8 @@ def into_turn(variable: VaryRange, value: float, lower: float, upper: float) -> 
     """An angle of a pose or a tool, by whole turns between bounds where that is possible; others as they are."""
     if not variable.is_angle or variable.kind is VariableKind.START or lower <= value <= upper:
         return value
-    moved = value + FULL_TURN * math.ceil((lower - TURN_ROOM - value) / FULL_TURN)
-    return moved if moved <= upper + TURN_ROOM else value
+    moved = value + FULL_TURN * math.ceil((lower - TURN_TOL - value) / FULL_TURN)
+    return moved if moved <= upper + TURN_TOL else value
 
 
 def _leaders(settings: LayoutSettings) -> dict[str, tuple[str, float, float]]:
@@ -121,7 +121,7 @@ def _leaders(settings: LayoutSettings) -> dict[str, tuple[str, float, float]]:
 def _is_full_turn(variable: VaryRange) -> bool:
     """Whether a range holds every direction, so that it bounds nothing."""
     is_turning = variable.is_angle and variable.kind is not VariableKind.START
-    return is_turning and variable.upper - variable.lower >= FULL_TURN - TURN_ROOM
+    return is_turning and variable.upper - variable.lower >= FULL_TURN - TURN_TOL
 
 
 def _usual(variable: VaryRange) -> float:
@@ -142,7 +142,7 @@ def _brought_in(variable: VaryRange, lower: float, upper: float) -> tuple[float,
         return 0.5 * (lower + upper), None
     value = into_turn(variable, number_of(variable, variable.given), lower, upper)
     inside = min(max(value, lower), upper)
-    if abs(inside - value) <= TURN_ROOM:
+    if abs(inside - value) <= TURN_TOL:
         return inside, None
     if variable.kind is VariableKind.WEIGHT:
         shown = [f"{math.exp(number):g}" for number in (value, lower, upper)]

@@ -15,7 +15,7 @@ from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.variables.directions import base_twists, effective_base_twists, tip_twists
 from cellplan.search.variables.neighbours import neighbour_cells
-from cellplan.search.variables.pedestals import with_pedestals, with_room_below
+from cellplan.search.variables.pedestals import leaving_columns, with_pedestals
 from cellplan.search.variables.state import State, concerned, pose_of
 from cellplan.search.variables.ties import Tied
 from cellplan.search.variables.written import written_number, written_starts, written_weight
@@ -59,7 +59,7 @@ class Variables:
         conversion, remarks = with_pedestals(cell, settings)
         base = cell.with_values(conversion)
         spare = 0.0 if settings.misplacement is None else settings.misplacement.position_mm.si
-        settings = replace(settings, ranges=with_room_below(base, settings.ranges, spare=spare))
+        settings = replace(settings, ranges=leaving_columns(base, settings.ranges, spare=spare))
         tied = Tied.of(settings)
         joints = [joint for robot in base.robots for joint in robot.model.joints]
         return cls(

@@ -7,10 +7,10 @@ import pytest
 
 
 def agrees(folder: Path, seed: int) -> None:
-    found = certified.compare(*certified.random_cell(folder, seed))
+    comparison = certified.compare(*certified.random_cell(folder, seed))
 
-    assert len(found) >= 3
-    assert [one for one in found if not one.is_right] == []
+    assert len(comparison) >= 3
+    assert [one for one in comparison if not one.is_right] == []
 
 
 def test_certified_distances_agree_with_brute_force(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

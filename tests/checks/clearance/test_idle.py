@@ -16,7 +16,7 @@ BLOCK = Box((0.1, 0.1, 0.1))
 HOME = np.array([0.1, 0.2, 0.3, 0.0, 0.5, 0.0])
 
 
-def found(q: Array, home: Array | None = HOME) -> list[Check]:
+def idle_checks(q: Array, home: Array | None = HOME) -> list[Check]:
     arm = replace(placed("arm", arm_model()), home=home)
     cell: Cell = make_cell(arm, placed("saw", slide_model(BLOCK)), tasks=(work("arm"), work("saw")))
     clock = schedule(len(q), work("saw"))
@@ -24,7 +24,7 @@ def found(q: Array, home: Array | None = HOME) -> list[Check]:
 
 
 def test_a_robot_at_its_home_passes() -> None:
-    (check,) = found(np.tile(HOME, (11, 1)))
+    (check,) = idle_checks(np.tile(HOME, (11, 1)))
 
     assert check.passed
     assert (check.name, check.subject, check.message) == (
@@ -39,7 +39,7 @@ def test_a_robot_away_from_its_home_fails_however_short_it_is_away(rows: slice) 
     q = np.tile(HOME, (11, 1))
     q[rows, 1] += np.radians(0.001)
 
-    (check,) = found(q)
+    (check,) = idle_checks(q)
 
     assert not check.passed
     assert check.value == pytest.approx(0.001)
@@ -50,4 +50,4 @@ def test_without_a_home_a_robot_has_to_stand_still_all_the_same() -> None:
     still, moved = np.tile(HOME, (11, 1)), np.tile(HOME, (11, 1))
     moved[-1, 0] += 1e-6
 
-    assert [check.passed for check in found(still, home=None) + found(moved, home=None)] == [True, False]
+    assert [check.passed for check in idle_checks(still, home=None) + idle_checks(moved, home=None)] == [True, False]

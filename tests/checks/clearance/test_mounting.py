@@ -118,8 +118,8 @@ def test_all_that_stands_passes_in_one_check() -> None:
 def test_a_first_link_without_a_foot_is_judged_over_the_whole_motion() -> None:
     model = arm_model()
     bodies = tuple(
-        replace(each, X_BS=pose((0.0, 0.0, 0.07), (0.0, 0.1, 0.0))) if each.name == "column" else each
-        for each in model.bodies[1:]
+        replace(body, X_BS=pose((0.0, 0.0, 0.07), (0.0, 0.1, 0.0))) if body.name == "column" else body
+        for body in model.bodies[1:]
     )
     cell = make_cell(placed("a", replace(model, bodies=bodies)), things=(thing("ramp", HalfSpace(), ramp(0.05)),))
     q = np.zeros((5, 6))
@@ -140,11 +140,11 @@ def ramp(angle: float) -> Array:
 def test_a_tool_on_a_flange_without_a_body_may_touch_the_link_behind(ahead: float, passed: bool) -> None:
     model = arm_model()
     bodies = tuple(
-        replace(each, shape=Box((0.2, 0.08, 0.08)), X_BS=pose((0.6 + ahead, 0.0, 1.0)))
-        if each.name == "wrist"
-        else each
-        for each in model.bodies
-        if each.name != "hand"
+        replace(body, shape=Box((0.2, 0.08, 0.08)), X_BS=pose((0.6 + ahead, 0.0, 1.0)))
+        if body.name == "wrist"
+        else body
+        for body in model.bodies
+        if body.name != "hand"
     )
 
     (check,) = judged(make_cell(placed("a", replace(model, bodies=bodies), tool=stick())))

@@ -89,49 +89,49 @@ APART = {"holder": "a", "operator": "b", "other": "c"}
 
 
 def test_a_tool_of_constant_speed_allows_its_tolerance_by_its_speed() -> None:
-    found = skew_of(cell_of(APART))
+    skew = skew_of(cell_of(APART))
 
-    (tool,) = found.tools
+    (tool,) = skew.tools
     assert tool.speed == pytest.approx(SPEED)
     assert tool.by_position == pytest.approx(LIMIT / SPEED)
     assert tool.by_orientation == MOST_SKEW
-    pair = next(each for each in found.pairs if {each.first, each.second} == {"holder", "operator"})
-    by_kind = {each.limit: each.skew for each in pair.limits}
+    pair = next(pair for pair in skew.pairs if {pair.first, pair.second} == {"holder", "operator"})
+    by_kind = {limit.limit: limit.skew for limit in pair.limits}
     assert by_kind[SkewLimit.TOOL] == pytest.approx(LIMIT / SPEED)
     assert by_kind[SkewLimit.DEPTH] == pytest.approx(1e-2 / SPEED)
     assert by_kind[SkewLimit.CLEARANCE] == MOST_SKEW
-    assert found.allowed == pytest.approx(LIMIT / SPEED)
-    assert found.alone == pytest.approx(0.5 * LIMIT / SPEED)
+    assert skew.allowed == pytest.approx(LIMIT / SPEED)
+    assert skew.alone == pytest.approx(0.5 * LIMIT / SPEED)
 
 
 def test_bodies_limit_the_pair_that_comes_near() -> None:
-    found = skew_of(cell_of(APART, clearance=0.399))
+    skew = skew_of(cell_of(APART, clearance=0.399))
 
-    pair = next(each for each in found.pairs if {each.first, each.second} == {"holder", "operator"})
-    clearance = next(each for each in pair.limits if each.limit is SkewLimit.CLEARANCE)
+    pair = next(pair for pair in skew.pairs if {pair.first, pair.second} == {"holder", "operator"})
+    clearance = next(limit for limit in pair.limits if limit.limit is SkewLimit.CLEARANCE)
     assert clearance.skew == MOST_SKEW  # 0.4 m apart however they are shifted
     assert skew_of(cell_of(APART, clearance=0.401)).allowed == 0.0
 
 
 @pytest.mark.parametrize("stated", [1e-3, 8e-3])
 def test_a_stated_skew_has_an_error_and_a_shortest_cycle(stated: float) -> None:
-    found = skew_of(cell_of(APART, skews={"a": 1e3 * stated, "b": 2e3 * stated}))
+    skew = skew_of(cell_of(APART, skews={"a": 1e3 * stated, "b": 2e3 * stated}))
 
-    (tool,) = found.tools
-    pair = next(each for each in found.pairs if {each.first, each.second} == {"holder", "operator"})
+    (tool,) = skew.tools
+    pair = next(pair for pair in skew.pairs if {pair.first, pair.second} == {"holder", "operator"})
     assert pair.stated == stated
-    assert pair.is_kept is (stated <= LIMIT / SPEED)
+    assert pair.is_met is (stated <= LIMIT / SPEED)
     assert tool.position == pytest.approx(SPEED * stated)
     assert tool.shortest_cycle == pytest.approx(stated * SPEED / LIMIT)  # the program takes 1 s
 
 
 def test_robots_of_one_controller_share_a_clock() -> None:
-    found = skew_of(cell_of({"holder": "a", "operator": "a", "other": "c"}))
+    skew = skew_of(cell_of({"holder": "a", "operator": "a", "other": "c"}))
 
-    assert found.groups == (("holder", "operator"), ("other",))
-    assert found.tools == ()
-    assert [(pair.first, pair.second) for pair in found.pairs] == [("holder", "other"), ("operator", "other")]
-    assert found.allowed == MOST_SKEW
+    assert skew.groups == (("holder", "operator"), ("other",))
+    assert skew.tools == ()
+    assert [(pair.first, pair.second) for pair in skew.pairs] == [("holder", "other"), ("operator", "other")]
+    assert skew.allowed == MOST_SKEW
 
 
 def test_a_robot_without_a_controller_has_a_clock_of_its_own() -> None:
@@ -159,10 +159,10 @@ def test_a_part_that_its_holder_keeps_at_rest_is_there_on_every_clock() -> None:
 def test_clocks_of_two_robots_of_which_one_stands_still_limit_nothing() -> None:
     scene, clock, q = run_of(cell_of(APART, clearance=0.401))  # more than they keep, which the run itself shows
 
-    found = allowed_skew(scene, clock, q | {"holder": np.zeros((SAMPLES, 1))}, ())
+    skew = allowed_skew(scene, clock, q | {"holder": np.zeros((SAMPLES, 1))}, ())
 
-    assert found.allowed == MOST_SKEW
-    assert all(limit.subject == "" for pair in found.pairs for limit in pair.limits)
+    assert skew.allowed == MOST_SKEW
+    assert all(limit.subject == "" for pair in skew.pairs for limit in pair.limits)
 
 
 def test_a_task_in_the_world_depends_on_no_other_clock() -> None:
@@ -197,5 +197,5 @@ def test_the_cell_of_four_robots_costs_half_a_millimetre_for_each_millisecond() 
 
 def _fastest(report: Report, name: str) -> float:
     """Largest speed of the tool of a task in the world between two rows."""
-    robot = next(each.robot for each in report.accuracy if each.task == name)
+    robot = next(accuracy.robot for accuracy in report.accuracy if accuracy.task == name)
     return report.speeds[robot].tool_peak

@@ -32,8 +32,8 @@ def cell_with(part: Solid, **task: object) -> Cell:
     model = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
     robot = placed("gun", model, base=pose((0.0, 0.0, 0.1), DOWN), tool=TOOL)
     tolerance = ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-3))
-    own: Task = replace(work("gun"), tolerance=tolerance, **task)
-    return make_cell(robot, part=fixed_part(part, np.eye(4)), tasks=(own,))
+    gun: Task = replace(work("gun"), tolerance=tolerance, **task)
+    return make_cell(robot, part=fixed_part(part, np.eye(4)), tasks=(gun,))
 
 
 def judged(
@@ -42,8 +42,8 @@ def judged(
     """What is said of a tip that passes these points."""
     cell = cell_with(part, **task)
     X_PT = np.array([pose((x, y, z), rpy) for x, y, z in points])
-    found = standoff_on(cell, cell.tasks[0], X_PT, times=np.arange(len(points), dtype=float))
-    return found, check_standoffs(cell, [found])
+    standoff = standoff_on(cell, cell.tasks[0], X_PT, times=np.arange(len(points), dtype=float))
+    return standoff, check_standoffs(cell, [standoff])
 
 
 @pytest.mark.parametrize("part", [PLATE, tessellate(PLATE)])
@@ -62,25 +62,25 @@ def judged(
 def test_both_distances_are_those_of_the_closed_form(
     part: Solid, point: tuple[float, ...], rpy: tuple[float, float, float], nearest: float, along: float
 ) -> None:
-    found, _ = judged([point], part, rpy=rpy)
+    judgement, _ = judged([point], part, rpy=rpy)
 
-    assert found.worst_nearest == pytest.approx(nearest, abs=6e-5)
-    assert found.worst_along == pytest.approx(along, abs=1e-9)
+    assert judgement.worst_nearest == pytest.approx(nearest, abs=6e-5)
+    assert judgement.worst_along == pytest.approx(along, abs=1e-9)
 
 
 @pytest.mark.parametrize("part", [Sphere(0.05), Cylinder(0.05, 0.02), tessellate(Cylinder(0.05, 0.02), 96)])
 def test_round_parts_are_as_far_as_their_surface(part: Solid) -> None:
-    found, _ = judged([(0.08, 0.0, 0.0)], part, rpy=(0.0, -np.pi / 2, 0.0))
+    judgement, _ = judged([(0.08, 0.0, 0.0)], part, rpy=(0.0, -np.pi / 2, 0.0))
 
     sagitta = 0.05 * (1.0 / np.cos(np.pi / 96) - 1.0) if isinstance(part, Mesh) else 0.0
-    assert found.worst_nearest == pytest.approx(0.03, abs=6e-5 + sagitta)
-    assert found.worst_along == pytest.approx(0.03, abs=1e-9 + sagitta)
+    assert judgement.worst_nearest == pytest.approx(0.03, abs=6e-5 + sagitta)
+    assert judgement.worst_along == pytest.approx(0.03, abs=1e-9 + sagitta)
 
 
 def test_a_seam_in_the_air_fails_with_its_distances_and_the_keys() -> None:
-    found, (check,) = judged([(x, 0.0, 0.07) for x in (0.0, 0.01, 0.02)], process=WELD)
+    judgement, (check,) = judged([(x, 0.0, 0.07) for x in (0.0, 0.01, 0.02)], process=WELD)
 
-    assert found.is_off
+    assert judgement.is_off
     assert not check.passed
     assert check.message == (
         "standoff of task 'work_of_gun': the tip is 60.0 mm from the part at 0.000 s, 60.0 mm along its axis; "
@@ -97,13 +97,13 @@ def test_a_process_that_states_nothing_is_at_the_surface_within_two_millimetres_
 
 
 def test_a_task_without_process_and_statement_is_only_named() -> None:
-    found, checks = judged([(0.0, 0.0, 0.07)])
+    judgement, checks = judged([(0.0, 0.0, 0.07)])
 
     assert not checks
-    lines = unstated_standoffs(cell_with(PLATE), [found])
+    lines = unstated_standoffs(cell_with(PLATE), [judgement])
     assert lines == ["standoff_mm of work_of_gun (tip 60.0 mm off the part) not stated"]
     assert not unstated_standoffs(cell_with(PLATE), [judged([(0.0, 0.0, 0.01)])[0]])
-    assert not unstated_standoffs(cell_with(PLATE, process=WELD), [found])
+    assert not unstated_standoffs(cell_with(PLATE, process=WELD), [judgement])
 
 
 @pytest.mark.parametrize(
@@ -134,10 +134,10 @@ def test_run_in_and_run_out_are_excused_by_name_only() -> None:
     assert not judged(CUT, process=WELD)[1][0].passed
     assert not judged(CUT, process=WELD, off_part=(OffPart.RUN_IN,))[1][0].passed
 
-    found, (check,) = judged(CUT, process=WELD, off_part=(OffPart.RUN_IN, OffPart.RUN_OUT))
+    judgement, (check,) = judged(CUT, process=WELD, off_part=(OffPart.RUN_IN, OffPart.RUN_OUT))
 
     assert check.passed
-    assert dict(found.excused) == pytest.approx({"run_in": 0.03, "run_out": 0.02})
+    assert dict(judgement.excused) == pytest.approx({"run_in": 0.03, "run_out": 0.02})
     assert check.message.endswith("; excused: run_in over 30.0 mm, run_out over 20.0 mm")
 
 
@@ -151,10 +151,10 @@ def test_a_cut_that_leaves_the_part_is_excused_by_name_only() -> None:
 def test_no_name_excuses_a_path_that_is_nowhere_at_the_part() -> None:
     points = [(x, 0.0, 0.07) for x in (0.0, 0.01, 0.02)]
 
-    found, (check,) = judged(points, process=WELD, off_part=tuple(OffPart))
+    judgement, (check,) = judged(points, process=WELD, off_part=tuple(OffPart))
 
     assert not check.passed
-    assert not found.excused
+    assert not judgement.excused
 
 
 def test_written_rows_count_from_the_start_of_the_path_to_its_end() -> None:
@@ -162,7 +162,7 @@ def test_written_rows_count_from_the_start_of_the_path_to_its_end() -> None:
     q = np.array([0.09, 0.01, 0.01, 0.09])[:, None]  # away, on the path, away
     times = np.array([0.0, 1.0, 2.0, 3.0])
 
-    def found(task: Task) -> tuple[Standoff, ...]:
+    def standoff(task: Task) -> tuple[Standoff, ...]:
         scheduled = TaskSchedule(
             task=task,
             X_PT=np.broadcast_to(np.eye(4), (4, 4, 4)),
@@ -174,10 +174,10 @@ def test_written_rows_count_from_the_start_of_the_path_to_its_end() -> None:
         chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
         return standoffs(cell, Schedule(times=times, tasks=(scheduled,)), chains, {"gun": q})
 
-    (at_path,) = found(cell.tasks[0])
-    (throughout,) = found(replace(cell.tasks[0], start=0.0))
+    (at_path,) = standoff(cell.tasks[0])
+    (throughout,) = standoff(replace(cell.tasks[0], start=0.0))
 
     assert at_path.nearest == pytest.approx((0.0, 0.0), abs=1e-5)
     assert not at_path.is_off
     assert throughout.nearest[1] == pytest.approx(0.08, abs=1e-4)
-    assert found(replace(cell.tasks[0], relative_to=Frame.WORLD)) == ()
+    assert standoff(replace(cell.tasks[0], relative_to=Frame.WORLD)) == ()

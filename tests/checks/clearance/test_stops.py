@@ -54,11 +54,11 @@ def convoy(stop: StopEntry | None = None) -> tuple[Cell, Schedule, dict[str, Arr
 def test_a_robot_runs_up_on_the_one_ahead_by_its_reaction_and_half_of_its_braking() -> None:
     cell, schedule, q = convoy()
 
-    found = stop_report(Scene.from_cell(cell), schedule, q)
+    report = stop_report(Scene.from_cell(cell), schedule, q)
 
-    assert found is not None
-    assert found.runs_on == pytest.approx({"rear": 0.25, "front": 0.1})
-    (pair,) = found.distances
+    assert report is not None
+    assert report.runs_on == pytest.approx({"rear": 0.25, "front": 0.1})
+    (pair,) = report.distances
     truth = 0.3 - SPEED * 0.25  # 0.3 m between the balls while both move
     too_far = SPEED * 0.35 / BAND_PARTS
     assert truth - too_far - MINIMUM_TOL - EXACT <= pair.proved <= pair.distance <= truth + EXACT
@@ -71,10 +71,10 @@ def test_a_robot_runs_up_on_the_one_ahead_by_its_reaction_and_half_of_its_brakin
 def test_a_single_stop_is_followed_exactly(robot: str, truth: float) -> None:
     cell, schedule, q = convoy()
 
-    found = one_stop(Scene.from_cell(cell), schedule, q, robot=robot, at=0.7)
+    stop = one_stop(Scene.from_cell(cell), schedule, q, robot=robot, at=0.7)
 
-    assert found is not None
-    (pair,) = found.distances
+    assert stop is not None
+    (pair,) = stop.distances
     assert truth - MINIMUM_TOL - EXACT <= pair.proved <= pair.distance <= truth + MINIMUM_TOL
     assert pair.worst is not None
     assert pair.worst.stopped in {robot, "front"}
@@ -84,10 +84,10 @@ def test_a_single_stop_is_followed_exactly(robot: str, truth: float) -> None:
 def test_stops_count_to_the_end_of_the_program_only() -> None:
     cell, schedule, q = convoy()
 
-    found = one_stop(Scene.from_cell(cell), schedule, q, robot="front", at=1.9)
+    stop = one_stop(Scene.from_cell(cell), schedule, q, robot="front", at=1.9)
 
-    assert found is not None
-    assert found.distances[0].distance == pytest.approx(0.3 - SPEED * 0.1, abs=MINIMUM_TOL + EXACT)
+    assert stop is not None
+    assert stop.distances[0].distance == pytest.approx(0.3 - SPEED * 0.1, abs=MINIMUM_TOL + EXACT)
 
 
 @pytest.mark.parametrize(("demand", "passed"), [(0.08, True), (0.12, False)])
@@ -130,15 +130,15 @@ def pressed(stop: StopEntry | None = None) -> tuple[Cell, Schedule, dict[str, Ar
 def test_a_part_that_goes_on_runs_onto_the_stopped_tool() -> None:
     cell, schedule, q = pressed(StopEntry(depth_mm=30.0))
 
-    found = stop_report(Scene.from_cell(cell), schedule, q)
+    report = stop_report(Scene.from_cell(cell), schedule, q)
 
-    assert found is not None
-    (depth,) = found.depths
+    assert report is not None
+    (depth,) = report.depths
     assert depth.depth == pytest.approx(0.1 * 0.4, abs=1e-5)  # the table goes on for 0.2 s and half of 0.4 s
     assert depth.worst is not None
     assert (depth.worst.stopped, depth.worst.going) == ("pen", "table")
     assert depth.worst.path_s - depth.worst.at_s == pytest.approx(0.4, abs=1e-6)
-    (check,) = check_stops(cell, found)
+    (check,) = check_stops(cell, report)
     assert not check.passed
     assert check.value == pytest.approx(40.0, abs=0.01)
 
@@ -146,28 +146,30 @@ def test_a_part_that_goes_on_runs_onto_the_stopped_tool() -> None:
 def test_a_tool_that_goes_on_leaves_the_stopped_part() -> None:
     cell, schedule, q = pressed()
 
-    found = one_stop(Scene.from_cell(cell), schedule, q, robot="table", at=1.0)
+    stop = one_stop(Scene.from_cell(cell), schedule, q, robot="table", at=1.0)
 
-    assert found is not None
-    assert found.depths[0].depth == pytest.approx(0.0, abs=1e-9)
+    assert stop is not None
+    assert stop.depths[0].depth == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_part_that_nobody_carries_is_run_onto_by_no_stop() -> None:
     cell, schedule, q = pressed()
     cell = replace(cell, robots=cell.robots[1:], part=fixed_part(cell.part.shape, np.eye(4)))
 
-    found = stop_report(Scene.from_cell(cell), schedule, {"pen": q["pen"]})
+    report = stop_report(Scene.from_cell(cell), schedule, {"pen": q["pen"]})
 
-    assert found is not None
-    assert found.depths == ()
-    assert found.distances == ()
+    assert report is not None
+    assert report.depths == ()
+    assert report.distances == ()
 
 
 def test_nothing_is_said_where_no_controller_states_how_its_robots_go_on() -> None:
     cell, schedule, q = convoy(StopEntry(clearance_mm=10.0))
     silent = replace(
         cell,
-        controllers={name: each.changed(reaction_ms=None, brake_s=None) for name, each in cell.controllers.items()},
+        controllers={
+            name: controller.changed(reaction_ms=None, brake_s=None) for name, controller in cell.controllers.items()
+        },
     )
 
     assert stop_report(Scene.from_cell(silent), schedule, q) is None
@@ -183,10 +185,10 @@ def test_two_robots_of_which_one_stands_still_are_as_near_as_without_a_stop(stil
     q["front" if still == "rear" else "rear"] = 0.1 * schedule.times[:, None]
     truth = 0.3 if still == "rear" else 0.1  # the other one moves by 0.2 m, away or nearer
 
-    found = stop_report(Scene.from_cell(cell), schedule, q)
+    report = stop_report(Scene.from_cell(cell), schedule, q)
 
-    assert found is not None
-    (pair,) = found.distances
+    assert report is not None
+    (pair,) = report.distances
     assert truth - MINIMUM_TOL - EXACT <= pair.proved <= pair.distance <= truth + MINIMUM_TOL + EXACT
     assert pair.worst is not None
     assert pair.worst.at_s == pair.worst.path_s
@@ -195,20 +197,20 @@ def test_two_robots_of_which_one_stands_still_are_as_near_as_without_a_stop(stil
 def test_two_robots_that_stand_still_are_measured_where_they_stand() -> None:
     cell, schedule, q = convoy()
 
-    found = stop_report(Scene.from_cell(cell), schedule, {name: np.zeros_like(rows) for name, rows in q.items()})
+    report = stop_report(Scene.from_cell(cell), schedule, {name: np.zeros_like(rows) for name, rows in q.items()})
 
-    assert found is not None
-    assert found.distances[0].distance == pytest.approx(0.3, abs=EXACT)
+    assert report is not None
+    assert report.distances[0].distance == pytest.approx(0.3, abs=EXACT)
 
 
 def test_a_tool_on_a_part_at_rest_is_as_deep_as_without_a_stop() -> None:
     cell, schedule, q = pressed()
     inwards = {"table": np.zeros_like(q["table"]), "pen": -0.015 * schedule.times[:, None]}
 
-    found = stop_report(Scene.from_cell(cell), schedule, inwards)
+    report = stop_report(Scene.from_cell(cell), schedule, inwards)
 
-    assert found is not None
-    assert found.depths[0].depth == pytest.approx(0.03, abs=1e-5)
+    assert report is not None
+    assert report.depths[0].depth == pytest.approx(0.03, abs=1e-5)
 
 
 @pytest.mark.slow

@@ -93,11 +93,11 @@ def test_every_class_agrees_with_a_brute_force_search(seed: int) -> None:
     for contact in report.contacts:
         assert distance_of(scene, by_name[contact.pair], interpolated(scene, q, 79 * contact.first_s)) == 0.0
     for kind, at_samples in smallest.items():
-        found = report.minima[kind]
-        assert found.certified
-        assert found.minimum <= at_samples + EXACT / 2
-        there = distance_of(scene, by_name[found.pair], interpolated(scene, q, 79 * found.at_s))
-        assert found.minimum <= there + 1e-9 <= found.minimum + EXACT  # rounding of the instant
+        result = report.minima[kind]
+        assert result.certified
+        assert result.minimum <= at_samples + EXACT / 2
+        there = distance_of(scene, by_name[result.pair], interpolated(scene, q, 79 * result.at_s))
+        assert result.minimum <= there + 1e-9 <= result.minimum + EXACT  # rounding of the instant
 
 
 @pytest.mark.parametrize("seed", [0, *MORE[:2]])
@@ -123,13 +123,13 @@ def test_no_instant_between_the_samples_is_nearer_than_the_minimum(seed: int) ->
 def test_points_of_a_minimum_lie_on_its_bodies_as_far_apart_as_it_says() -> None:
     scene, q = Scene.from_cell(two_arms()), swinging(0, 80)
     report, _ = check_clearance(scene, schedule(80), q)
-    measured = [found for found in report.minima.values() if found.minimum]
+    measured = [value for value in report.minima.values() if value.minimum]
 
     assert measured
-    for found in measured:
-        p, q_ = np.array(found.points)
-        assert found.minimum - 4e-5 <= np.linalg.norm(q_ - p)  # points of round bodies lie on fine prisms round them
-        assert np.linalg.norm(q_ - p) <= found.minimum + EXACT
+    for entry in measured:
+        p, q_ = np.array(entry.points)
+        assert entry.minimum - 4e-5 <= np.linalg.norm(q_ - p)  # points of round bodies lie on fine prisms round them
+        assert np.linalg.norm(q_ - p) <= entry.minimum + EXACT
 
 
 def test_the_closest_pairs_are_listed_nearest_first() -> None:

@@ -37,7 +37,7 @@ def cell_with(tool: Tool, part: Solid, task: Task | None = None) -> Cell:
     )
 
 
-def found(cell: Cell, heights: Sequence[float] | Array) -> tuple[ToolDepth, Check]:
+def depth_of(cell: Cell, heights: Sequence[float] | Array) -> tuple[ToolDepth, Check]:
     """What is said of a tool whose tip passes these heights in [m], one after another in 1 s."""
     q = np.asarray(heights, dtype=float)[:, None]
     times = np.linspace(0.0, 1.0, len(q))
@@ -58,7 +58,7 @@ def found(cell: Cell, heights: Sequence[float] | Array) -> tuple[ToolDepth, Chec
 @pytest.mark.parametrize("tool", [PEN, BARE])
 @pytest.mark.parametrize("part", [SHEET, tessellate(SHEET)])
 def test_a_pen_through_a_sheet_fails_with_all_that_is_inside_and_beyond(tool: Tool, part: Solid) -> None:
-    depth, check = found(cell_with(tool, part), [0.05, 0.001, -0.014, 0.02])
+    depth, check = depth_of(cell_with(tool, part), [0.05, 0.001, -0.014, 0.02])
 
     assert depth.depth == pytest.approx(0.015, abs=1e-9)
     assert depth.at_s == pytest.approx(2.0 / 3.0)
@@ -70,7 +70,7 @@ def test_a_pen_through_a_sheet_fails_with_all_that_is_inside_and_beyond(tool: To
 
 @pytest.mark.parametrize("tool", [PEN, BARE])
 def test_a_tool_that_touches_or_hovers_passes(tool: Tool) -> None:
-    depth, check = found(cell_with(tool, SHEET), np.linspace(0.05, 0.001, 51))
+    depth, check = depth_of(cell_with(tool, SHEET), np.linspace(0.05, 0.001, 51))
 
     assert depth.depth == pytest.approx(0.0, abs=1e-9)
     assert check.passed
@@ -80,13 +80,13 @@ def test_a_plunge_between_two_rows_is_found_where_joints_move_evenly() -> None:
     block = Box((0.4, 0.4, 0.1))
     q = [0.2, 0.04, 0.2]
 
-    depth, _ = found(cell_with(BARE, block), q)
+    depth, _ = depth_of(cell_with(BARE, block), q)
 
     assert (depth.depth, depth.at_s) == (pytest.approx(0.01, abs=1e-9), pytest.approx(0.5))
 
 
 def test_a_thin_plate_that_is_passed_between_two_rows_is_found() -> None:
-    depth, check = found(cell_with(BARE, SHEET), [0.05, -0.3])  # below -0.12 the tool is beyond the sheet wholly
+    depth, check = depth_of(cell_with(BARE, SHEET), [0.05, -0.3])  # below -0.12 the tool is beyond the sheet wholly
 
     assert depth.depth > 0.09
     assert depth.at_s not in (0.0, 1.0)
@@ -97,7 +97,7 @@ def test_a_thin_plate_that_is_passed_between_two_rows_is_found() -> None:
 def test_a_task_that_cuts_may_be_as_deep_as_it_says(allowed: float, passes: bool) -> None:
     task = replace(work("drill"), tool_depth=allowed)
 
-    depth, check = found(cell_with(PEN, Box((0.4, 0.4, 0.1)), task), [0.1, 0.047 - 1e-9, 0.1])
+    depth, check = depth_of(cell_with(PEN, Box((0.4, 0.4, 0.1)), task), [0.1, 0.047 - 1e-9, 0.1])
 
     assert (check.passed, check.limit) == (passes, pytest.approx(1e3 * allowed))
     assert depth.depth == pytest.approx(0.003, abs=1e-8)
@@ -128,7 +128,7 @@ def test_the_cure_fits_the_task() -> None:
         "check the points and axes of the file": replace(work("drill"), path=file),
     }
     for cure, task in words.items():
-        _, check = found(cell_with(BARE, Box((0.4, 0.4, 0.1)), task), [0.0, 0.0])
+        _, check = depth_of(cell_with(BARE, Box((0.4, 0.4, 0.1)), task), [0.0, 0.0])
         assert f"; {cure}" in check.message
         assert check.message.endswith("allow it with tool_depth_mm if the process removes material")
 

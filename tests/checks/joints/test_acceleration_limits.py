@@ -30,7 +30,9 @@ def turning(share: Array, joint: int = 0, *, by: float = 1.0) -> Array:
     return q
 
 
-def found(cell: Cell, q: Array, schedule: Schedule | None = None) -> tuple[MotionAccelerations, dict[str, list[Check]]]:
+def accelerations_of(
+    cell: Cell, q: Array, schedule: Schedule | None = None
+) -> tuple[MotionAccelerations, dict[str, list[Check]]]:
     clock = schedule or circle_schedule(cell, steps=len(q) - 1)
     chains = {"arm": ScrewChain(cell.robots[0])}
     X_WP = chains["arm"].tool_poses(q) if cell.part.held_by else np.eye(4)[None]
@@ -51,9 +53,9 @@ def times_of(steps: int) -> Array:
 
 
 def test_every_joint_is_judged_and_an_assumed_limit_is_named_as_such() -> None:
-    _, checks = found(planar_arm_cell(), turning(smooth(times_of(STEPS))))
+    _, checks = accelerations_of(planar_arm_cell(), turning(smooth(times_of(STEPS))))
 
-    assert {name: len(own) for name, own in checks.items()} == {"joint_acceleration_assumed": 4}
+    assert {name: len(checks_of_joint) for name, checks_of_joint in checks.items()} == {"joint_acceleration_assumed": 4}
     first, *_, last = checks["joint_acceleration_assumed"]
     assert first.passed
     assert first.value == pytest.approx(np.degrees(10.0 / np.sqrt(3.0)), rel=1e-4)
@@ -64,7 +66,9 @@ def test_every_joint_is_judged_and_an_assumed_limit_is_named_as_such() -> None:
 
 @pytest.mark.parametrize(("limit", "passed"), [(5.8, True), (5.7, False)])
 def test_a_stated_limit_is_held_on_both_sides(limit: float, passed: bool) -> None:
-    _, checks = found(planar_arm_cell(limits={"q1": {"acceleration": limit}}), turning(smooth(times_of(STEPS))))
+    _, checks = accelerations_of(
+        planar_arm_cell(limits={"q1": {"acceleration": limit}}), turning(smooth(times_of(STEPS)))
+    )
 
     (check,) = checks["joint_acceleration"]
     assert check.passed == passed
@@ -74,7 +78,7 @@ def test_a_stated_limit_is_held_on_both_sides(limit: float, passed: bool) -> Non
 
 @pytest.mark.parametrize("steps", [1000, 100, 20])
 def test_a_motion_that_starts_at_speed_fails_at_any_step_and_says_why(steps: int) -> None:
-    _, checks = found(planar_arm_cell(), turning(times_of(steps)))
+    _, checks = accelerations_of(planar_arm_cell(), turning(times_of(steps)))
 
     first = checks["joint_acceleration_assumed"][0]
     assert not first.passed
@@ -84,7 +88,9 @@ def test_a_motion_that_starts_at_speed_fails_at_any_step_and_says_why(steps: int
 
 def test_unlimited_accelerations_are_reported_with_the_reason_and_not_judged() -> None:
     rule = AccelerationRule(full_speed_in=(), is_unlimited=True, reason="a study")
-    accelerations, checks = found(ruled(rule, {"q1": {"acceleration": 0.1, "jerk": 0.1}}), turning(times_of(STEPS)))
+    accelerations, checks = accelerations_of(
+        ruled(rule, {"q1": {"acceleration": 0.1, "jerk": 0.1}}), turning(times_of(STEPS))
+    )
 
     assert not checks
     assert accelerations.joints[0].source is LimitSource.UNLIMITED
@@ -94,7 +100,7 @@ def test_unlimited_accelerations_are_reported_with_the_reason_and_not_judged() -
 
 @pytest.mark.parametrize(("limit", "passed"), [(60.0, True), (55.0, False)])
 def test_jerk_is_held_where_a_limit_is_stated(limit: float, passed: bool) -> None:
-    _, checks = found(planar_arm_cell(limits={"q2": {"jerk": limit}}), turning(smooth(times_of(STEPS)), 1))
+    _, checks = accelerations_of(planar_arm_cell(limits={"q2": {"jerk": limit}}), turning(smooth(times_of(STEPS)), 1))
 
     (check,) = checks["joint_jerk"]
     assert check.passed == passed
@@ -106,10 +112,10 @@ def test_the_instant_at_which_a_joint_fails_is_left_out_and_reported() -> None:
     cell = planar_arm_cell()
     times = times_of(STEPS)
     share = np.minimum(smooth(times), smooth(np.array([0.0, 0.5, 1.0]))[1])  # stops at once in the middle
-    assert not found(cell, turning(share))[1]["joint_acceleration_assumed"][0].passed
+    assert not accelerations_of(cell, turning(share))[1]["joint_acceleration_assumed"][0].passed
 
     locked = replace(cell.motion, locked=(LockedJoint(robot="arm", joint="q1", since=0.5),))
-    accelerations, checks = found(replace(cell, motion=locked), turning(share))
+    accelerations, checks = accelerations_of(replace(cell, motion=locked), turning(share))
 
     assert all(check.passed for check in checks["joint_acceleration_assumed"])
     assert [left.what for left in accelerations.not_judged] == ["accelerations at 0.500 s, when arm/q1 fails"]
@@ -123,7 +129,7 @@ def test_tool_and_part_are_reported_in_the_world_and_the_part_may_be_limited() -
     part = replace(
         cell.part, shape=Box((0.4, 0.02, 0.02)), X_PS=np.eye(4), X_WP=None, held_by=(Grasp(robot="arm", X_PT=pose()),)
     )
-    accelerations, _ = found(replace(cell, part=part), q)
+    accelerations, _ = accelerations_of(replace(cell, part=part), q)
     tau = times_of(STEPS)
     rate, speeding = 30.0 * (tau * (1.0 - tau)) ** 2, 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau)
     per_metre = float(np.hypot(rate**2, speeding).max())
@@ -134,7 +140,7 @@ def test_tool_and_part_are_reported_in_the_world_and_the_part_may_be_limited() -
     assert accelerations.part.corner.peak == pytest.approx(float(np.hypot(4 * LINK + 0.2, 0.01)) * per_metre, rel=1e-4)
     for limit, passed in ((5.9, True), (5.8, False)):
         strict = replace(cell, part=part, checks=cell.checks.changed(part_acceleration_m_s2=limit))
-        (check,) = found(strict, q)[1]["part_acceleration"]
+        (check,) = accelerations_of(strict, q)[1]["part_acceleration"]
         assert check.passed == passed
 
 
@@ -144,7 +150,7 @@ def test_process_speed_has_mean_peak_and_the_stretches_that_are_slower(
 ) -> None:
     cell = planar_arm_cell()
     schedule = circle_schedule(cell, smooth=is_smooth)
-    accelerations, _ = found(cell, inverse_of(schedule), schedule)
+    accelerations, _ = accelerations_of(cell, inverse_of(schedule), schedule)
 
     speed = accelerations.process[cell.tasks[0].name]
     assert speed.mean == pytest.approx(2.0 * np.pi * RADIUS, rel=1e-3)

@@ -33,19 +33,19 @@ def sizes(times: Array, positions: Array) -> Array:
 @pytest.mark.parametrize("step", [0.001, 0.004, 0.01, 0.02, 0.05])
 def test_a_quintic_from_rest_to_rest_has_its_peak_and_no_jump(step: float) -> None:
     times = clock(step)
-    found = joint_accelerations(times, quintic(times)[:, None], cycle=CYCLE)
+    rows = joint_accelerations(times, quintic(times)[:, None], cycle=CYCLE)
 
-    assert found.values.max() == pytest.approx(10.0 / np.sqrt(3.0), rel=0.03)
-    assert not found.is_jump.any()
+    assert rows.values.max() == pytest.approx(10.0 / np.sqrt(3.0), rel=0.03)
+    assert not rows.is_jump.any()
 
 
 @pytest.mark.parametrize("step", [0.001, 0.004, 0.01, 0.02, 0.05])
 def test_even_speeding_up_from_rest_is_no_jump(step: float) -> None:
     times = clock(step)
-    found = joint_accelerations(times, ramp(times)[:, None], cycle=CYCLE)
+    rows = joint_accelerations(times, ramp(times)[:, None], cycle=CYCLE)
 
-    assert found.values.max() == pytest.approx(4.0, rel=1e-6)
-    assert not found.is_jump.any()
+    assert rows.values.max() == pytest.approx(4.0, rel=1e-6)
+    assert not rows.is_jump.any()
 
 
 @pytest.mark.parametrize("step", [0.001, 0.01])
@@ -59,21 +59,21 @@ def test_speeds_that_grow_by_the_same_amount_in_every_step_are_no_jump(step: flo
 @pytest.mark.parametrize(("step", "over"), [(0.001, 0.001), (0.004, 0.004), (0.02, CYCLE), (0.05, CYCLE)])
 def test_a_motion_that_starts_and_ends_at_speed_jumps_over_the_step_or_the_cycle(step: float, over: float) -> None:
     times = clock(step)
-    found = joint_accelerations(times, 0.3 * times[:, None], cycle=CYCLE)
+    rows = joint_accelerations(times, 0.3 * times[:, None], cycle=CYCLE)
 
-    assert found.values[[0, -1], 0] == pytest.approx([0.3 / over, 0.3 / over])
-    assert found.values[1:-1].max() < 1e-6
-    assert found.is_jump[[0, -1], 0].all()
+    assert rows.values[[0, -1], 0] == pytest.approx([0.3 / over, 0.3 / over])
+    assert rows.values[1:-1].max() < 1e-6
+    assert rows.is_jump[[0, -1], 0].all()
 
 
 @pytest.mark.parametrize("step", [0.001, 0.02])
 def test_a_jump_in_the_middle_of_a_program_is_found(step: float) -> None:
     times = clock(step)
-    found = joint_accelerations(times, np.maximum(times - 0.5, 0.0)[:, None], cycle=CYCLE)
+    rows = joint_accelerations(times, np.maximum(times - 0.5, 0.0)[:, None], cycle=CYCLE)
 
     k = int(np.searchsorted(times, 0.5 - 1e-9))
-    assert found.values[k, 0] == pytest.approx(1.0 / min(step, CYCLE))
-    assert found.is_jump[k, 0]
+    assert rows.values[k, 0] == pytest.approx(1.0 / min(step, CYCLE))
+    assert rows.is_jump[k, 0]
 
 
 def test_a_joint_that_stands_still_has_no_acceleration() -> None:
@@ -86,11 +86,11 @@ def test_accelerations_of_a_point_on_a_circle() -> None:
     angle = 2.0 * np.pi * quintic(times)
     points = 0.5 * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
 
-    found = np.linalg.norm(point_accelerations(times, points), axis=1)
+    result = np.linalg.norm(point_accelerations(times, points), axis=1)
 
     middle = len(times) // 2  # fastest there, and not speeding up
-    assert found[middle] == pytest.approx(0.5 * (2.0 * np.pi * 1.875) ** 2, rel=1e-3)
-    assert found[0] == pytest.approx(0.0, abs=0.1)
+    assert result[middle] == pytest.approx(0.5 * (2.0 * np.pi * 1.875) ** 2, rel=1e-3)
+    assert result[0] == pytest.approx(0.0, abs=0.1)
 
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=40), st.sampled_from([0.001, 0.004, 0.03]))
@@ -114,17 +114,17 @@ def test_a_motion_run_backwards_has_the_same_accelerations(speeds: list[float], 
 @pytest.mark.parametrize("step", [0.0005, 0.001, 0.003, 0.004, 0.01, 0.02])
 def test_jerk_of_a_quintic_is_right_for_steps_shorter_and_longer_than_the_window(step: float) -> None:
     times = clock(step, 0.999 if step == 0.003 else 1.0)
-    found = jerks(times, point_accelerations(times, quintic(times))[:, None, None], window=CYCLE)
+    jerk = jerks(times, point_accelerations(times, quintic(times))[:, None, None], window=CYCLE)
 
     exact = 60.0 / times[-1] ** 3
-    assert exact * (1.0 - 10.0 * max(step, CYCLE)) <= found.max() <= exact * (1.0 + 1e-6)
+    assert exact * (1.0 - 10.0 * max(step, CYCLE)) <= jerk.max() <= exact * (1.0 + 1e-6)
 
 
 def test_a_jump_of_acceleration_counts_over_the_window_and_not_over_the_step() -> None:
     times = clock(0.001)
-    found = jerks(times, point_accelerations(times, ramp(times))[:, None, None], window=CYCLE)
+    jerk = jerks(times, point_accelerations(times, ramp(times))[:, None, None], window=CYCLE)
 
-    assert found.max() == pytest.approx(8.0 / CYCLE, rel=1e-6)  # from +4 to -4
+    assert jerk.max() == pytest.approx(8.0 / CYCLE, rel=1e-6)  # from +4 to -4
 
 
 @pytest.mark.parametrize("window", [0.001, 0.0025, 0.004, 0.05, 3.0])
@@ -137,6 +137,6 @@ def test_jerk_is_the_largest_change_over_any_window_of_that_length(window: float
     from_times = np.concatenate([known, known - window])  # a piecewise linear change is largest at a corner
     changes = np.interp(from_times + window, known, values) - np.interp(from_times, known, values)
 
-    found = jerks(times, accelerations[:, None, None], window=window)
+    jerk = jerks(times, accelerations[:, None, None], window=window)
 
-    assert found.max() * window == pytest.approx(np.abs(changes).max(), rel=1e-6)
+    assert jerk.max() * window == pytest.approx(np.abs(changes).max(), rel=1e-6)

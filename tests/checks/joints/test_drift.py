@@ -42,38 +42,38 @@ def positions(**drifting):
 def test_the_drift_of_each_cycle_is_found_with_its_sign():
     q = positions(a_turn=0.01 * TIMES, b_slide=-0.002 * TIMES**2)
 
-    found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0)), q)
+    drift = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0)), q)
 
-    turn, _, _, slide = found.drifts
-    assert (found.cycles, found.period, found.closes) == (4, pytest.approx(1.0, abs=1e-15), False)
+    turn, _, _, slide = drift.drifts
+    assert (drift.cycles, drift.period, drift.closes) == (4, pytest.approx(1.0, abs=1e-15), False)
     assert turn.drift == pytest.approx([0.01] * 4, abs=1e-15)
     assert slide.drift == pytest.approx([-0.002, -0.006, -0.010, -0.014], abs=1e-15)
     assert (slide.worst, slide.at_cycle, slide.is_revolute) == (pytest.approx(0.014, abs=1e-15), 4, False)
 
 
 def test_between_two_samples_a_joint_moves_evenly():
-    found = repeatability(CELL, clocked((0.005, 0.0125)), positions(a_turn=TIMES))
+    drift = repeatability(CELL, clocked((0.005, 0.0125)), positions(a_turn=TIMES))
 
     swing = 0.3 * np.sin(2.0 * np.pi * TIMES)
     expected = 0.5 * (swing[0] + swing[1]) + 0.005
-    assert found.drifts[0].drift[0] == pytest.approx(expected, abs=1e-15)
-    assert found.period is None  # 5 ms and 7.5 ms
+    assert drift.drifts[0].drift[0] == pytest.approx(expected, abs=1e-15)
+    assert drift.period is None  # 5 ms and 7.5 ms
 
 
 def test_tasks_that_do_not_come_back_together_make_one_cycle_of_the_run():
-    found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), (2.0, 4.0)), positions(b_turn=0.01 * TIMES))
+    drift = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), (2.0, 4.0)), positions(b_turn=0.01 * TIMES))
 
-    assert found.cycle_times.tolist() == [0.0, 4.0]
-    assert found.drifts[2].drift == pytest.approx([0.04], abs=1e-15)
+    assert drift.cycle_times.tolist() == [0.0, 4.0]
+    assert drift.drifts[2].drift == pytest.approx([0.04], abs=1e-15)
 
 
 def test_one_cycle_of_the_run_lasts_from_the_first_start_to_the_last_end():
     timed = clocked((1.0, 3.0), (2.0, 4.0))
     late = replace(timed.tasks[0], task=replace(timed.tasks[0].task, start=0.5))
 
-    found = repeatability(CELL, replace(timed, tasks=(late, timed.tasks[1])), positions())
+    drift = repeatability(CELL, replace(timed, tasks=(late, timed.tasks[1])), positions())
 
-    assert found.cycle_times.tolist() == [0.0, 4.0]
+    assert drift.cycle_times.tolist() == [0.0, 4.0]
 
 
 def test_an_open_task_or_none_leaves_nothing_to_say():
@@ -84,10 +84,10 @@ def test_an_open_task_or_none_leaves_nothing_to_say():
 def test_cycles_that_begin_while_the_tool_settles_are_left_out():
     transient = 0.5 * np.exp(-20.0 * TIMES)
 
-    found = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), settle=0.7), positions(a_turn=transient))
+    drift = repeatability(CELL, clocked((1.0, 2.0, 3.0, 4.0), settle=0.7), positions(a_turn=transient))
 
-    assert found.cycle_times.tolist() == [1.0, 2.0, 3.0, 4.0]
-    assert found.closes
+    assert drift.cycle_times.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert drift.closes
     assert repeatability(CELL, clocked((4.0,), settle=0.7), positions()) is None
 
 

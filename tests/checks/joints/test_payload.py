@@ -90,11 +90,11 @@ def test_an_upright_axis_feels_no_weight_but_the_acceleration_of_the_written_mot
 def test_second_differences_take_the_motion_to_be_at_rest_before_and_after() -> None:
     points = 3.0 * TIMES[:, None] * np.array([1.0, 0.0, 0.0])  # starts and ends with a jump
 
-    found = point_accelerations(TIMES, points)
+    accelerations = point_accelerations(TIMES, points)
 
-    assert found[0, 0] == pytest.approx(3.0 / 0.001)
-    assert found[-1, 0] == pytest.approx(-3.0 / 0.001)
-    np.testing.assert_allclose(found[1:-1], 0.0, atol=1e-6)
+    assert accelerations[0, 0] == pytest.approx(3.0 / 0.001)
+    assert accelerations[-1, 0] == pytest.approx(-3.0 / 0.001)
+    np.testing.assert_allclose(accelerations[1:-1], 0.0, atol=1e-6)
 
 
 def test_the_part_weighs_at_its_centre_with_the_inertia_of_its_shape() -> None:

@@ -45,13 +45,13 @@ class Desired:
 
     def poses(self, times: Array) -> tuple[Array, ...]:
         share = np.clip(times - 0.5, 0.0, 1.0)
-        way = SPEED * (smooth(share) if self.is_smooth else share)
+        travel = SPEED * (smooth(share) if self.is_smooth else share)
         X_PT = np.tile(np.eye(4), (len(times), 1, 1))
         if self.turns:
-            X_PT[:, 0, 0] = X_PT[:, 1, 1] = np.cos(way)
-            X_PT[:, 1, 0], X_PT[:, 0, 1] = np.sin(way), -np.sin(way)
+            X_PT[:, 0, 0] = X_PT[:, 1, 1] = np.cos(travel)
+            X_PT[:, 1, 0], X_PT[:, 0, 1] = np.sin(travel), -np.sin(travel)
         else:
-            X_PT[:, 0, 3] = way
+            X_PT[:, 0, 3] = travel
         return (X_PT,)
 
 
@@ -79,21 +79,21 @@ def test_a_jump_after_an_approach_is_found_at_and_between_rows_of_any_step(step:
 @pytest.mark.parametrize("step", STEPS)
 def test_a_known_jump_counts_over_the_cycle_of_the_controller(step: float) -> None:
     times = rows(step)
-    found = joint_accelerations(times, approached(times, 1.0)[:, None], cycle=CYCLE, jumps_at=np.array([1.0]))
+    result = joint_accelerations(times, approached(times, 1.0)[:, None], cycle=CYCLE, jumps_at=np.array([1.0]))
 
     row = round(1.0 / step)
-    assert found.values[row, 0] == pytest.approx(SPEED / min(step, CYCLE), rel=0.1)
-    assert found.is_jump[row, 0]
+    assert result.values[row, 0] == pytest.approx(SPEED / min(step, CYCLE), rel=0.1)
+    assert result.is_jump[row, 0]
 
 
 @pytest.mark.parametrize("step", STEPS)
 def test_a_joint_that_moves_smoothly_where_the_tool_jumps_has_no_jump(step: float) -> None:
     times = rows(step)
     q = smooth(0.5 * times)[:, None]
-    found = joint_accelerations(times, q, cycle=CYCLE, jumps_at=np.array([0.42, 1.0]))
+    result = joint_accelerations(times, q, cycle=CYCLE, jumps_at=np.array([0.42, 1.0]))
 
-    assert not found.is_jump.any()
-    assert found.values.max() == pytest.approx(10.0 / np.sqrt(3.0) / 4.0, rel=0.01)
+    assert not result.is_jump.any()
+    assert result.values.max() == pytest.approx(10.0 / np.sqrt(3.0) / 4.0, rel=0.01)
 
 
 def test_a_jump_at_the_ends_of_the_clock_is_one_out_of_rest() -> None:

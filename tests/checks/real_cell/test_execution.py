@@ -15,9 +15,9 @@ def test_tools_stand_on_the_part_where_the_planners_engine_has_them(cells):
     q = np.concatenate([robot.start for robot in cell.robots])
     state = CombinedModel(cell).state(q)
 
-    found = RealCell(cell).tool_poses(["kuka", "staubli"], q[None])
+    tips = RealCell(cell).tool_poses(["kuka", "staubli"], q[None])
 
-    for poses, index in zip(found, (1, 3), strict=True):
+    for poses, index in zip(tips, (1, 3), strict=True):
         np.testing.assert_allclose(poses[0], inverse(state.X_WP) @ state.X_WT[index], atol=1e-12)  # rounding
 
 
@@ -28,9 +28,9 @@ def test_noise_is_as_large_as_stated_and_sits_on_the_part():
 
     (seen,) = measured_poses([X], system, np.random.default_rng(1))
 
-    room = 4 / np.sqrt(2 * n)  # four standard errors of a standard deviation
-    assert (seen - X)[:, :3, 3].std(axis=0) == pytest.approx(2e-5, rel=room)
-    assert rotation_vector(seen[:, :3, :3]).std(axis=0) == pytest.approx(1e-4, rel=room)
+    tolerance = 4 / np.sqrt(2 * n)  # four standard errors of a standard deviation
+    assert (seen - X)[:, :3, 3].std(axis=0) == pytest.approx(2e-5, rel=tolerance)
+    assert rotation_vector(seen[:, :3, :3]).std(axis=0) == pytest.approx(1e-4, rel=tolerance)
 
 
 def test_a_perfect_system_sees_the_truth_and_draws_nothing():

@@ -11,12 +11,12 @@ ROUNDING = 1e-12  # [m], [rad]
 def test_a_constant_error_is_accuracy_and_no_repeatability():
     errors = np.tile([3e-4, -4e-4, 0.0, 1e-3, -2e-3, 3e-3], (5, 1))
 
-    found = pose_figures(errors, 1.5)
+    figures = pose_figures(errors, 1.5)
 
-    assert (found.at_s, found.AP_p) == (1.5, pytest.approx(5e-4))
-    assert found.AP_abc == pytest.approx((1e-3, 2e-3, 3e-3))
-    assert found.RP_l == pytest.approx(0.0, abs=ROUNDING)
-    assert found.RP_abc == pytest.approx((0.0, 0.0, 0.0), abs=ROUNDING)
+    assert (figures.at_s, figures.AP_p) == (1.5, pytest.approx(5e-4))
+    assert figures.AP_abc == pytest.approx((1e-3, 2e-3, 3e-3))
+    assert figures.RP_l == pytest.approx(0.0, abs=ROUNDING)
+    assert figures.RP_abc == pytest.approx((0.0, 0.0, 0.0), abs=ROUNDING)
 
 
 def test_two_runs_apart_scatter_about_their_middle():
@@ -24,11 +24,11 @@ def test_two_runs_apart_scatter_about_their_middle():
     errors = np.zeros((2, 6))
     errors[:, 1], errors[:, 5] = (1e-3, -1e-3), (1e-2, -1e-2)
 
-    found = pose_figures(errors, 0.0)
+    figures = pose_figures(errors, 0.0)
 
-    assert found.AP_p == pytest.approx(0.0, abs=ROUNDING)
-    assert found.RP_l == pytest.approx(1e-3)
-    assert found.RP_abc == pytest.approx((0.0, 0.0, 3 * np.sqrt(2) * 1e-2), abs=ROUNDING)
+    assert figures.AP_p == pytest.approx(0.0, abs=ROUNDING)
+    assert figures.RP_l == pytest.approx(1e-3)
+    assert figures.RP_abc == pytest.approx((0.0, 0.0, 3 * np.sqrt(2) * 1e-2), abs=ROUNDING)
 
 
 def test_normal_scatter_along_a_line_repeats_as_the_folded_normal_distribution_says():
@@ -47,15 +47,15 @@ def test_a_path_is_judged_at_its_worst_instants():
     errors[:, 1, 2] = 7e-4  # both runs are off here: accuracy
     errors[:, 2, 2] = (-2e-4, 2e-4)  # here they are off in opposite ways: repeatability
 
-    found = path_figures(errors, times)
+    figures = path_figures(errors, times)
 
-    assert (found.AT_p, found.AT_p_at_s) == (pytest.approx(7e-4), 0.1)
-    assert (found.RT_p, found.RT_p_at_s) == (pytest.approx(2e-4), 0.2)
+    assert (figures.AT_p, figures.AT_p_at_s) == (pytest.approx(7e-4), 0.1)
+    assert (figures.RT_p, figures.RT_p_at_s) == (pytest.approx(2e-4), 0.2)
 
 
 def test_one_run_repeats_nothing():
-    found, pose = path_figures(np.ones((1, 2, 6)), np.array([0.0, 1.0])), pose_figures(np.ones((1, 6)), 0.0)
+    figures, pose = path_figures(np.ones((1, 2, 6)), np.array([0.0, 1.0])), pose_figures(np.ones((1, 6)), 0.0)
 
-    assert found.RT_p is found.RT_p_at_s is found.RT_abc is None
+    assert figures.RT_p is figures.RT_p_at_s is figures.RT_abc is None
     assert pose.RP_l is pose.RP_abc is None
-    assert found.AT_p == pose.AP_p == pytest.approx(np.sqrt(3.0))
+    assert figures.AT_p == pose.AP_p == pytest.approx(np.sqrt(3.0))

@@ -36,7 +36,7 @@ def accuracy(position=0.0, at=0):
 
 def run_of(*errors, judged_from=0):
     trials = tuple(
-        Trial(draw=Draw(robots={}, X_grasps={}), before=(each,), correction=None, in_pass=None) for each in errors
+        Trial(draw=Draw(robots={}, X_grasps={}), before=(error,), correction=None, in_pass=None) for error in errors
     )
     return RunRehearsal(
         name=None,

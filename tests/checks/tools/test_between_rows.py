@@ -68,9 +68,9 @@ def looked(
     jump_times = np.array([0.35] if corner else jumps)
     known = Known(times=plain.times, tasks=(scheduled,), jump_times=jump_times, corner=corner)
     accuracy = task_accuracy(scheduled, scene.chains["arm"], q=q, X_WP=part_poses(cell, scene.chains, {"arm": q}))
-    ((found,), _) = check_between_rows(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
-    assert found.between is not None
-    return found.between, check_task_between(found, tolerance)
+    ((between,), _) = check_between_rows(scene, known, {"arm": q}, accuracy=(accuracy,), closures=())
+    assert between.between is not None
+    return between.between, check_task_between(between, tolerance)
 
 
 @pytest.mark.parametrize("turn", [0.01, 0.1])
@@ -176,8 +176,8 @@ def test_no_instant_is_worse_than_the_bound(seed: int) -> None:
         truth = task_accuracy(replace(scheduled, X_PT=X_PT), scene.chains[robot], q=q[robot], X_WP=X_WP)
         between = accuracy.between
         assert between is not None
-        for error, found in ((truth.position_error, between.position), (truth.orientation_error, between.orientation)):
+        for error, entry in ((truth.position_error, between.position), (truth.orientation_error, between.orientation)):
             worst = float(np.linalg.norm(error, axis=1).max())
-            assert found.bound is not None
-            assert worst <= found.bound
-            assert worst <= 1.02 * found.largest + 1e-9
+            assert entry.bound is not None
+            assert worst <= entry.bound
+            assert worst <= 1.02 * entry.largest + 1e-9

@@ -61,10 +61,10 @@ def test_smallest_singular_value_of_the_stack(options, at_rest):
     schedule = still_scheduled(tasks, chains, by_name, X_WP)
     moving = [t.robot for t in tasks] if at_rest else [r.name for r in cell.robots]
 
-    found = conditioning(cell, schedule, chains, q=by_name, X_WP=X_WP, moving=moving)
+    measures = conditioning(cell, schedule, chains, q=by_name, X_WP=X_WP, moving=moving)
 
-    np.testing.assert_allclose(found.stack, planners_values(cell, schedule, q, moving), atol=1e-12)
-    assert ("holder" in found.robots) is not at_rest
+    np.testing.assert_allclose(measures.stack, planners_values(cell, schedule, q, moving), atol=1e-12)
+    assert ("holder" in measures.robots) is not at_rest
 
 
 @pytest.mark.parametrize("axes", [(0, 1, 2, 3, 4, 5), (0, 1, 5)], ids=["whole", "planar"])
@@ -87,16 +87,18 @@ def test_the_stack_holds_the_closures_of_further_holders_and_the_path_of_the_par
     schedule = Schedule(times=np.arange(N) * 1e-3, tasks=scheduled)
     names = [r.name for r in cell.robots]
 
-    found = conditioning(cell, schedule, chains, q=by_name, X_WP=part_poses(cell, chains, by_name), moving=names)
+    measures = conditioning(cell, schedule, chains, q=by_name, X_WP=part_poses(cell, chains, by_name), moving=names)
 
     for k in range(N):
         J = planners_jacobian(cell, q[k])
         stack = np.concatenate([J[:-1].reshape(-1, cell.joint_count), J[-1][list(axes)]])
-        assert found.stack[k] == pytest.approx(np.linalg.svd(stack, compute_uv=False)[-1], abs=1e-12)
-        own = J[-1][list(axes)][:, cell.columns("op2")]
-        assert found.robots["op2"][k] == pytest.approx(np.linalg.svd(own, compute_uv=False)[len(axes) - 1], abs=1e-12)
-    assert set(found.robots) == set(names)
-    assert all(len(series) == N for series in found.robots.values())
+        assert measures.stack[k] == pytest.approx(np.linalg.svd(stack, compute_uv=False)[-1], abs=1e-12)
+        columns = J[-1][list(axes)][:, cell.columns("op2")]
+        assert measures.robots["op2"][k] == pytest.approx(
+            np.linalg.svd(columns, compute_uv=False)[len(axes) - 1], abs=1e-12
+        )
+    assert set(measures.robots) == set(names)
+    assert all(len(series) == N for series in measures.robots.values())
 
 
 NUDGE = 1e-5  # [rad]: central differences are then good to about 1e-10
@@ -139,21 +141,21 @@ def test_manipulability_and_condition_follow_from_the_derivative_of_the_tool_pos
     q = np.random.default_rng(1).uniform(-1, 1, (3, cell.joint_count))
     chains = {r.name: ScrewChain(r) for r in cell.robots}
 
-    found = measured(cell, tasks, q)
+    measures = measured(cell, tasks, q)
 
     for k, configuration in enumerate(q):
         J = jacobian_by_differences(cell, chains, tasks, configuration)
         squares = np.linalg.eigvalsh(J @ J.T)  # in rising order: squared singular values, by another way
-        assert found.manipulability[k] == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-6)
-        assert found.squared_condition[k] == pytest.approx(squares[0] / squares[-1], rel=1e-6)
-        assert found.condition[k] == pytest.approx(np.sqrt(squares[0] / squares[-1]), rel=1e-6)
-        assert found.stack[k] == pytest.approx(np.sqrt(squares[0]), rel=1e-6)
+        assert measures.manipulability[k] == pytest.approx(np.sqrt(np.linalg.det(J @ J.T)), rel=1e-6)
+        assert measures.squared_condition[k] == pytest.approx(squares[0] / squares[-1], rel=1e-6)
+        assert measures.condition[k] == pytest.approx(np.sqrt(squares[0] / squares[-1]), rel=1e-6)
+        assert measures.stack[k] == pytest.approx(np.sqrt(squares[0]), rel=1e-6)
 
 
 def test_with_more_rows_than_joints_everything_is_singular():
     cell = random_cell(3, operators=2, joints=3)  # 12 rows, 9 joints
 
-    found = measured(cell, list(cell.tasks), np.random.default_rng(2).uniform(-1, 1, (N, 9)))
+    measures = measured(cell, list(cell.tasks), np.random.default_rng(2).uniform(-1, 1, (N, 9)))
 
-    for values in (found.stack, found.condition, found.squared_condition, found.manipulability):
+    for values in (measures.stack, measures.condition, measures.squared_condition, measures.manipulability):
         np.testing.assert_array_equal(values, np.zeros(N))

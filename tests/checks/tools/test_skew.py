@@ -27,14 +27,14 @@ def steady(error: float, limit: float) -> ErrorGrowth:
 
 @pytest.mark.parametrize("error", [0.0, 3e-5])
 def test_a_tool_of_constant_speed_allows_what_is_left_of_its_tolerance(error: float) -> None:
-    way = steady(error, limit=1e-4)
+    growth = steady(error, limit=1e-4)
 
-    allowed, at_s = way.allowed()
+    allowed, at_s = growth.allowed()
 
     assert allowed == pytest.approx((1e-4 - error) / SPEED, rel=1e-9)
     assert at_s is not None
-    assert way.largest(allowed) == pytest.approx(1e-4)
-    assert way.largest(2e-3) == pytest.approx(error + 2e-3 * SPEED)
+    assert growth.largest(allowed) == pytest.approx(1e-4)
+    assert growth.largest(2e-3) == pytest.approx(error + 2e-3 * SPEED)
 
 
 def test_an_error_beyond_the_tolerance_allows_nothing() -> None:
@@ -48,22 +48,22 @@ def test_a_way_that_is_shorter_than_the_tolerance_allows_any_skew() -> None:
 def test_a_tool_that_moves_for_a_while_only_is_limited_there() -> None:
     still = np.zeros(len(TIMES))
     sums = SPEED * np.clip(TIMES - 0.4, 0.0, 0.1)  # 50 mm from 0.4 to 0.5 s
-    way = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=0.01)
+    growth = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=0.01)
 
-    allowed, at_s = way.allowed()
+    allowed, at_s = growth.allowed()
 
     assert allowed == pytest.approx(0.02)
     assert at_s is not None
     assert 0.4 <= at_s <= 0.5
-    assert way.largest(0.3) == pytest.approx(0.05)
+    assert growth.largest(0.3) == pytest.approx(0.05)
 
 
 def test_twice_the_time_allows_twice_the_skew() -> None:
     still, sums = np.zeros(len(TIMES)), 0.1 * np.sin(0.5 * np.pi * TIMES)
-    way = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=1e-3)
-    slower = replace(way, times=2.0 * TIMES, rows=2.0 * TIMES)
+    growth = ErrorGrowth(times=TIMES, sums=sums, turns=still, whole=sums, rows=TIMES, errors=still, limit=1e-3)
+    slower = replace(growth, times=2.0 * TIMES, rows=2.0 * TIMES)
 
-    assert slower.allowed()[0] == pytest.approx(2.0 * way.allowed()[0])
+    assert slower.allowed()[0] == pytest.approx(2.0 * growth.allowed()[0])
 
 
 @pytest.mark.parametrize("axes", [(0, 1, 2, 3, 4, 5), (0, 2, 5), (0, 1, 2, 3, 4), (1,)])
@@ -76,7 +76,7 @@ def test_no_error_at_a_shifted_time_is_above_its_bound(seed: int, axes: tuple[in
     times, motion, arms = 0.1 * np.arange(12), FreeMotion(scene, stacked), LeverArms(scene, stacked)
     assert cell.carrier is not None
     carrier = cell.robots[cell.carrier].name
-    robot = next(each.name for each in cell.robots if each.name != carrier)
+    robot = next(robot.name for robot in cell.robots if robot.name != carrier)
     movers = {n: Mover.of(scene, arms, n, q=q[n], steps=arms.steps(stacked)) for n in (carrier, robot)}
     X_CP, tool = cell.part.X_CP, scene.chains[robot]
     rows = np.arange(12)
@@ -86,7 +86,7 @@ def test_no_error_at_a_shifted_time_is_above_its_bound(seed: int, axes: tuple[in
     relation = replace(work(robot), axes=axes, is_spin_free=axes == (0, 1, 2, 3, 4))
     shifted = ShiftedTool(
         relation=relation, mover=movers[robot], carrier=movers[carrier], X_CP=X_CP, desired=desired, limits=(0.3, 0.3)
-    ).ways(times)
+    ).travel(times)
 
     for skew in (0.01, 0.07, 0.25):
         for share in (-1.0, -0.6, 0.3, 1.0):
@@ -110,7 +110,7 @@ def test_the_bound_of_a_small_skew_is_near_the_way_of_the_tool(seed: int) -> Non
     q = {robot.name: stacked[:, cell.columns(robot.name)] for robot in cell.robots}
     assert cell.carrier is not None
     carrier = cell.robots[cell.carrier].name
-    robot = next(each.name for each in cell.robots if each.name != carrier)
+    robot = next(robot.name for robot in cell.robots if robot.name != carrier)
     arms = LeverArms(scene, stacked)
     movers = {n: Mover.of(scene, arms, n, q=q[n], steps=arms.steps(stacked)) for n in (carrier, robot)}
     X_WT, times = scene.chains[robot].tool_poses(q[robot]), 0.005 * np.arange(201)
@@ -126,5 +126,5 @@ def test_the_bound_of_a_small_skew_is_near_the_way_of_the_tool(seed: int) -> Non
 
     fastest = np.linalg.norm(np.diff(X_WT[:, :3, 3], axis=0), axis=1).max() / 0.005
 
-    assert fastest <= tool.ways(times).speed <= 1.01 * fastest
-    assert tool.ways(times).position.allowed()[0] == pytest.approx(1e-3 / fastest, rel=0.01)
+    assert fastest <= tool.travel(times).speed <= 1.01 * fastest
+    assert tool.travel(times).position.allowed()[0] == pytest.approx(1e-3 / fastest, rel=0.01)

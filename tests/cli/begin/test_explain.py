@@ -78,8 +78,10 @@ def test_json_counts_fit_each_other(cells: Path, capsys: pytest.CaptureFixture[s
     assert graph["independent_circuits"] == len(reported["circuits"]) == graph["edges"] - graph["vertices"] + 1
     for circuit in reported["circuits"]:
         ends = {joint["name"]: (joint["from"], joint["to"]) for joint in graph["joints"]}
-        way = [ends[step["joint"]][:: step["sign"]] for step in circuit["passed"]]
-        assert [end for _, end in way] == [begin for begin, _ in way[1:] + way[:1]]  # each joint begins where one ended
+        passed = [ends[step["joint"]][:: step["sign"]] for step in circuit["passed"]]
+        assert [end for _, end in passed] == [
+            begin for begin, _ in passed[1:] + passed[:1]
+        ]  # each joint begins where one ended
 
 
 def test_a_start_that_is_to_be_found_leaves_the_rank_open(cells: Path, capsys: pytest.CaptureFixture[str]) -> None:

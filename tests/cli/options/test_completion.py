@@ -88,7 +88,7 @@ def test_bash_itself_completes_with_the_script_that_is_shown(folder: Path, capsy
     program.chmod(0o755)
     typed = 'COMP_WORDS=(cellplan solve cells/p); COMP_CWORD=2; _cellplan_completion cellplan; echo "${COMPREPLY[@]}"'
 
-    found = subprocess.run(
+    completion = subprocess.run(
         ["bash", "--norc", "-c", f"source completion.sh; {typed}"],
         check=True,
         capture_output=True,
@@ -96,7 +96,7 @@ def test_bash_itself_completes_with_the_script_that_is_shown(folder: Path, capsy
         env={**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"},
     )
 
-    assert found.stdout.split() == ["cells/planar_pair.yaml"]
+    assert completion.stdout.split() == ["cells/planar_pair.yaml"]
 
 
 @pytest.mark.parametrize("shell", completion.SHELLS)

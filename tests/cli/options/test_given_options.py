@@ -65,7 +65,7 @@ def test_help_is_shown_whatever_else_is_given(capsys: pytest.CaptureFixture[str]
 
 def with_value(command: str, option: str) -> list[str]:
     """An option of a command with a value where it takes one."""
-    (one,) = [each for each in PROGRAM.commands[command].params if option in each.opts]
+    (one,) = [param for param in PROGRAM.commands[command].params if option in param.opts]
     return [option] if one.is_flag else [option, "1"]
 
 
@@ -101,7 +101,7 @@ def test_every_option_of_every_command_is_among_these() -> None:
     for name in NAMES:
         command = next(group[name] for group in COMMANDS.values() if name in group)
         for parameter in inspect.signature(as_command(command)).parameters.values():
-            options = [each for each in PROGRAM.commands[name].params if each.name == parameter.name]
+            options = [param for param in PROGRAM.commands[name].params if param.name == parameter.name]
             assert len(options) == 1
             is_list = "list" in str(get_args(parameter.annotation)[0])
             assert options[0].param_type_name == "argument" or options[0].multiple == is_list

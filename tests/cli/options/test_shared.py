@@ -13,9 +13,9 @@ from cellplan.model.solver import Integrator, MethodName
 
 
 def help_of(option: Any) -> str:
-    (found,) = (each for each in get_args(option) if isinstance(each, typer.models.OptionInfo))
-    assert found.help is not None
-    return found.help
+    (result,) = (entry for entry in get_args(option) if isinstance(entry, typer.models.OptionInfo))
+    assert result.help is not None
+    return result.help
 
 
 def listed(words: tuple[str, ...]) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from cellplan.cli.main import run
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 FIXED = """\
 cellplan_errors: 1
@@ -81,8 +81,8 @@ def test_a_machine_gets_one_object(pair: str, capsys: pytest.CaptureFixture[str]
     assert task["before"]["max_position_error_mm"] >= task["before"]["rms_position_error_mm"] > 0.0
     assert task["after"] is None
     assert task["iso_9283"]["before"]["RT_p_mm"] > 0.0
-    drawn = [trial["drawn"]["robots"]["right"]["base"]["xyz_mm"][0] for trial in record["runs"][0]["trials"]]
-    assert len(set(drawn)) == 3
+    samples = [trial["drawn"]["robots"]["right"]["base"]["xyz_mm"][0] for trial in record["runs"][0]["trials"]]
+    assert len(set(samples)) == 3
     assert Path("out/plots/envelope_before_circle.svg").is_file()
 
 

@@ -30,9 +30,9 @@ def test_a_cell_that_was_not_solved_gets_a_drawing_of_its_start(
 
     status = run(["floorplan", str(sound / "cell" / "small.yaml"), "-o", str(drawing), "--json"])
 
-    found = json.loads(capsys.readouterr().out)
-    assert (status, found["status"], found["format"]) == (0, "written", "dxf")
-    assert found["bytes"] == drawing.stat().st_size
+    record = json.loads(capsys.readouterr().out)
+    assert (status, record["status"], record["format"]) == (0, "written", "dxf")
+    assert record["bytes"] == drawing.stat().st_size
     assert "Robots at the start;" in drawing.read_text()
     assert run(["floorplan", str(sound / "cell" / "small.yaml"), "-o", str(drawing)]) == 0  # a drawing is replaced
 
@@ -61,7 +61,7 @@ def test_what_cannot_be_drawn_ends_with_one_line(
     (tmp_path / "mine.svg").write_text("<svg>mine</svg>")
     places = {"folder": tmp_path, "cell": sound / "cell" / "small.yaml", "run": sound / "run"}
 
-    status = run(["floorplan", *(each.format(**places) for each in arguments)])
+    status = run(["floorplan", *(argument.format(**places) for argument in arguments)])
 
     out, err = capsys.readouterr()
     assert (status, out) == (2, "")

@@ -12,7 +12,7 @@ import pytest
 from cellplan.cli.main import run
 from cellplan.cli.terminal import progress
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture
@@ -247,9 +247,9 @@ def test_solving_imports_no_plotting_library(hasty_pair: Path, tmp_path: Path) -
     arguments = ["solve", str(hasty_pair), "--duration", "0.1", "-q", "-o", str(tmp_path / "run")]
     program = f"import sys; from cellplan.cli.main import run; run({arguments}); sys.exit('matplotlib' in sys.modules)"
 
-    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    completed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
 
-    assert found.returncode == 0, found.stderr
+    assert completed.returncode == 0, completed.stderr
     assert list((tmp_path / "run" / "plots").glob("*.svg"))
 
 

@@ -15,8 +15,8 @@ ON_PART = "home_deg: [7.426416495712, -80, -118.820825943611, 26.231452660417, 8
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is in the way of the straight move then stays there."""
-    monkeypatch.setattr("cellplan.planning.transfer.in_turn.DRAWN", 2)
-    monkeypatch.setattr("cellplan.planning.transfer.in_time.DRAWN", 2)
+    monkeypatch.setattr("cellplan.planning.transfer.in_turn.SAMPLES", 2)
+    monkeypatch.setattr("cellplan.planning.transfer.in_time.SAMPLES", 2)
     monkeypatch.setattr("cellplan.planning.transfer.in_time.DELAYS", 1)
 
 

@@ -218,12 +218,12 @@ def test_a_format_that_was_named_and_is_refused_is_an_error(
     given = run(["export", str(copy.run), "--cell", str(copy.cell), *words, "-o", str(tmp_path / "out"), "--json"])
 
     reported = json.loads(capsys.readouterr().out)
-    by_name = {each["format"]: each for each in reported["exports"]}
+    by_name = {export["format"]: export for export in reported["exports"]}
     assert (given, reported["exit"], reported["status"]) == (status, status, "refused")
     assert by_name["krl"]["status"] == "refused"
     assert by_name["krl"]["errors"] == [
         f"robots.{robot}.controller: expected the controller that plays krl, got none"
         for robot in ("left", "right", "idle")
     ]
-    for name, each in by_name.items():
-        assert (tmp_path / "out" / name / "export.json").exists() is (each["status"] == "exported")
+    for name, export in by_name.items():
+        assert (tmp_path / "out" / name / "export.json").exists() is (export["status"] == "exported")

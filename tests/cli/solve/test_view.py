@@ -29,9 +29,9 @@ def test_a_machine_gets_one_object(sound: Path, tmp_path: Path, capsys: pytest.C
 
     status = run(["view", str(sound / "cell" / "small.yaml"), "-o", str(page), "--json"])
 
-    found = json.loads(capsys.readouterr().out)
-    assert (status, found["status"], found["kind"], found["failures"]) == (0, "written", "cell", [])
-    assert found["bytes"] == page.stat().st_size
+    record = json.loads(capsys.readouterr().out)
+    assert (status, record["status"], record["kind"], record["failures"]) == (0, "written", "cell", [])
+    assert record["bytes"] == page.stat().st_size
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_what_cannot_be_shown_ends_with_one_line(
         "cell": str(sound / "cell" / "small.yaml"),
     }
 
-    status = run(["view", *(each.format(**places) for each in arguments)])
+    status = run(["view", *(argument.format(**places) for argument in arguments)])
 
     out, err = capsys.readouterr()
     assert (status, out, err) == (2, "", f"{message.format(**places)}\n")

@@ -64,12 +64,12 @@ def until(condition: Callable[[], bool], what: str) -> None:
 def in_frame(browser: Browser, page: str, script: str) -> Any:
     """What a script gives in the frame that shows a page of the run; None while there is none."""
     frames = browser.command("Page.getFrameTree")["frameTree"].get("childFrames", [])
-    frame = next((each["frame"] for each in frames if each["frame"]["url"].partition("#")[0].endswith(page)), None)
+    frame = next((frame["frame"] for frame in frames if frame["frame"]["url"].partition("#")[0].endswith(page)), None)
     if frame is None:
         return None
     world = browser.command("Page.createIsolatedWorld", frameId=frame["id"])["executionContextId"]
-    found = browser.command("Runtime.evaluate", expression=script, contextId=world, returnByValue=True)
-    return found["result"].get("value")
+    reply = browser.command("Runtime.evaluate", expression=script, contextId=world, returnByValue=True)
+    return reply["result"].get("value")
 
 
 def shows_cycle(browser: Browser, seconds: int) -> bool:

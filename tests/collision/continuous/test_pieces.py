@@ -91,9 +91,9 @@ def test_a_large_piece_proves_no_more_than_is_true_and_is_not_measured_exactly()
 def test_the_pieces_of_a_body_are_made_once_for_all_its_pairs() -> None:
     engine = Engine((prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2)), prepare("ball", Sphere(0.1))))
 
-    beside_stick, beside_ball = split(engine, (0, 1))[0], split(engine, (2, 0))[0]
+    stick_pieces, ball_pieces = split(engine, (0, 1))[0], split(engine, (2, 0))[0]
 
-    assert all(a is b for a, b in zip(beside_stick.bodies[1:], beside_ball.bodies[1:], strict=True))
+    assert all(a is b for a, b in zip(stick_pieces.bodies[1:], ball_pieces.bodies[1:], strict=True))
 
 
 def stirring() -> tuple[Scene, Array, tuple[int, int]]:

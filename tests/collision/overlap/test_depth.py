@@ -60,31 +60,31 @@ def test_no_direction_separates_sooner_than_the_depth_says_but_for_its_room(i: i
     first, second = SOLIDS[i], SOLIDS[j]
     R, p = rotation_exp(2.0 * rng.normal(size=3)), rng.uniform(-0.15, 0.15, 3)
 
-    found = convex_depth(first, second, R, p)
+    deepest = convex_depth(first, second, R, p)
 
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     request.enable_contact = True
     X_A, X_B = coal.Transform3s(np.eye(3), np.zeros(3)), coal.Transform3s(R, p)
     coal.collide(coal_shape(first), X_A, coal_shape(second), X_B, request, result)
     theirs = -result.getContact(0).penetration_depth if result.isCollision() else 0.0
-    assert found <= theirs * (1.0 + SHARE) + 2e-5  # theirs is a way out, though not always the shortest
-    if found > 1e-4:
+    assert deepest <= theirs * (1.0 + SHARE) + 2e-5  # theirs is a way out, though not always the shortest
+    if deepest > 1e-4:
         assert result.isCollision()
-        assert moved_apart(first, second, R, p, by=1.001 * found + CLOSE, hint=result.getContact(0).normal)
+        assert moved_apart(first, second, R, p, by=1.001 * deepest + CLOSE, hint=result.getContact(0).normal)
 
 
 def moved_apart(first: Solid, second: Solid, R: Array, p: Array, *, by: float, hint: Array) -> bool:
     """Whether some move of that length separates two solids: along a hint, or in the directions of many proofs."""
-    if any(convex_depth(first, second, R, p + 1.05 * by * each) == 0.0 for each in (hint, -hint)):
+    if any(convex_depth(first, second, R, p + 1.05 * by * direction) == 0.0 for direction in (hint, -hint)):
         return True
     angle = np.linspace(0.0, 1.0, 4001)
     height, turn = 1.0 - 2.0 * angle, 4001 * np.pi * (3.0 - np.sqrt(5.0)) * angle
     width = np.sqrt(1.0 - height**2)
     n = np.stack([width * np.cos(turn), width * np.sin(turn), height], axis=1)
     n = np.concatenate([n, np.eye(3), -np.eye(3), R.T, -R.T])
-    return bool(np.any([convex_depth(first, second, R, p + 1.05 * by * each) <= 0.1 * by for each in n[::200]])) or any(
-        convex_depth(first, second, R, p + 1.05 * by * each) == 0.0 for each in n
-    )
+    return bool(
+        np.any([convex_depth(first, second, R, p + 1.05 * by * direction) <= 0.1 * by for direction in n[::200]])
+    ) or any(convex_depth(first, second, R, p + 1.05 * by * direction) == 0.0 for direction in n)
 
 
 def test_a_mesh_that_is_convex_is_as_deep_as_the_solid_it_shows() -> None:
@@ -128,10 +128,10 @@ def tube(inner: float, outer: float, length: float, sides: int = 24) -> Mesh:
     ],
 )
 def test_a_pin_in_a_bore_is_not_deep_but_one_in_the_wall_is(guest: Shape, X: Array, expected: float) -> None:
-    found = depth(tube(0.05, 0.1, 0.2), guest, X)
+    deepest = depth(tube(0.05, 0.1, 0.2), guest, X)
 
-    assert found == pytest.approx(expected, abs=1.5e-3)  # the bore has 24 sides
-    assert (found > 5e-4) == (expected > 0.0)
+    assert deepest == pytest.approx(expected, abs=1.5e-3)  # the bore has 24 sides
+    assert (deepest > 5e-4) == (expected > 0.0)
 
 
 def test_an_open_mesh_counts_by_its_surface_only() -> None:

@@ -44,12 +44,12 @@ def test_points_of_a_solid_are_as_deep_in_a_cube_of_triangles_as_the_closed_form
     for _ in range(4):
         R, p = rotation_exp(rng.normal(size=3)), rng.uniform(-0.6 * BLOCK, 0.6 * BLOCK, 3)
 
-        found = deepest_point(body, host, R, p)
+        deepest = deepest_point(body, host, R, p)
 
         truth = float((0.5 * BLOCK - np.abs(points @ R.T + p)).min(axis=1).max())
         deep += truth > SUNK_TOL
-        assert found >= max(0.0, truth) - SUNK_TOL - 1e-5
-        assert found <= max(0.0, truth) + 2e-3  # so far may random points be from the deepest one
+        assert deepest >= max(0.0, truth) - SUNK_TOL - 1e-5
+        assert deepest <= max(0.0, truth) + 2e-3  # so far may random points be from the deepest one
     assert deep
 
 

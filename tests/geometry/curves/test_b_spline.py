@@ -33,10 +33,10 @@ def test_derivatives_are_those_of_central_differences(degree: int, derivative: i
     spline = UniformBSpline(degree=degree, count=11)
     step, inside = 1e-6, SHARES[1:-1] + 0.003  # off the knots, where third derivatives of cubics jump
 
-    found = spline.basis(inside, derivative)
+    values = spline.basis(inside, derivative)
     ends = [spline.basis(inside + side * step, derivative - 1) for side in (1.0, -1.0)]
 
-    np.testing.assert_allclose(found, (ends[0] - ends[1]) / (2.0 * step), rtol=1e-6, atol=1e-6 * np.abs(found).max())
+    np.testing.assert_allclose(values, (ends[0] - ends[1]) / (2.0 * step), rtol=1e-6, atol=1e-6 * np.abs(values).max())
 
 
 def test_fewer_functions_than_the_degree_needs_are_refused() -> None:

@@ -58,10 +58,10 @@ def test_a_direction_along_an_axis_sees_only_the_sides_that_face_it(direction: A
 def test_lines_beside_a_round_body_do_not_hit() -> None:
     wall = Wall(centre=np.zeros(3), axis=np.eye(3)[2], radius=0.1, half_length=0.2)
     ball = Ball(centre=np.zeros(3), radius=0.1)
-    beside = np.array([[0.0, 0.1 + 1e-9, 0.0]])
+    origin = np.array([[0.0, 0.1 + 1e-9, 0.0]])
 
     for patch in (wall, ball):
-        hits = patch.hits(beside, np.eye(3)[0])
+        hits = patch.hits(origin, np.eye(3)[0])
         assert np.all(np.isnan(hits))
         assert not patch.covers(hits)[0]
 

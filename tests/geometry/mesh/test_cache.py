@@ -13,7 +13,7 @@ from cellplan.geometry.mesh.cache import recall_mesh
 from cellplan.geometry.mesh.load import read_mesh
 from cellplan.geometry.shapes import Mesh
 
-pytestmark = pytest.mark.usefixtures("own_cache")
+pytestmark = pytest.mark.usefixtures("cache_folder")
 
 
 def fresh(path: Path, **options: object) -> Mesh:
@@ -31,17 +31,17 @@ def assert_same(one: Mesh, other: Mesh) -> None:
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "dae"])
 @pytest.mark.parametrize("scale", [1.0, 0.001, (0.5, -0.5, 0.25)])
-def test_a_mesh_is_the_same_when_it_was_kept(tmp_path: Path, own_cache: Path, suffix: str, scale: object) -> None:
+def test_a_mesh_is_the_same_when_it_was_kept(tmp_path: Path, cache_folder: Path, suffix: str, scale: object) -> None:
     path = tmp_path / f"part.{suffix}"
     trimesh.creation.annulus(1.1, 2.3, 3.7).export(path)
 
     read = fresh(path, scale=scale)
-    entries = list(own_cache.iterdir())
-    kept = fresh(path, scale=scale)
+    entries = list(cache_folder.iterdir())
+    made = fresh(path, scale=scale)
 
     assert len(entries) == 1
-    assert list(own_cache.iterdir()) == entries
-    assert_same(read, kept)
+    assert list(cache_folder.iterdir()) == entries
+    assert_same(read, made)
 
 
 def test_name_scale_and_format_are_not_mixed_up(tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_a_file_that_was_changed_is_read_anew(tmp_path: Path) -> None:
     assert np.ptp(fresh(path).vertices[:, 2]) == pytest.approx(2.0, abs=1e-12)
 
 
-def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, own_cache: Path) -> None:
+def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, cache_folder: Path) -> None:
     path = tmp_path / "part.stl"
     trimesh.creation.box((1.0, 1.0, 1.0)).export(path)
     path.write_bytes(path.read_bytes()[:-3])
@@ -78,14 +78,14 @@ def test_a_refused_file_is_refused_again_and_leaves_nothing(tmp_path: Path, own_
         messages.append(str(caught.value))
 
     assert messages[0] == messages[1]
-    assert not own_cache.exists() or not list(own_cache.iterdir())
+    assert not cache_folder.exists() or not list(cache_folder.iterdir())
 
 
-def test_an_entry_that_is_damaged_is_made_again(tmp_path: Path, own_cache: Path) -> None:
+def test_an_entry_that_is_damaged_is_made_again(tmp_path: Path, cache_folder: Path) -> None:
     path = tmp_path / "part.stl"
     trimesh.creation.box((1.0, 2.0, 3.0)).export(path)
     read = fresh(path)
-    (entry,) = own_cache.iterdir()
+    (entry,) = cache_folder.iterdir()
     whole = entry.read_bytes()
     entry.write_bytes(whole[:200])
 

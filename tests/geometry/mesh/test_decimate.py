@@ -18,21 +18,21 @@ BALL = mesh_of(trimesh.creation.icosphere(subdivisions=4, radius=0.2))
 
 
 def test_a_mesh_that_is_small_enough_stays_as_it_is() -> None:
-    found = decimated(BALL, len(BALL.faces))
+    reduced = decimated(BALL, len(BALL.faces))
 
-    assert found.deviation == 0.0
-    assert np.array_equal(found.points[found.triangles], BALL.vertices[BALL.faces])
+    assert reduced.deviation == 0.0
+    assert np.array_equal(reduced.points[reduced.triangles], BALL.vertices[BALL.faces])
 
 
 @pytest.mark.parametrize("limit", [2000, 500, 200])
 def test_no_point_of_a_ball_is_farther_from_it_than_the_deviation(limit: int) -> None:
-    found = decimated(BALL, limit)
-    inside = trimesh.Trimesh(found.points, found.triangles, process=False).sample(2000, seed=1)
+    reduced = decimated(BALL, limit)
+    inside = trimesh.Trimesh(reduced.points, reduced.triangles, process=False).sample(2000, seed=1)
     sunk = 0.2 - float(np.linalg.norm(BALL.vertices[BALL.faces].mean(axis=1), axis=1).min())  # of the facets themselves
 
-    assert len(found.triangles) <= limit
-    assert np.abs(np.linalg.norm(inside, axis=1) - 0.2).max() <= found.deviation + sunk
-    assert found.deviation < 0.2
+    assert len(reduced.triangles) <= limit
+    assert np.abs(np.linalg.norm(inside, axis=1) - 0.2).max() <= reduced.deviation + sunk
+    assert reduced.deviation < 0.2
 
 
 def test_points_that_no_triangle_uses_are_left_out() -> None:

@@ -72,8 +72,8 @@ def test_a_surface_turned_inside_out_is_turned_back_and_a_cavity_stays_one() -> 
         assert mesh_volume(mesh) == pytest.approx(0.048 * (1 - 1 / 8), rel=1e-12)
         assert contains(mesh, np.array([[0.0, 0, 0], [0.08, 0, 0], [1, 0, 0]])).tolist() == [False, True, False]
 
-    beside = np.concatenate([BOX.vertices, inner + np.array([1.0, 0, 0])])
-    mesh = make_mesh(beside, hollow, source="x")
+    vertices = np.concatenate([BOX.vertices, inner + np.array([1.0, 0, 0])])
+    mesh = make_mesh(vertices, hollow, source="x")
     assert mesh_volume(mesh) == pytest.approx(0.048 * (1 + 1 / 8), rel=1e-12)
     assert contains(mesh, np.array([[1.0, 0, 0], [0.5, 0, 0]])).tolist() == [True, False]
 
@@ -110,9 +110,9 @@ def test_corner_normals_follow_round_walls_and_break_at_creases(shape: Solid) ->
         truth = corner.copy()
     truth /= np.linalg.norm(truth, axis=2, keepdims=True)
     # a vertex of a latitude ring sees its neighbours unevenly: less than one facet of 3.75 deg
-    room = 1e-12 if isinstance(shape, Cylinder) else np.radians(3.75)
+    tolerance = 1e-12 if isinstance(shape, Cylinder) else np.radians(3.75)
     assert np.linalg.norm(normals, axis=2) == pytest.approx(1.0, abs=1e-12)
-    assert np.abs(normals - truth).max() < room
+    assert np.abs(normals - truth).max() < tolerance
 
 
 def turned_mesh(mesh: Mesh, R: np.ndarray) -> Mesh:

@@ -71,9 +71,9 @@ def test_rays_lie_on_the_plane_of_the_triangle_they_hit_and_nothing_lies_before(
     assert np.abs(off_plane).max(initial=0.0) < 1e-12
     with np.errstate(divide="ignore", invalid="ignore"):  # convex and closed: clip the line by all planes
         steep = unit @ normals.T
-        way = np.sum(corner[:, 0] * normals, axis=1) - origins @ normals.T
-        enter = np.where(steep < 0, way / steep, -np.inf).max(axis=1)
-        leave = np.where(steep > 0, way / steep, np.inf).min(axis=1)
+        distance = np.sum(corner[:, 0] * normals, axis=1) - origins @ normals.T
+        enter = np.where(steep < 0, distance / steep, -np.inf).max(axis=1)
+        leave = np.where(steep > 0, distance / steep, np.inf).min(axis=1)
     truth = np.where(enter > leave, np.inf, np.where(enter >= 0, enter, np.where(leave >= 0, leave, np.inf)))
     assert np.array_equal(np.isfinite(truth), hit)
     assert hits.distance[hit] == pytest.approx(truth[hit], abs=1e-12)

@@ -26,8 +26,8 @@ def of_holder(words: str) -> tuple[str, str]:
 
 
 def limits(cell: Cell, robot: str) -> list[tuple[float | None, LimitSource]]:
-    found = [acceleration_limit(cell.robot(robot), index) for index in range(6)]
-    return [(None if limit is None else round(float(np.degrees(limit)), 6), source) for limit, source in found]
+    result = [acceleration_limit(cell.robot(robot), index) for index in range(6)]
+    return [(None if limit is None else round(float(np.degrees(limit)), 6), source) for limit, source in result]
 
 
 def test_full_speed_in_a_quarter_of_a_second_is_assumed_for_three_axes_and_in_less_for_the_wrist(load: Load) -> None:

@@ -77,13 +77,13 @@ def test_a_cell_without_controllers_knows_none(load: Load) -> None:
 
 def test_the_cycle_of_a_controller_is_that_over_which_jerk_is_taken(connected: Load) -> None:
     """Stated at one key or at both, or by the motion where the robot states none."""
-    own = "cycle_ms: 8, "
-    beside = ("    controller: {id: c2", "    controller_cycle_ms: 8\n    controller: {id: c2")
+    cycle = "cycle_ms: 8, "
+    edit = ("    controller: {id: c2", "    controller_cycle_ms: 8\n    controller: {id: c2")
 
     assert connected().robot("worker").controller_cycle == 0.008
-    assert connected(beside).robot("worker").controller_cycle == 0.008
-    assert connected((own, ""), beside).robot("worker").controller_cycle == 0.008
-    assert connected((own, "")).robot("worker").controller_cycle == 0.004
+    assert connected(edit).robot("worker").controller_cycle == 0.008
+    assert connected((cycle, ""), edit).robot("worker").controller_cycle == 0.008
+    assert connected((cycle, "")).robot("worker").controller_cycle == 0.004
     assert connected().robot("holder").controller_cycle == 0.004
 
 

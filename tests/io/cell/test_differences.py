@@ -24,13 +24,13 @@ from cellplan.io.cell.write import written_document
 )
 def test_a_change_is_found_again_and_nothing_else(cells: Path, values: dict[str, object], expected: object) -> None:
     cell = load_cell(cells / "four_robots.yaml")
-    found = document_differences([written_document(cell), written_document(cell.with_values(values))])
+    differences = document_differences([written_document(cell), written_document(cell.with_values(values))])
     if expected is None:  # a list beside a word is shown whole
-        assert list(found) == ["robots.kuka.start_deg"]
-        assert len(found["robots.kuka.start_deg"][0]) == 6
-        assert found["robots.kuka.start_deg"][1] == "auto"
+        assert list(differences) == ["robots.kuka.start_deg"]
+        assert len(differences["robots.kuka.start_deg"][0]) == 6
+        assert differences["robots.kuka.start_deg"][1] == "auto"
     else:
-        assert found == expected
+        assert differences == expected
 
 
 def test_what_only_some_have_is_named_once_at_its_top() -> None:

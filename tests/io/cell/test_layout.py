@@ -34,13 +34,15 @@ def test_addresses_work_with_and_without_their_section(load: Load) -> None:
     first = bare.layout.ranges[0]
     assert (first.address, first.lower, first.upper, first.given) == ("robots.worker.base.x_mm", 0.0, 2.5, 2.0)
     joints = bare.robot("holder").model.joints
-    assert [(each.lower, each.upper) for each in bare.layout.ranges[1:]] == [(it.lower, it.upper) for it in joints]
+    assert [(range_.lower, range_.upper) for range_ in bare.layout.ranges[1:]] == [
+        (it.lower, it.upper) for it in joints
+    ]
 
 
 def test_a_single_number_may_be_named(load: Load) -> None:
     layout = load(with_layout("{vary: {worker.base.yaw_deg: [90, 270], 'holder.start_deg[2]': [100, 110]}}")).layout
     assert layout is not None
-    assert [each.address for each in layout.ranges] == ["robots.worker.base.yaw_deg", "robots.holder.start_deg[2]"]
+    assert [range_.address for range_ in layout.ranges] == ["robots.worker.base.yaw_deg", "robots.holder.start_deg[2]"]
     assert layout.ranges[0].lower == pytest.approx(math.pi / 2)
 
 
@@ -48,10 +50,10 @@ def test_without_ranges_the_operators_and_the_first_start_vary(load: Load) -> No
     layout = load().layout
     assert layout is not None
     assert layout.is_default
-    found = {each.address: (each.lower, each.upper) for each in layout.ranges}
-    assert found["robots.worker.base.x_mm"] == (1.0, 3.0)
-    assert "robots.worker.base.z_mm" not in found  # it stands on the floor
-    assert sum(address.startswith("robots.holder.start_deg") for address in found) == 6
+    result = {range_.address: (range_.lower, range_.upper) for range_ in layout.ranges}
+    assert result["robots.worker.base.x_mm"] == (1.0, 3.0)
+    assert "robots.worker.base.z_mm" not in result  # it stands on the floor
+    assert sum(address.startswith("robots.holder.start_deg") for address in result) == 6
     raised = load(("xyz_mm: [2000, 0, 0]", "xyz_mm: [2000, 0, 700]")).layout
     assert raised is not None
     assert {it.address: (it.lower, it.upper) for it in raised.ranges}["robots.worker.base.z_mm"] == (0.0, 0.7)
@@ -60,9 +62,9 @@ def test_without_ranges_the_operators_and_the_first_start_vary(load: Load) -> No
 def test_without_ranges_a_base_far_away_may_come_to_the_holder(load: Load) -> None:
     layout = load(("xyz_mm: [2000, 0, 0]", "xyz_mm: [-4000, 2400, 0]")).layout
     assert layout is not None
-    found = {each.address: (each.lower, each.upper) for each in layout.ranges}
-    assert found["robots.worker.base.x_mm"] == (-5.0, -0.5)
-    assert found["robots.worker.base.y_mm"] == (1.4, 3.4)
+    result = {range_.address: (range_.lower, range_.upper) for range_ in layout.ranges}
+    assert result["robots.worker.base.x_mm"] == (-5.0, -0.5)
+    assert result["robots.worker.base.y_mm"] == (1.4, 3.4)
 
 
 @pytest.mark.parametrize("size", ["[800, 400]", "[800, 400, 10]"])
@@ -91,7 +93,7 @@ def test_what_stands_beside_the_ranges(load: Load) -> None:
     )
     layout = cell.layout
     assert layout is not None
-    assert [each.address for each in layout.ranges] == [
+    assert [range_.address for range_ in layout.ranges] == [
         "robots.worker.base.x_mm",
         "robots.worker.base.z_mm",
         "robots.holder.base.z_mm",
@@ -204,19 +206,19 @@ def test_what_stands_beside_the_ranges(load: Load) -> None:
     ],
 )
 def test_mistakes_are_one_located_line(refuse: Refuse, layout: str, message: str | None) -> None:
-    found = refuse(with_layout(layout))
-    assert len(found) == 1
-    assert found[0].startswith("c:22: layout.")
+    result = refuse(with_layout(layout))
+    assert len(result) == 1
+    assert result[0].startswith("c:22: layout.")
     if message is not None:
-        assert found[0] == f"c:22: layout.{message}"
+        assert result[0] == f"c:22: layout.{message}"
 
 
 def test_a_pedestal_keeps_its_robot_upright(refuse: Refuse) -> None:
-    found = refuse(
+    message = refuse(
         ("    weights: [1, 1, 1, 1, 1, 1]", "    pedestal: {cylinder: {radius_mm: 200}, floor_z_mm: -300}"),
         with_layout("{vary: {worker.base: {roll_deg: [-5, 5]}}}"),
     )
-    assert found == [
+    assert message == [
         "c:22: layout.vary.worker.base.roll_deg: expected no range of roll or pitch for a base so mounted; to tilt it, "
         "use mount: {tilted: …}"
     ]
@@ -284,8 +286,8 @@ def test_wrong_rods_are_one_located_line(refuse: Refuse, tool: str, message: str
 
 
 def test_spin_and_free_spin_exclude_each_other(refuse: Refuse) -> None:
-    found = refuse(("    tool_axis: normal", "    spin_deg: 10\n    free: [spin]"))
-    assert found == ["c:20: tasks.ring.spin_deg: unexpected key, the spin is free: leave out one of them"]
+    message = refuse(("    tool_axis: normal", "    spin_deg: 10\n    free: [spin]"))
+    assert message == ["c:20: tasks.ring.spin_deg: unexpected key, the spin is free: leave out one of them"]
 
 
 def test_a_layout_is_not_written_for_other_tasks_or_modes(load: Load) -> None:

@@ -53,9 +53,9 @@ def test_an_open_mesh_is_refused_unless_it_is_a_surface(
 
     cell = load((old, new.format(", open: true")))
 
-    (found,) = open_surfaces_record(cell)
-    (line,) = open_surface_notes([found])
-    assert (found["open_edges"], found["has_inside"]) == (3, False)
+    (result,) = open_surfaces_record(cell)
+    (line,) = open_surface_notes([result])
+    assert (result["open_edges"], result["has_inside"]) == (3, False)
     assert line[1].endswith("has 3 open edges: contact is detected, containment is not")
 
 

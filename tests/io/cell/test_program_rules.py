@@ -228,14 +228,14 @@ def test_a_written_program_loads_to_the_same_program(load: Load, tmp_path: Path)
 
 def test_found_starts_of_later_tasks_are_written(load: Load, tmp_path: Path) -> None:
     cell = load(*changes())
-    found = np.radians([10, 20, 30, 40, 50, 60])
+    result = np.radians([10, 20, 30, 40, 50, 60])
 
     assert "start_deg: auto" in render_cell(cell).partition("second:")[2]
-    cell = replace(cell, tasks=(cell.tasks[0], replace(cell.tasks[1], start_posture=found)))
+    cell = replace(cell, tasks=(cell.tasks[0], replace(cell.tasks[1], start_posture=result)))
     (tmp_path / "again").write_text(render_cell(cell), encoding="utf-8")
     again = load_cell(tmp_path / "again")
 
-    np.testing.assert_allclose(again.tasks[1].start_posture, found, rtol=1e-15)
+    np.testing.assert_allclose(again.tasks[1].start_posture, result, rtol=1e-15)
     assert again.tasks[0].start_posture is None
 
 

@@ -69,7 +69,7 @@ def test_the_usual_flange_is_described_and_all_possible_ones_are_named(
     assert (made.name, made.source, made.base, made.flange, made.is_usual) == (
         *("two-arm", "arm.urdf", "base", "tool0", False),
     )
-    assert [(each.link, each.joints) for each in made.flanges] == [
+    assert [(flange.link, flange.joints) for flange in made.flanges] == [
         ("tool0", ("j1", "j2")),
         ("left", ("j1", "j2", "g")),
         ("right", ("j1", "j2", "g")),  # carried by a joint that follows g
@@ -79,7 +79,7 @@ def test_the_usual_flange_is_described_and_all_possible_ones_are_named(
 def test_a_named_flange_takes_the_joints_that_lead_to_it(described: Callable[..., RobotDescription]) -> None:
     made = described("revolute", flange="left")
 
-    assert ([each.name for each in made.joints], made.locked, made.is_usual) == (["j1", "j2", "g"], {}, False)
+    assert ([joint.name for joint in made.joints], made.locked, made.is_usual) == (["j1", "j2", "g"], {}, False)
     with pytest.raises(InputError, match="flange: unknown link 'middle'"):
         described(flange="middle")
 
@@ -113,7 +113,7 @@ def test_links_have_the_box_round_all_their_bodies_along_their_own_axes(
     X_LS = inverse(frame.X_BL) @ rod.X_BS
     corners = rod.shape.vertices @ X_LS[:3, :3].T + X_LS[:3, 3]
 
-    assert [(each.link, each.shapes) for each in made.links] == [("base", ("cylinder", "box")), ("upper", ("mesh",))]
+    assert [(link.link, link.shapes) for link in made.links] == [("base", ("cylinder", "box")), ("upper", ("mesh",))]
     assert made.links[0].size == pytest.approx([0.2, 0.2, 0.7], abs=1e-12)
     assert made.links[1].size == pytest.approx(np.ptp(corners, axis=0), abs=1e-12)
 
@@ -170,16 +170,16 @@ def test_without_a_usual_flange_a_name_decides_and_then_the_number_of_joints(
     made = describe_robot(str(path))
 
     assert (made.flange, made.is_usual) == (flange, False)
-    assert {each.link for each in made.flanges} == {a, c, flange}
+    assert {flange.link for flange in made.flanges} == {a, c, flange}
 
 
 def test_every_bundled_robot_is_described_with_its_bodies() -> None:
     made = describe_robot("kuka_kr6")
 
     assert made.model is not None
-    assert sum(len(each.shapes) for each in made.links) == len(made.model.bodies) == 18
+    assert sum(len(link.shapes) for link in made.links) == len(made.model.bodies) == 18
     assert made.cell_lines == "robots:\n  kuka_kr6:\n    model: kuka_kr6\n"
-    assert [each.upper for each in made.joints] == made.model.upper.tolist()
+    assert [joint.upper for joint in made.joints] == made.model.upper.tolist()
 
 
 def test_options_of_urdfs_are_refused_for_other_robots() -> None:

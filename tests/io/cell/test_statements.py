@@ -93,9 +93,9 @@ def test_the_cell_goes_before_the_file_of_the_robot(load: Callable[..., Cell]) -
         axes={"F3": AxisLimitEntry(moment_nm=6.0, inertia_kg_m2=0.1)},
         source="sheet",
     )
-    own = cell.robot("holder").model
-    assert own.body_accuracy is not None
-    assert own.payload is not None
+    model_ = cell.robot("holder").model
+    assert model_.body_accuracy is not None
+    assert model_.payload is not None
 
 
 def test_masses_that_are_not_stated_are_none_and_not_zero(load: Callable[..., Cell]) -> None:
@@ -140,10 +140,10 @@ def test_a_mistake_in_a_cell_is_named_with_its_place(
 def test_an_unstated_accuracy_cannot_be_added(load: Callable[..., Cell], tmp_path: Path) -> None:
     table(tmp_path, f"bodies: [{SOLID}]\n")
     adding = ("motion: {duration_s: 4}", "motion: {duration_s: 4}\nchecks: {body_accuracy: add}")
-    own, no_weights = ("model: abb_irb1600", "model: one.yaml"), (f"{WEIGHTS}\n", "")
+    edit, no_weights = ("model: abb_irb1600", "model: one.yaml"), (f"{WEIGHTS}\n", "")
 
     with pytest.raises(InvalidFileError) as caught:
-        load(adding, own, no_weights)
+        load(adding, edit, no_weights)
 
     assert str(caught.value) == (
         "c:21: checks.body_accuracy: expected stated accuracies of all link bodies to add, got none for worker: state "

@@ -122,11 +122,11 @@ def test_planar_work_keeps_its_made_up_tool_axis(load: Load, tmp_path: Path) -> 
 
 def test_a_found_start_is_written_and_a_given_one_stays(load: Load, tmp_path: Path) -> None:
     cell = load()
-    found = as_written(cell.robot("worker").model, np.array([0.1, -0.2, 0.3, 1.0, -1.1, 3.0]))
+    start = as_written(cell.robot("worker").model, np.array([0.1, -0.2, 0.3, 1.0, -1.1, 3.0]))
 
-    again = reload(cell, tmp_path, {"worker": found, "holder": np.zeros(6)})
+    again = reload(cell, tmp_path, {"worker": start, "holder": np.zeros(6)})
 
-    np.testing.assert_array_equal(again.robot("worker").start, found)
+    np.testing.assert_array_equal(again.robot("worker").start, start)
     np.testing.assert_array_equal(again.robot("holder").start, cell.robot("holder").start)
 
 
@@ -208,9 +208,9 @@ def test_words_with_a_meaning_of_their_own_are_quoted(text: str) -> None:
 
 def test_secondary_goals_are_written_with_their_defaults(cells: Path, tmp_path: Path) -> None:
     text = (cells / "four_robots.yaml").read_text(encoding="utf-8")
-    asked = "gain_per_s: 650, secondary: {manipulability: {}, joint_limits: {}, obstacles: {}, posture: {}}}"
+    goals = "gain_per_s: 650, secondary: {manipulability: {}, joint_limits: {}, obstacles: {}, posture: {}}}"
     assert "gain_per_s: 650}" in text
-    (tmp_path / "cell.yaml").write_text(text.replace("gain_per_s: 650}", asked), encoding="utf-8")
+    (tmp_path / "cell.yaml").write_text(text.replace("gain_per_s: 650}", goals), encoding="utf-8")
     cell = load_cell(tmp_path / "cell.yaml")
 
     again = reload(cell, tmp_path)

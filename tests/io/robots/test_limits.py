@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cellplan.io.robots.limits import LIMIT_TOL, RATES, StatedLimits, limit_findings, tightest
 
-OWN = StatedLimits(lower=-1.0, upper=2.0, velocity=3.0, acceleration=4.0)
+STATED = StatedLimits(lower=-1.0, upper=2.0, velocity=3.0, acceleration=4.0)
 VALUES = st.none() | st.floats(0.01, 10.0)
 
 
@@ -30,22 +30,24 @@ def test_every_limit_has_a_rate() -> None:
 
 
 @given(stated(), stated())
-def test_the_result_is_allowed_by_both_and_missing_only_where_both_are(own: StatedLimits, cell: StatedLimits) -> None:
-    made = tightest(own, cell)
+def test_the_result_is_allowed_by_both_and_missing_only_where_both_are(
+    stated: StatedLimits, cell: StatedLimits
+) -> None:
+    made = tightest(stated, cell)
 
-    for each in (own, cell):
-        assert not [text for _, text in limit_findings(each, made, is_revolute=True) if "limit of the model" in text]
+    for entry in (stated, cell):
+        assert not [text for _, text in limit_findings(entry, made, is_revolute=True) if "limit of the model" in text]
     for name in RATES:
-        known = {getattr(own, name), getattr(cell, name)} - {None}
+        known = {getattr(stated, name), getattr(cell, name)} - {None}
         assert getattr(made, name) in (known or {None})
 
 
 @given(stated(), stated())
-def test_limits_without_findings_are_taken_as_the_cell_states_them(own: StatedLimits, cell: StatedLimits) -> None:
-    if list(limit_findings(own, cell, is_revolute=False)):
+def test_limits_without_findings_are_taken_as_the_cell_states_them(stated: StatedLimits, cell: StatedLimits) -> None:
+    if list(limit_findings(stated, cell, is_revolute=False)):
         return
 
-    made = tightest(own, cell)
+    made = tightest(stated, cell)
 
     for name in RATES:
         value = getattr(cell, name)
@@ -91,4 +93,4 @@ def test_limits_without_findings_are_taken_as_the_cell_states_them(own: StatedLi
 def test_wider_limits_are_found_by_key_in_its_unit(
     cell: StatedLimits, is_revolute: bool, findings: list[tuple[str, str]]
 ) -> None:
-    assert list(limit_findings(OWN, cell, is_revolute=is_revolute)) == findings
+    assert list(limit_findings(STATED, cell, is_revolute=is_revolute)) == findings

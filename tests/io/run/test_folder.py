@@ -321,14 +321,14 @@ def test_a_run_is_never_missing_while_it_is_replaced(tmp_path: Path, monkeypatch
 def left_behind(folder: Path, kind: str, *, by: str = "dead") -> Path:
     """A hidden folder of a process that is no more, of this one, or of another system."""
     path = drafts.hidden_folders(folder / "bench")[kind == ".replaced"]
-    own = f"-{os.getpid()}-{drafts._start(os.getpid())}"
-    assert own in path.name
+    suffix = f"-{os.getpid()}-{drafts._start(os.getpid())}"
+    assert suffix in path.name
     system = drafts._system()
     names = {
-        "dead": path.name.replace(own, "-999999999-123abc"),
-        "reused": path.name.replace(own, f"-{os.getpid()}-123abc"),
+        "dead": path.name.replace(suffix, "-999999999-123abc"),
+        "reused": path.name.replace(suffix, f"-{os.getpid()}-123abc"),
         "living": path.name,
-        "elsewhere": path.name.replace(own, "-999999999-123abc").replace(system, "abcdef"),
+        "elsewhere": path.name.replace(suffix, "-999999999-123abc").replace(system, "abcdef"),
     }
     left = folder / names[by]
     left.mkdir(parents=True)

@@ -35,7 +35,7 @@ def test_an_untouched_folder_gives_no_finding(run: tuple[Path, Manifest]) -> Non
 
     assert reported(folder, manifest) == []
     assert list(manifest.files) == ["report.json", "tables/a.csv", "tables/b.csv"]
-    assert (manifest.status, manifest.cell_file, manifest.own_inputs) == ("passed", "c", ())
+    assert (manifest.status, manifest.cell_file, manifest.user_files) == ("passed", "c", ())
 
 
 def test_what_is_made_from_a_run_later_is_no_part_of_it(run: tuple[Path, Manifest]) -> None:

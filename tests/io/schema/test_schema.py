@@ -38,11 +38,11 @@ def four_robots() -> dict[str, Any]:
 
 
 def places(value: Any, path: Place = ()) -> list[Place]:
-    found = [path] if path else []
+    paths = [path] if path else []
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, item in items:
-        found += places(item, (*path, key))
-    return found
+        paths += places(item, (*path, key))
+    return paths
 
 
 PLACES = places(FOUR_ROBOTS)
@@ -95,7 +95,7 @@ def test_a_renamed_key_is_named_with_its_own_line(place: Place) -> None:
     names = {("robots",), ("tasks",), ("environment",)}
     if place[:-1] not in names:  # names are free; elsewhere the key is unknown
         line = parse_yaml(text.encode(), file="cell").keys[new_place].line
-        assert any(found.startswith(f":{line}: {key_text(new_place)}: unknown key") for found in findings)
+        assert any(finding.startswith(f":{line}: {key_text(new_place)}: unknown key") for finding in findings)
 
 
 WRONG = [True, "wrong word", [], {}, [1, 2], {"a": 1}, -1, 1e300, 5e-324, "", -7.5, ["x"], 10**25]
@@ -110,11 +110,11 @@ def test_a_value_of_another_kind_is_fine_or_named_with_its_line(place: Place, wr
     findings = reported(text)
 
     assert all(1 <= line <= len(text.splitlines()) for line in lines_of(findings))
-    assert all("Input should" not in found and "<" not in found for found in findings)
+    assert all("Input should" not in finding and "<" not in finding for finding in findings)
     kind_differs = isinstance(wrong, bool | list | dict) and wrong not in ([], {})
     if kind_differs and not isinstance(owner(FOUR_ROBOTS, place)[place[-1]], type(wrong)):
         line = parse_yaml(text.encode(), file="cell").line(place)
-        assert any(found.startswith(f":{line}: {key_text(place)}") for found in findings)
+        assert any(finding.startswith(f":{line}: {key_text(place)}") for finding in findings)
 
 
 @given(
@@ -129,14 +129,14 @@ def test_words_that_are_no_number_are_refused_where_they_stand(place: Place, wor
 
     findings = reported(text.replace("987654321", word))
 
-    named = [found for found in findings if f": {key_text(place)}: " in found]
+    named = [finding for finding in findings if f": {key_text(place)}: " in finding]
     assert named
     assert named[0].startswith(f":{line}: ")
 
 
 def walk(node: Any) -> list[Any]:
     children = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
-    return [node, *(found for child in children for found in walk(child))]
+    return [node, *(path for child in children for path in walk(child))]
 
 
 def test_the_json_schema_is_closed_and_holds_no_null() -> None:

@@ -13,9 +13,9 @@ FILES = {"cell.yaml": b"cell", "robots/arm/arm.urdf": b"arm", "README.md": b"pag
 
 def tree(folder: Path) -> dict[str, bytes]:
     """Every file below a folder; folders without files end in a slash."""
-    found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    files = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
     empty = [p for p in folder.rglob("*") if p.is_dir() and not any(p.iterdir())]
-    return found | {f"{p.relative_to(folder).as_posix()}/": b"" for p in empty}
+    return files | {f"{p.relative_to(folder).as_posix()}/": b"" for p in empty}
 
 
 def test_a_new_folder_holds_the_files_and_nothing_else(tmp_path: Path) -> None:

@@ -90,8 +90,8 @@ def keys_of(node: Any) -> set[str]:
         return {key for item in node for key in keys_of(item)}
     if not isinstance(node, dict):
         return set()
-    own = set(node.get("properties", {})) | {word for word in node.get("enum", []) if isinstance(word, str)}
-    return own | {key for item in node.values() for key in keys_of(item)}
+    names = set(node.get("properties", {})) | {word for word in node.get("enum", []) if isinstance(word, str)}
+    return names | {key for item in node.values() for key in keys_of(item)}
 
 
 def test_the_page_names_the_cell_and_its_schema(template: Template, folder: Path) -> None:

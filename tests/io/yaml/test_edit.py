@@ -43,14 +43,14 @@ def test_an_edit_changes_one_line_and_the_text_reads_as_the_new_values(path, val
     text = edited_text(TEXT, {path: value})
 
     assert line in text.splitlines()
-    kept = [each for each in TEXT.splitlines() if each in text.splitlines()]
-    assert len(kept) >= len(TEXT.splitlines()) - 2
+    unchanged = [line for line in TEXT.splitlines() if line in text.splitlines()]
+    assert len(unchanged) >= len(TEXT.splitlines()) - 2
     node = parse_yaml(text.encode(), file="x").root
     for step in path[:-1]:
         node, before = node[step], before[step]
     assert (path[-1] not in node) if value is REMOVED else (node[path[-1]] == value)
-    assert {key: each for key, each in node.items() if key != path[-1]} == {
-        key: each for key, each in before.items() if key != path[-1]
+    assert {key: value for key, value in node.items() if key != path[-1]} == {
+        key: value for key, value in before.items() if key != path[-1]
     }
 
 

@@ -36,8 +36,8 @@ def desired_twist(cell, V):
     return {f"{task.name}:{name}": speed for name, speed in zip(("px", "py", "pz", "rx", "ry", "rz"), V, strict=True)}
 
 
-def closure_gap(net, speeds):
-    return np.abs(net.matrix @ np.array([speeds[name] for name in net.joints])).max()
+def closure_gap(net, velocities):
+    return np.abs(net.matrix @ np.array([velocities[name] for name in net.joints])).max()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -56,11 +56,11 @@ def test_secondary_and_primary_sides_are_the_closure(pair):
     _, _, net = pair
     primary = ["op0/j1", "task_op0:rx", "holder/j4"]
     N_s, N_p = partition(net, primary)
-    speeds = np.random.default_rng(0).normal(size=len(net.joints))
+    velocities = np.random.default_rng(0).normal(size=len(net.joints))
     given = [net.joints.index(name) for name in primary]
     sought = [i for i in range(len(net.joints)) if i not in given]
 
-    np.testing.assert_allclose(N_s @ speeds[sought] - N_p @ speeds[given], net.matrix @ speeds, atol=1e-13)
+    np.testing.assert_allclose(N_s @ velocities[sought] - N_p @ velocities[given], net.matrix @ velocities, atol=1e-13)
 
 
 def test_imposed_tool_motion_with_a_locked_and_a_driven_joint_agrees_with_the_matrix(pair):
@@ -75,11 +75,11 @@ def test_imposed_tool_motion_with_a_locked_and_a_driven_joint_agrees_with_the_ma
     known = [net.joints.index(name) for name in imposed]
     free = [i for i in range(12) if i not in known]
     by_matrix = np.linalg.solve(J[:, free], V - J[:, known] @ np.array(list(imposed.values())))
-    speeds = np.array([solved.speeds[name] for name in net.joints])
+    velocities = np.array([solved.velocities[name] for name in net.joints])
     assert solved.freedom == 0
-    assert np.abs(speeds[free] - by_matrix).max() <= SOLVE_TOL * np.abs(by_matrix).max()
-    np.testing.assert_array_equal(speeds[known], list(imposed.values()))
-    assert closure_gap(net, solved.speeds) <= SOLVE_TOL * np.abs(by_matrix).max()
+    assert np.abs(velocities[free] - by_matrix).max() <= SOLVE_TOL * np.abs(by_matrix).max()
+    np.testing.assert_array_equal(velocities[known], list(imposed.values()))
+    assert closure_gap(net, solved.velocities) <= SOLVE_TOL * np.abs(by_matrix).max()
 
 
 def test_monitored_tool_motion_is_what_the_joints_give(pair):
@@ -89,7 +89,7 @@ def test_monitored_tool_motion_is_what_the_joints_give(pair):
 
     solved = solve_network(net, dict(zip(net.joints[:12], qdot, strict=True)))
 
-    measured = [solved.speeds[name] for name in desired_twist(cell, np.zeros(6))]
+    measured = [solved.velocities[name] for name in desired_twist(cell, np.zeros(6))]
     expected = planners_jacobian(cell, q)[0] @ qdot
     assert np.abs(measured - expected).max() <= AGREEMENT * np.abs(expected).max() * 10  # one more solve
     assert solved.freedom == 0
@@ -104,9 +104,9 @@ def test_freedom_is_counted_and_spent_on_the_least_weighted_motion(pair):
 
     J, W_inv = planners_jacobian(cell, q)[0], np.diag(1.0 / weights[:12])
     expected = W_inv @ J.T @ np.linalg.solve(J @ W_inv @ J.T, V)  # weighted pseudo-inverse, D.28
-    found = np.array([solved.speeds[name] for name in net.joints[:12]])
+    result = np.array([solved.velocities[name] for name in net.joints[:12]])
     assert solved.freedom == 6
-    assert np.abs(found - expected).max() <= SOLVE_TOL * np.abs(expected).max()
+    assert np.abs(result - expected).max() <= SOLVE_TOL * np.abs(expected).max()
 
 
 def test_a_driven_positioner_joint_moves_the_operator_that_holds_its_place(pair):
@@ -118,8 +118,8 @@ def test_a_driven_positioner_joint_moves_the_operator_that_holds_its_place(pair)
 
     J = planners_jacobian(cell, q)[0]
     follow = np.linalg.solve(J[:, 6:], -J[:, 0])
-    found = [solved.speeds[f"op0/j{i}"] for i in range(6)]
-    assert np.abs(found - follow).max() <= SOLVE_TOL * np.abs(follow).max()
+    result = [solved.velocities[f"op0/j{i}"] for i in range(6)]
+    assert np.abs(result - follow).max() <= SOLVE_TOL * np.abs(follow).max()
 
 
 def test_too_many_imposed_speeds_are_refused(pair):
@@ -150,7 +150,7 @@ def test_all_imposed_is_accepted_when_it_fits(pair):
 def test_nothing_imposed_is_rest(pair):
     _, _, net = pair
     solved = solve_network(net, {})
-    assert set(solved.speeds.values()) == {0.0}
+    assert set(solved.velocities.values()) == {0.0}
     assert solved.freedom == 12
 
 
@@ -222,7 +222,7 @@ def test_the_worked_example_of_the_concept_page_is_what_the_library_gives():
     J = davies_cooperation_jacobian(cell, np.zeros(4), plane=PlaneName.XY)[0]
     net = network(cell, np.zeros(4), plane=PlaneName.XY)
     rest = {joint.name: 0.0 for joint in net.graph.joints if joint.is_virtual}
-    following = solve_network(net, rest | {"holder/j0": 1.0}).speeds
+    following = solve_network(net, rest | {"holder/j0": 1.0}).velocities
 
     np.testing.assert_allclose(J, [[0.5, -0.5, 0.5, 0.5], [-2, -1, -1, 0], [-1, 1, 1, 1]], atol=1e-14)
     np.testing.assert_allclose([following[f"op0/j{i}"] for i in range(3)], [1, -3, 3], atol=1e-12)
@@ -239,12 +239,12 @@ def test_a_further_holder_closes_a_real_circuit_without_a_virtual_chain():
     assert len(chords) == 2
     assert not any(name.startswith("op1@part") for name in net.joints)
 
-    found = solve_network(net, {**desired_twist(cell, np.zeros(6)), "holder/j0": 0.3})
+    solved = solve_network(net, {**desired_twist(cell, np.zeros(6)), "holder/j0": 0.3})
 
     J = planners_jacobian(cell, q)
-    speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
-    assert found.freedom == 5
-    assert np.abs(J @ speeds).max() <= SOLVE_TOL * np.abs(speeds).max()  # neither tool strays on the part
+    velocities = np.array([solved.velocities[name] for name in net.joints[: cell.joint_count]])
+    assert solved.freedom == 5
+    assert np.abs(J @ velocities).max() <= SOLVE_TOL * np.abs(velocities).max()  # neither tool strays on the part
 
 
 def test_what_a_grasp_leaves_open_is_a_joint_that_is_not_measured():
@@ -253,11 +253,11 @@ def test_what_a_grasp_leaves_open_is_a_joint_that_is_not_measured():
     net = network(cell, q)
     twist = planners_jacobian(cell, q)[1]
 
-    found = solve_network(net, desired_twist(cell, np.zeros(6)) | {"holder/j0": 0.3})
+    solved = solve_network(net, desired_twist(cell, np.zeros(6)) | {"holder/j0": 0.3})
 
-    speeds = np.array([found.speeds[name] for name in net.joints[: cell.joint_count]])
-    turn = [found.speeds[f"op1@part:{name}"] for name in ("rx", "ry", "rz")]
-    np.testing.assert_allclose(twist @ speeds, [0.0, 0.0, 0.0, *turn], atol=SOLVE_TOL * np.abs(speeds).max())
+    velocities = np.array([solved.velocities[name] for name in net.joints[: cell.joint_count]])
+    turn = [solved.velocities[f"op1@part:{name}"] for name in ("rx", "ry", "rz")]
+    np.testing.assert_allclose(twist @ velocities, [0.0, 0.0, 0.0, *turn], atol=SOLVE_TOL * np.abs(velocities).max())
 
 
 def test_planar_holders_have_three_rows_each(cells):

@@ -32,15 +32,15 @@ def graphs(draw):
 
 
 @given(graphs())
-def test_every_circuit_closes(drawn):
-    graph, order = drawn
+def test_every_circuit_closes(cell):
+    graph, order = cell
     B = circuit_matrix(graph, circuits(graph, spanning_tree(graph, order)))
     np.testing.assert_array_equal(B @ graph.incidence.T, 0)
 
 
 @given(graphs())
-def test_circuits_are_independent_and_as_many_as_euler_says(drawn):
-    graph, order = drawn
+def test_circuits_are_independent_and_as_many_as_euler_says(cell):
+    graph, order = cell
     tree = spanning_tree(graph, order)
     B = circuit_matrix(graph, circuits(graph, tree))
     pieces = len(graph.links) - np.linalg.matrix_rank(graph.incidence) if graph.joints else len(graph.links)
@@ -69,10 +69,10 @@ def test_a_cell_has_one_circuit_per_task(operators, held):
     """The circuit matrix of the thesis (Eq. 4.26): virtual chain, operator against it, positioner when it holds."""
     cell = random_cell(operators, operators=operators, held=held, with_follower=True)
     graph = coupling_graph(cell)
-    found = circuits(graph, spanning_tree(graph))
-    B = circuit_matrix(graph, found)
+    loops = circuits(graph, spanning_tree(graph))
+    B = circuit_matrix(graph, loops)
 
-    assert len(found) == operators == len(graph.joints) - len(graph.links) + 1
+    assert len(loops) == operators == len(graph.joints) - len(graph.links) + 1
     np.testing.assert_array_equal(B @ graph.incidence.T, 0)
     for row, task in zip(B, cell.tasks, strict=True):
         signs = {joint.owner: row[column] for column, joint in enumerate(graph.joints) if row[column]}

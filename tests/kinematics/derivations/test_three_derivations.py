@@ -15,11 +15,11 @@ from cellplan.kinematics.derivations.denavit_hartenberg import dh_cooperation_ja
 from cellplan.kinematics.derivations.successive_screws import screw_cooperation_jacobian
 
 AGREEMENT = 1e-11  # [-] of the largest entry; a dozen products of 4x4 matrices leave some 1e-14
-WAYS = [dh_cooperation_jacobian, screw_cooperation_jacobian, davies_cooperation_jacobian]
+DERIVATIONS = [dh_cooperation_jacobian, screw_cooperation_jacobian, davies_cooperation_jacobian]
 
 
 def assert_one_matrix(cell, q):
-    matrices = [planners_jacobian(cell, q), *(way(cell, q) for way in WAYS)]
+    matrices = [planners_jacobian(cell, q), *(derivation(cell, q) for derivation in DERIVATIONS)]
     largest = np.abs(matrices[0]).max()
     for i, first in enumerate(matrices):
         for second in matrices[i + 1 :]:
@@ -80,8 +80,8 @@ def test_two_tasks_of_one_operator_are_two_equal_rows():
     q = np.random.default_rng(2).uniform(-3.0, 3.0, cell.joint_count)
 
     assert_one_matrix(cell, q)
-    for way in WAYS:
-        J = way(cell, q)
+    for derivation in DERIVATIONS:
+        J = derivation(cell, q)
         assert np.abs(J[0] - J[1]).max() <= AGREEMENT * np.abs(J).max()
 
 
@@ -94,8 +94,8 @@ def test_a_robot_without_joints_has_no_columns():
     assert davies_cooperation_jacobian(cell, q).shape == (1, 6, len(cell.robots[0].model.joints))
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_hinges_in_line_have_the_closed_form(way):
+@pytest.mark.parametrize("derivation", DERIVATIONS)
+def test_hinges_in_line_have_the_closed_form(derivation):
     """One hinge each, bases 2 m apart along y, links of 1 m along x: lever arm times rate, minus for the positioner."""
     cell = random_cell(123, operators=1)
     hinge = model_of([("R", (0, 0, 1), (0, 0, 0))], pose([1.0, 0.0, 0.0]))
@@ -105,16 +105,16 @@ def test_hinges_in_line_have_the_closed_form(way):
     )
     part = replace(cell.part, held_by=(replace(cell.part.held_by[0], X_PT=np.eye(4)),))
 
-    J = way(replace(cell, robots=robots, part=part), np.zeros(2))[0]
+    J = derivation(replace(cell, robots=robots, part=part), np.zeros(2))[0]
 
     np.testing.assert_allclose(J[:, 0], [2.0, -1.0, 0, 0, 0, -1.0], atol=1e-15)  # -(z x (1, 2, 0)) and -z
     np.testing.assert_allclose(J[:, 1], [0.0, 1.0, 0, 0, 0, 1.0], atol=1e-15)  # z x (1, 0, 0) and z
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_a_posture_that_does_not_fit_is_refused(way):
+@pytest.mark.parametrize("derivation", DERIVATIONS)
+def test_a_posture_that_does_not_fit_is_refused(derivation):
     cell = random_cell(124, operators=1, joints=5)
     with pytest.raises(InputError, match=r"^q: expected 10 joint positions, one per joint, got shape \(9,\)$"):
-        way(cell, np.zeros(9))
+        derivation(cell, np.zeros(9))
     with pytest.raises(InputError, match=r"^q: expected finite joint positions, got nan$"):
-        way(cell, np.full(10, np.nan))
+        derivation(cell, np.full(10, np.nan))

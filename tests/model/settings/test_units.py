@@ -81,14 +81,14 @@ def leaves(annotation: Any) -> set[Any]:
     return set().union(*map(leaves, parts)) if parts else {annotation}
 
 
-def entries(model: Any, found: dict[Any, None]) -> dict[Any, None]:
+def entries(model: Any, values: dict[Any, None]) -> dict[Any, None]:
     """A mapping of the format, and all mappings below it."""
-    if isinstance(model, type) and issubclass(model, Entry) and model not in found:
-        found[model] = None
+    if isinstance(model, type) and issubclass(model, Entry) and model not in values:
+        values[model] = None
         for field in model.model_fields.values():
             for leaf in leaves(field.annotation):
-                entries(leaf, found)
-    return found
+                entries(leaf, values)
+    return values
 
 
 def numbers(value: Any) -> list[Any]:

@@ -25,7 +25,7 @@ from cellplan.pipeline.compare.result import comparison_files
 from cellplan.report.record.figures import KEY, figures_of
 from cellplan.study.trial import TrialStatus, Variant
 
-pytestmark = pytest.mark.usefixtures("trials_here", "kept_solutions")
+pytestmark = pytest.mark.usefixtures("trials_here", "stored_solutions")
 
 TOLERANCES = tuple(f"tasks.{task}.tolerance.position_mm=0.5" for task in ("first", "second"))
 COARSE = ("motion.step_s=0.02", "solver.integrator=accurate", *TOLERANCES)
@@ -55,27 +55,27 @@ def mixed(place: Path, sound: Path) -> dict[str, Any]:
 
 def figures(record: dict[str, Any], name: str) -> dict[str, Any]:
     """Figures of a variant."""
-    (found,) = [each["figures"] for each in record["variants"] if each["name"] == name]
-    return found
+    (result,) = [variant["figures"] for variant in record["variants"] if variant["name"] == name]
+    return result
 
 
 def test_figures_are_those_of_a_plain_solve(sound: Path, mixed: dict[str, Any]) -> None:
     report = json.loads((sound / "run" / "report.json").read_text())
-    found = figures(mixed, "cell/small.yaml")
-    assert found["cycle_time_s"] == report["cycle_time_s"]
-    assert found["min_clearance_mm"] == report["clearance"]["whole"]["minimum_mm"]
-    assert found["not_in_program"] == report["not_in_program"]
+    result = figures(mixed, "cell/small.yaml")
+    assert result["cycle_time_s"] == report["cycle_time_s"]
+    assert result["min_clearance_mm"] == report["clearance"]["whole"]["minimum_mm"]
+    assert result["not_in_program"] == report["not_in_program"]
     for robot, joints in report["joints"].items():
         load = sum(joint["travel"] / joint["velocity_limit"] for joint in joints.values())
         for kind in ("load_s", "phase_load_s", "work_load_s"):
-            assert found["robots"][robot][kind] == pytest.approx(load, rel=1e-11)
-        assert found["robots"][robot]["role"] == report["motion_share"][robot]["role"]
-        assert found["robots"][robot]["motion_share"] == pytest.approx(
+            assert result["robots"][robot][kind] == pytest.approx(load, rel=1e-11)
+        assert result["robots"][robot]["role"] == report["motion_share"][robot]["role"]
+        assert result["robots"][robot]["motion_share"] == pytest.approx(
             report["motion_share"][robot]["share"], rel=1e-11
         )
     for name, task in report["tasks"].items():
         errors = (task["max_position_error_mm"], task["max_position_error_between_rows_mm"])
-        assert found["tasks"][name]["position_error_mm"] == max(errors)
+        assert result["tasks"][name]["position_error_mm"] == max(errors)
 
 
 def test_a_run_has_the_figures_of_its_cell_and_says_that_its_proof_was_not_made_again(mixed: dict[str, Any]) -> None:
@@ -94,15 +94,15 @@ def test_figures_from_records_are_those_from_reports(place: Path, modes: dict[st
     """A second derivation of the key figures that a sweep has."""
     values = dict(map(read_setting, COARSE)) | {"motion.mode": mode}
     solution = solve(load_cell(place / "pair.yaml").with_values(values))
-    expected = figures_of([each.report for each in solution.runs]).record(KEY)
-    found = figures(modes, mode)
-    assert {key: found[key] for key in expected} == expected
+    expected = figures_of([run.report for run in solution.runs]).record(KEY)
+    result = figures(modes, mode)
+    assert {key: result[key] for key in expected} == expected
     for kind in ("velocity", "acceleration"):  # every phase works on a task
-        assert found[f"work_{kind}_ratio"] == expected[f"max_{kind}_ratio"]  # type: ignore[literal-required]
+        assert result[f"work_{kind}_ratio"] == expected[f"max_{kind}_ratio"]  # type: ignore[literal-required]
 
 
 def test_every_mode_is_a_variant_and_what_breaks_is_named(modes: dict[str, Any]) -> None:
-    verdicts = {each["name"]: each["status"] for each in modes["variants"]}
+    verdicts = {variant["name"]: variant["status"] for variant in modes["variants"]}
     assert list(verdicts) == [str(mode) for mode in Mode]
     assert verdicts["pairwise"] == "passed"
     assert verdicts["simultaneous"] == verdicts["part_at_rest"] == "failed"
@@ -121,11 +121,11 @@ def test_a_mode_that_cannot_be_planned_is_a_variant_with_its_reason(cells: Path)
 
 def test_inputs_that_differ_are_listed_with_both_values(mixed: dict[str, Any]) -> None:
     """Those of a run: what was to be found when it was solved."""
-    found = {each["key"]: each["values"] for each in mixed["differences"]}
-    assert found["robots.right.start_deg"][0] == "auto"
-    assert len(found["robots.right.start_deg"][1]) == 3
-    assert {key.partition(".")[0] for key in found} == {"robots"}
-    assert {key.rpartition(".")[2] for key in found} <= {"start_deg", "home_deg"}
+    result = {difference["key"]: difference["values"] for difference in mixed["differences"]}
+    assert result["robots.right.start_deg"][0] == "auto"
+    assert len(result["robots.right.start_deg"][1]) == 3
+    assert {key.partition(".")[0] for key in result} == {"robots"}
+    assert {key.rpartition(".")[2] for key in result} <= {"start_deg", "home_deg"}
 
 
 def test_a_run_whose_report_lacks_a_figure_is_a_variant_with_that_reason(sound: Path, tmp_path: Path) -> None:
@@ -175,11 +175,13 @@ def test_the_page_is_whole_and_needs_nothing_else(
     assert page.count("<svg xmlns=") == 3
     assert "://" not in page.replace("http://www.w3.org", "")
     record = modes if study == "modes" else mixed
-    assert all(each["name"] in page for each in record["variants"])
+    assert all(variant["name"] in page for variant in record["variants"])
 
 
 def test_the_page_and_table_of_modes_without_a_motion_give_their_reasons(modes: dict[str, Any]) -> None:
-    gone = [{**each, "status": "no_solution", "reason": "kuka: lost", "figures": {}} for each in modes["variants"]]
+    gone = [
+        {**variant, "status": "no_solution", "reason": "kuka: lost", "figures": {}} for variant in modes["variants"]
+    ]
     files = comparison_files({**modes, "variants": gone}, [None] * len(gone))
     assert set(files) == {"study.json", "study.csv", "study.html"}
     assert files["study.html"].decode().count("<li>kuka: lost</li>") == len(gone)
@@ -188,7 +190,7 @@ def test_the_page_and_table_of_modes_without_a_motion_give_their_reasons(modes: 
 
 def test_the_table_has_a_row_for_each_variant(place: Path, modes: dict[str, Any]) -> None:
     rows = list(csv.DictReader((place / "modes" / "study.csv").read_text().splitlines()))
-    assert [row["name"] for row in rows] == [each["name"] for each in modes["variants"]]
+    assert [row["name"] for row in rows] == [variant["name"] for variant in modes["variants"]]
     assert float(rows[1]["load_s left"]) == figures(modes, "pairwise")["robots"]["left"]["load_s"]
 
 

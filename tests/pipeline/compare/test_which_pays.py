@@ -79,14 +79,14 @@ def test_moves_that_a_program_leaves_out_weaken_the_claim() -> None:
 def test_what_fails_is_named_with_its_first_check_and_still_has_a_load() -> None:
     failed = {"failed": ["work-1: joint B2 is beyond"], "failed_checks": 1}
     bad = variant("bad", status="failed", reason="joint B2 is beyond", operator_load_s=7.0, **failed)
-    found = sentences([variant("good"), bad, without_motion("none", "no_solution"), without_motion("odd", "bad_input")])
-    assert found[:4] == [
+    texts = sentences([variant("good"), bad, without_motion("none", "no_solution"), without_motion("odd", "bad_input")])
+    assert texts[:4] == [
         "Only good passes every check: 4 s.",
         "bad fails 1 check, first: work-1: joint B2 is beyond.",
         "none has no solution: kuka: no start posture.",
         "odd is no valid cell: kuka: no start posture.",
     ]
-    assert "Load of the operators, most first: bad 7 s, good 3 s." in found
+    assert "Load of the operators, most first: bad 7 s, good 3 s." in texts
 
 
 def test_nothing_pays_where_nothing_passes() -> None:
@@ -101,5 +101,5 @@ def test_figures_that_are_not_known_are_no_costs() -> None:
 
 
 def test_a_run_that_was_not_verified_again_is_named() -> None:
-    found = sentences([variant("one"), variant("run", proof="name the cell file with --cell")])
-    assert found[-1] == "run was not verified again: name the cell file with --cell."
+    texts = sentences([variant("one"), variant("run", proof="name the cell file with --cell")])
+    assert texts[-1] == "run was not verified again: name the cell file with --cell."

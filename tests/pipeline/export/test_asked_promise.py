@@ -37,10 +37,12 @@ def export(folder: Path, *options: str) -> tuple[int, str, str]:
 
 
 def test_a_timed_program_is_not_for_robots_that_wait(run: VerifiedRun) -> None:
-    found = choose_promise(run, URSCRIPT, ("right",))
+    promise = choose_promise(run, URSCRIPT, ("right",))
 
-    assert found.promise is Promise.TIMED
-    assert "not to be played with programs that wait at marks: --promise sequence writes those that do" in found.remarks
+    assert promise.promise is Promise.TIMED
+    assert (
+        "not to be played with programs that wait at marks: --promise sequence writes those that do" in promise.remarks
+    )
 
 
 def test_the_programs_of_two_makers_wait_at_the_same_marks(folder: Path) -> None:
@@ -70,7 +72,7 @@ def test_a_promise_that_is_not_kept_is_not_replaced_by_a_lesser_one(folder: Path
 
 
 def test_a_latency_that_is_not_stated_is_asked_for_where_times_are(run: VerifiedRun) -> None:
-    unstated = {name: each.changed(latency_ms=None) for name, each in run.cell.controllers.items()}
+    unstated = {name: controller.changed(latency_ms=None) for name, controller in run.cell.controllers.items()}
     bare = replace(run, cell=replace(run.cell, controllers=unstated), token=ACCESS_TOKEN)
 
     assert choose_promise(bare, URSCRIPT, ("right",)).promise is Promise.SEQUENCE_ONLY
@@ -83,9 +85,9 @@ def test_robots_whose_waits_no_format_writes_are_named(run: VerifiedRun) -> None
     other = ControllerEntry(kind="reis")
     mixed = replace(run.cell, controllers={**run.cell.controllers, "other": other})
 
-    found = choose_promise(replace(run, cell=mixed, token=ACCESS_TOKEN), VAL3, ("left",))
+    promise = choose_promise(replace(run, cell=mixed, token=ACCESS_TOKEN), VAL3, ("left",))
 
-    assert "no format writes the waits of right: program the marks of export.json there by hand" in found.remarks
+    assert "no format writes the waits of right: program the marks of export.json there by hand" in promise.remarks
 
 
 def test_a_promise_that_a_format_cannot_state_is_refused() -> None:

@@ -68,7 +68,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> Programs:
 
 def refusals(kind: str, source: Path, run: VerifiedRun, place: Path, *, seeds: range, seals: bool) -> list[str]:
     """What is said of broken copies; fails where one passes."""
-    found = []
+    messages = []
     for seed in seeds:
         rng = np.random.default_rng([seed, *kind.encode()])
         copy = place / f"{kind}-{seed}-{seals}"
@@ -85,8 +85,8 @@ def refusals(kind: str, source: Path, run: VerifiedRun, place: Path, *, seeds: r
             (copy / "export.json").write_text(json.dumps(record, indent=2), encoding="utf-8")
         with pytest.raises((InputError, NotVerifiedError)) as refusal:
             verify_export(read_stored_export(copy), run)
-        found.append(str(refusal.value))
-    return found
+        messages.append(str(refusal.value))
+    return messages
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -134,7 +134,7 @@ def test_no_broken_program_of_a_maker_is_verified_whose_digest_fits(
     folder, run = programs(form)
     said = refusals(kind, folder, run, tmp_path, seeds=range(SEALED_ROUNDS + 1), seals=True)
     said += refusals(kind, folder, run, tmp_path, seeds=range(ROUNDS), seals=False)
-    assert all(str(tmp_path) in each for each in said)
+    assert all(str(tmp_path) in entry for entry in said)
 
 
 @pytest.mark.parametrize("form", [*QUICK, *(pytest.param(form, marks=pytest.mark.slow) for form in ("krl", "rapid"))])
@@ -150,8 +150,8 @@ def test_there_are_hundreds_of_kinds_and_no_format_is_left_out() -> None:
 
 def test_untouched_programs_are_verified(exports: dict[str, Path], run: VerifiedRun) -> None:
     for folder in exports.values():
-        found = verify_export(read_stored_export(folder), run)
-        assert found.remarks == ()
+        verified = verify_export(read_stored_export(folder), run)
+        assert verified.remarks == ()
 
 
 @pytest.mark.parametrize(

@@ -25,9 +25,9 @@ NAMES = ("left", "right", "idle")
 @pytest.fixture(scope="module")
 def read(sound: Path) -> ReadRun:
     """The run as it was read; what is verified after that is of no account."""
-    found: list[ReadRun] = []
-    open_gate(sound / "run", cell=sound / "cell" / "small.yaml", refuse=found.append)
-    return found[0]
+    runs: list[ReadRun] = []
+    open_gate(sound / "run", cell=sound / "cell" / "small.yaml", refuse=runs.append)
+    return runs[0]
 
 
 def on(read: ReadRun, kind: KindName, *, handshake: HandshakeEntry | None = None, **stated: float) -> ReadRun:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_speeds
+from cellplan.pipeline.export.interpolant import HermiteRows, resting, row_velocities
 
 UNEVEN = np.array([0.0, 0.3, 0.35, 0.9, 1.0, 1.7])
 UNLIMITED = {"lower": np.array([-np.inf]), "upper": np.array([np.inf])}
@@ -41,7 +41,7 @@ def test_extremes_and_accelerations_are_those_of_a_dense_curve() -> None:
 def test_speeds_of_uneven_rows_are_those_of_the_parabola_through_them() -> None:
     q = (1.0 + 2.0 * UNEVEN - 3.0 * UNEVEN**2)[:, None]
 
-    qd = row_speeds(UNEVEN, q, rests=np.zeros(6, dtype=bool), **UNLIMITED)
+    qd = row_velocities(UNEVEN, q, rests=np.zeros(6, dtype=bool), **UNLIMITED)
 
     np.testing.assert_allclose(qd[1:-1, 0], 2.0 - 6.0 * UNEVEN[1:-1], atol=1e-13)
 
@@ -58,12 +58,12 @@ def test_no_curve_through_rows_at_a_limit_passes_it() -> None:
     q = np.minimum(np.sin(times / 0.39 * np.pi) * 1.01, 1.0)[:, None]
     limits = {"lower": np.array([0.0]), "upper": np.array([1.0])}
     rests = np.zeros(40, dtype=bool)  # other joints of the robot move on
-    free = row_speeds(times, q, rests=rests, **UNLIMITED)
-    kept = row_speeds(times, q, rests=rests, **limits)
+    free = row_velocities(times, q, rests=rests, **UNLIMITED)
+    limited = row_velocities(times, q, rests=rests, **limits)
 
-    low, high = HermiteRows(times=times, q=q, qd=kept).extremes()
+    low, high = HermiteRows(times=times, q=q, qd=limited).extremes()
 
     assert HermiteRows(times=times, q=q, qd=free).extremes()[1].max() > 1.0 + 1e-6
     assert high.max() <= 1.0
     assert low.min() >= 0.0
-    assert np.count_nonzero(np.any(kept != free, axis=1)) < 6
+    assert np.count_nonzero(np.any(limited != free, axis=1)) < 6

@@ -24,7 +24,7 @@ from cellplan.pipeline.export.shared import Shared
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 CYCLES = {"left": 0.004, "right": 0.008, "idle": 0.012}
 LIMITS = ThinningLimits(turn=5e-3, slide=1e-3, tool=5e-4)
 DEGREE = float(np.deg2rad(1.0))
@@ -62,8 +62,8 @@ def _swapped(rows: RobotRows) -> RobotRows:
 
 
 def _dropped(rows: RobotRows) -> RobotRows:
-    own = np.delete(np.arange(len(rows)), 18)
-    return replace(rows, q=rows.q[own], qd=rows.qd[own], times=rows.times[own], process=rows.process[own])
+    left = np.delete(np.arange(len(rows)), 18)
+    return replace(rows, q=rows.q[left], qd=rows.qd[left], times=rows.times[left], process=rows.process[left])
 
 
 def _late(rows: RobotRows) -> RobotRows:
@@ -77,11 +77,11 @@ def _not_a_number(rows: RobotRows) -> RobotRows:
 def test_all_rows_of_a_run_pass_and_hardly_deviate(run: VerifiedRun) -> None:
     job = job_of(run, full_rows(run))
 
-    found = judge(run, dialect(decimals=9), job, read_back(job, decimals=9))
+    judgement = judge(run, dialect(decimals=9), job, read_back(job, decimals=9))
 
-    assert found.findings == ()
-    assert {each.subject for each in found.deviations} >= {"left/A", "right/C", "the tool of task 'path'"}
-    assert max(each.largest for each in found.deviations) < 1e-6
+    assert judgement.findings == ()
+    assert {deviation.subject for deviation in judgement.deviations} >= {"left/A", "right/C", "the tool of task 'path'"}
+    assert max(deviation.largest for deviation in judgement.deviations) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -99,10 +99,10 @@ def test_all_rows_of_a_run_pass_and_hardly_deviate(run: VerifiedRun) -> None:
 def test_what_was_changed_after_it_was_written_is_found(run: VerifiedRun, change: Change, message: str) -> None:
     job = job_of(run, full_rows(run))
 
-    found = judge(run, dialect(decimals=9), job, _changed(read_back(job, decimals=9), "right", change))
+    judgement = judge(run, dialect(decimals=9), job, _changed(read_back(job, decimals=9), "right", change))
 
-    assert len(found.findings) == 1
-    assert re.search(message, found.findings[0])
+    assert len(judgement.findings) == 1
+    assert re.search(message, judgement.findings[0])
 
 
 def test_a_missing_robot_or_program_is_found(run: VerifiedRun) -> None:
@@ -120,11 +120,11 @@ def test_rows_that_were_wrong_before_they_were_written_are_found_by_the_checks(r
     """The writer and the reader agree: only the demands of the cell can tell."""
     job = job_of(run, _changed(full_rows(run), "right", _one_degree))
 
-    found = judge(run, dialect(decimals=9), job, read_back(job, decimals=9))
+    judgement = judge(run, dialect(decimals=9), job, read_back(job, decimals=9))
 
-    assert any("position error of task 'path'" in finding for finding in found.findings)
-    assert any("exceeds its acceleration limit" in finding for finding in found.findings)
-    largest = max(found.deviations, key=lambda each: each.largest if each.unit == "deg" else 0.0)
+    assert any("position error of task 'path'" in finding for finding in judgement.findings)
+    assert any("exceeds its acceleration limit" in finding for finding in judgement.findings)
+    largest = max(judgement.deviations, key=lambda deviation: deviation.largest if deviation.unit == "deg" else 0.0)
     assert (largest.subject, largest.at_s) == ("right/B", 0.5)
     assert largest.largest == pytest.approx(1.0, abs=1e-6)
 
@@ -138,10 +138,10 @@ def test_a_row_beyond_a_limit_is_found_whatever_is_promised(run: VerifiedRun) ->
     job = job_of(run, _changed(full_rows(run), "left", _turned_to(171, 0, 0)), promise=Promise.SEQUENCE_ONLY)
     without_times = {name: replace(rows, times=None) for name, rows in job.programs[0].robots.items()}
 
-    found = judge(run, dialect(decimals=9), job, (replace(job.programs[0], robots=without_times),))
+    judgement = judge(run, dialect(decimals=9), job, (replace(job.programs[0], robots=without_times),))
 
-    assert any("joint left/A is 1 deg beyond its upper limit 170 deg" in finding for finding in found.findings)
-    assert found.not_judged == (
+    assert any("joint left/A is 1 deg beyond its upper limit 170 deg" in finding for finding in judgement.findings)
+    assert judgement.not_judged == (
         "speeds, accelerations, feeds and loads: the controllers choose their own times",
         "times: the files state none",
     )
@@ -151,10 +151,10 @@ def test_robots_that_meet_are_found(turns: VerifiedRun) -> None:
     """The arm that waits lies across the other one."""
     job = job_of(turns, _changed(full_rows(turns), "right", _turned_to(-30, 0, 0)), promise=Promise.SEQUENCE_ONLY)
 
-    found = judge(turns, dialect(decimals=9), job, read_back(job, decimals=9)).findings
+    result = judge(turns, dialect(decimals=9), job, read_back(job, decimals=9)).findings
 
-    assert found[0].startswith("robot 'right' holds from 0.000 to 2.000 s: joint B is ")
-    assert any(finding.startswith("first: clearance: left/") and " touch, at " in finding for finding in found[1:])
+    assert result[0].startswith("robot 'right' holds from 0.000 to 2.000 s: joint B is ")
+    assert any(finding.startswith("first: clearance: left/") and " touch, at " in finding for finding in result[1:])
 
 
 def test_pairs_that_come_nearer_than_demanded_are_named_with_the_amount_and_a_cure(run: VerifiedRun) -> None:
@@ -162,12 +162,14 @@ def test_pairs_that_come_nearer_than_demanded_are_named_with_the_amount_and_a_cu
     strict = replace(run.cell, checks=run.cell.checks.changed(clearance_mm=500.0))
     job = job_of(run, full_rows(run), promise=Promise.SEQUENCE_ONLY)
 
-    found = judge(replace(run, cell=strict, token=ACCESS_TOKEN), dialect(decimals=9), job, read_back(job, decimals=9))
+    judgement = judge(
+        replace(run, cell=strict, token=ACCESS_TOKEN), dialect(decimals=9), job, read_back(job, decimals=9)
+    )
 
-    near = [finding for finding in found.findings if finding.startswith("clearance: ")]
+    near = [finding for finding in judgement.findings if finding.startswith("clearance: ")]
     assert len(near) > 1
-    kept = r"(come as near as|are proved to keep) [0-9.]+ mm"
-    form = rf"clearance: \S+ and \S+ {kept} .*, at [0-9.]+ s, demanded 500 mm; let "
+    wording = r"(come as near as|are proved to keep) [0-9.]+ mm"
+    form = rf"clearance: \S+ and \S+ {wording} .*, at [0-9.]+ s, demanded 500 mm; let "
     assert all(re.match(form, finding) for finding in near)
 
 
@@ -179,18 +181,18 @@ def test_every_program_of_a_run_is_judged(turns: VerifiedRun) -> None:
 
     assert [program.name for program in full] == ["first", "second"]
     assert judge(turns, dialect(decimals=9), job, read_back(job, decimals=9)).findings == ()
-    found = judge(turns, dialect(decimals=9), other, read_back(other, decimals=9)).findings
-    assert any(finding.startswith("second: position error of task 'second'") for finding in found)
-    assert not any(finding.startswith("first: ") for finding in found)
+    result = judge(turns, dialect(decimals=9), other, read_back(other, decimals=9)).findings
+    assert any(finding.startswith("second: position error of task 'second'") for finding in result)
+    assert not any(finding.startswith("first: ") for finding in result)
 
 
 def test_resampled_rows_pass_on_their_own_cycles(run: VerifiedRun) -> None:
     job = job_of(run, [resampled(run.cell, program, CYCLES) for program in full_rows(run)])
 
-    found = judge(run, dialect(), job, read_back(job, decimals=6), lead=lead_time(CYCLES))
+    judgement = judge(run, dialect(), job, read_back(job, decimals=6), lead=lead_time(CYCLES))
     early = judge(run, dialect(), job, read_back(job, decimals=6), lead=0.0)
 
-    assert found.findings == ()
+    assert judgement.findings == ()
     assert any("position error" in finding for finding in early.findings)
 
 
@@ -207,23 +209,27 @@ def test_a_cubic_is_judged_between_its_rows(run: VerifiedRun) -> None:
     read = read_back(job, decimals=9)
 
     assert judge(run, cubic, job, read).findings == ()
-    found = judge(run, cubic, job, _changed(read, "right", other_speed)).findings
-    assert any("position error of task 'path'" in finding for finding in found)
+    result = judge(run, cubic, job, _changed(read, "right", other_speed)).findings
+    assert any("position error of task 'path'" in finding for finding in result)
 
 
 def test_thinned_rows_without_times_are_judged_as_a_path(run: VerifiedRun) -> None:
     scene, names = Scene.from_cell(run.cell), [robot.name for robot in run.cell.robots]
     programs = [
-        thinned(scene, program, groups=[names], limits=LIMITS, essential_rows=kept)
-        for program, kept in zip(full_rows(run), essential_rows(run), strict=True)
+        thinned(scene, program, groups=[names], limits=LIMITS, essential_rows=essential)
+        for program, essential in zip(full_rows(run), essential_rows(run), strict=True)
     ]
     job = job_of(run, programs, promise=Promise.SEQUENCE_ONLY)
     sparse = dialect(decimals=5, is_thinned=True)
 
-    found = judge(run, sparse, job, read_back(job, decimals=5, with_times=False))
+    judgement = judge(run, sparse, job, read_back(job, decimals=5, with_times=False))
 
-    assert found.findings == ()
-    tool = next(each for each in found.deviations if each.subject == "the tool of task 'path'" and each.unit == "mm")
+    assert judgement.findings == ()
+    tool = next(
+        deviation
+        for deviation in judgement.deviations
+        if deviation.subject == "the tool of task 'path'" and deviation.unit == "mm"
+    )
     assert 0.01 < tool.largest <= 1e3 * LIMITS.tool + 0.01
 
 
@@ -241,21 +247,21 @@ def test_rows_on_the_cycle_of_a_controller_are_judged_as_they_are_played(run: Ve
     job = job_of(run, _changed(full_rows(run), "idle", _trembling))
     read = read_back(job, decimals=9)
 
-    found = {
-        name: judge(run, own, job, read)
-        for name, own in {"one": one_by_one, "sparse": sparse, "cycle": on_cycle}.items()
+    result = {
+        name: judge(run, form, job, read)
+        for name, form in {"one": one_by_one, "sparse": sparse, "cycle": on_cycle}.items()
     }
 
-    assert any("acceleration" in finding for finding in found["cycle"].findings)
-    assert found["cycle"].findings == found["one"].findings
-    assert not any("acceleration" in finding for finding in found["sparse"].findings)
-    assert found["cycle"].not_judged == ()
-    assert len(found["sparse"].not_judged) == 1
+    assert any("acceleration" in finding for finding in result["cycle"].findings)
+    assert result["cycle"].findings == result["one"].findings
+    assert not any("acceleration" in finding for finding in result["sparse"].findings)
+    assert result["cycle"].not_judged == ()
+    assert len(result["sparse"].not_judged) == 1
 
 
 def test_decimals_of_a_robot_count_in_the_language_of_its_controller_only(run: VerifiedRun) -> None:
     stated = replace(run.cell.robot("right"), control=RobotControlEntry(id="one", decimals=2))
-    cell = replace(run.cell, robots=tuple(stated if each.name == "right" else each for each in run.cell.robots))
+    cell = replace(run.cell, robots=tuple(stated if robot.name == "right" else robot for robot in run.cell.robots))
     job = job_of(run, full_rows(run))
     job = replace(job, frame=replace(job.frame, cell=cell))
     read = _changed(read_back(job, decimals=9), "right", lambda rows: replace(rows, q=rows.q + 0.004 * DEGREE))
@@ -271,8 +277,8 @@ def test_robots_that_are_not_exported_move_as_in_the_run(run: VerifiedRun) -> No
     other = job_of(run, _changed(full_rows(run, ["right"]), "right", _one_degree))
 
     assert judge(run, dialect(decimals=9), job, read_back(job, decimals=9)).findings == ()
-    found = judge(run, dialect(decimals=9), other, read_back(other, decimals=9)).findings
-    assert any("position error of task 'path'" in finding for finding in found)
+    result = judge(run, dialect(decimals=9), other, read_back(other, decimals=9)).findings
+    assert any("position error of task 'path'" in finding for finding in result)
 
 
 @pytest.mark.parametrize(("limits", "stops"), [(LIMITS, False), (replace(LIMITS, turn=0.1, tool=0.01), True)])
@@ -282,18 +288,18 @@ def test_rounded_corners_count_with_what_they_may_be_off(
     """Half of each segment may be rounded where rows are dense; some rows stay stops where segments are long."""
     scene, names = Scene.from_cell(run.cell), [robot.name for robot in run.cell.robots]
     few = [
-        thinned(scene, program, groups=[names], limits=limits, essential_rows=kept)
-        for program, kept in zip(full_rows(run), essential_rows(run), strict=True)
+        thinned(scene, program, groups=[names], limits=limits, essential_rows=essential)
+        for program, essential in zip(full_rows(run), essential_rows(run), strict=True)
     ]
     sparse, job = dialect(decimals=9, is_thinned=True), job_of(run, few, promise=Promise.SEQUENCE_ONLY)
 
     chosen = with_rounding(sparse, job, shared=Shared(run))
 
-    found = judge(run, sparse, chosen, read_back(chosen, decimals=9))
+    judgement = judge(run, sparse, chosen, read_back(chosen, decimals=9))
     left, count = stops_left(chosen)
-    assert found.findings == ()
+    assert judgement.findings == ()
     assert (0 < left < count) if stops else left == 0
-    assert found.rounded[0] == count - left
+    assert judgement.rounded[0] == count - left
     wide = judge(run, sparse, replace(job, blend=0.5), read_back(job, decimals=9)).findings
     assert any("position error of task 'path'" in finding for finding in wide) == stops
 
@@ -306,15 +312,15 @@ def test_rows_that_are_read_with_more_rounding_than_written_are_found(run: Verif
     allowed = row_shares(job, job.programs[0])[name]
     row = int(np.flatnonzero(allowed > 0.0)[0])
 
-    def found(rounding: np.ndarray) -> tuple[str, ...]:
+    def result(rounding: np.ndarray) -> tuple[str, ...]:
         robots = {**read.robots, name: replace(read.robots[name], rounding=rounding)}
         return judge(run, dialect(decimals=9), job, (replace(read, robots=robots),)).findings
 
-    assert found(allowed) == ()
-    assert found(np.zeros(len(allowed))) == ()
+    assert result(allowed) == ()
+    assert result(np.zeros(len(allowed))) == ()
     wide = allowed.copy()
     wide[row] = 0.6
-    assert found(wide) == (
+    assert result(wide) == (
         f"robot '{name}': row {row + 1}: expected rounding of at most 0.5 of the shorter segment, read 0.6",
     )
 
@@ -329,7 +335,7 @@ def test_what_rounded_rows_may_add_is_stated(run: VerifiedRun) -> None:
 
     assert none.corners == ()
     assert none.rounded[0] == 0 < some.rounded[0] == more.rounded[0] < more.rounded[1]
-    assert {each.subject for each in some.corners} == {"the tool of task 'path'"}
-    assert {each.unit for each in some.corners} == {"mm", "deg"}
-    assert all(each.largest > 0.0 for each in some.corners)
+    assert {corner.subject for corner in some.corners} == {"the tool of task 'path'"}
+    assert {corner.unit for corner in some.corners} == {"mm", "deg"}
+    assert all(corner.largest > 0.0 for corner in some.corners)
     assert more.corners == some.corners  # units of fewer than six axes count as rounded by half

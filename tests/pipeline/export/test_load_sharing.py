@@ -22,7 +22,7 @@ from cellplan.pipeline.export.resample import lead_time, resampled
 from cellplan.pipeline.export.rows import full_rows
 from cellplan.pipeline.export.skew import ClockPair, RunSkew
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 HOLDERS = ("left", "right")
 CELL = """\
 cellplan: 1
@@ -82,9 +82,9 @@ def planar(run: VerifiedRun, robot: str, q: Array) -> tuple[Array, Array]:
     tip = (placed.model.X_BF @ placed.tool.X_FT)[:2, 3]
     R, t = placed.X_WB[:2, :2], placed.X_WB[:2, 3]
     heading, place = np.cumsum(q, axis=1), np.tile(at[0], (len(q), 1))
-    for joint, way in enumerate(np.diff([*at, tip], axis=0)):
+    for joint, step in enumerate(np.diff([*at, tip], axis=0)):
         c, s = np.cos(heading[:, joint]), np.sin(heading[:, joint])
-        place = place + np.stack([c * way[0] - s * way[1], s * way[0] + c * way[1]], axis=1)
+        place = place + np.stack([c * step[0] - s * step[1], s * step[0] + c * step[1]], axis=1)
     return place @ R.T + t, heading[:, -1] + np.arctan2(R[1, 0], R[0, 0])
 
 
@@ -92,16 +92,18 @@ def grip_errors(run: VerifiedRun, left: Array, right: Array) -> tuple[Array, Arr
     """How far the right tool is from its place on the plate in [mm] and [deg], shape (N,) each."""
     (one, turn), (other, heading) = planar(run, "left", left), planar(run, "right", right)
     c, s = np.cos(turn), np.sin(turn)
-    way = other - one
-    seen = np.stack([c * way[:, 0] + s * way[:, 1], -s * way[:, 0] + c * way[:, 1]], axis=1)
+    shift = other - one
+    seen = np.stack([c * shift[:, 0] + s * shift[:, 1], -s * shift[:, 0] + c * shift[:, 1]], axis=1)
     off = (heading - turn - np.pi + np.pi) % (2.0 * np.pi) - np.pi
     return 1e3 * np.linalg.norm(seen - np.array([0.5, 0.0]), axis=1), np.rad2deg(np.abs(off))
 
 
-def of_grip(found: Judgement, unit: str) -> float:
+def of_grip(judgement: Judgement, unit: str) -> float:
     """Largest deviation of the right holder on the part."""
     return next(
-        each.largest for each in found.deviations if each.subject == "'right' on the part" and each.unit == unit
+        deviation.largest
+        for deviation in judgement.deviations
+        if deviation.subject == "'right' on the part" and deviation.unit == unit
     )
 
 
@@ -122,10 +124,10 @@ def test_a_turned_wrist_is_the_deviation_of_the_grip(run: VerifiedRun, angle: fl
     placed = run.cell.robot("right")
     reach = np.linalg.norm((placed.model.X_BF @ placed.tool.X_FT)[:2, 3] - placed.model.axes[2].point_B[:2])
 
-    found = judged(run, angle)
+    judgement = judged(run, angle)
 
-    assert of_grip(found, "deg") == pytest.approx(np.rad2deg(abs(angle)), rel=1e-3)
-    assert of_grip(found, "mm") == pytest.approx(2e3 * reach * np.sin(abs(angle) / 2.0), rel=1e-3)
+    assert of_grip(judgement, "deg") == pytest.approx(np.rad2deg(abs(angle)), rel=1e-3)
+    assert of_grip(judgement, "mm") == pytest.approx(2e3 * reach * np.sin(abs(angle) / 2.0), rel=1e-3)
 
 
 def test_rows_that_strain_the_part_beyond_the_demand_are_refused(run: VerifiedRun) -> None:
@@ -143,13 +145,13 @@ def test_the_grip_is_judged_between_rows_of_different_cycles(run: VerifiedRun) -
     program = resampled(run.cell, full, cycles)
     job = job_of(run, (program,))
 
-    found = judge(run, dialect(decimals=9), job, read_back(job, decimals=9), lead=lead_time(cycles))
+    judgement = judge(run, dialect(decimals=9), job, read_back(job, decimals=9), lead=lead_time(cycles))
 
     times = np.linspace(0.5, 2.5, 4001)
     played = [at_times(program, name, times) for name in HOLDERS]
     mm, _ = grip_errors(run, *played)
     assert max(mm) > 0.002  # they do cost something
-    assert of_grip(found, "mm") == pytest.approx(max(mm), rel=0.05, abs=1e-4)
+    assert of_grip(judgement, "mm") == pytest.approx(max(mm), rel=0.05, abs=1e-4)
 
 
 def at_times(program: ProgramRows, robot: str, times: Array) -> Array:
@@ -160,7 +162,7 @@ def at_times(program: ProgramRows, robot: str, times: Array) -> Array:
 
 
 def on_controllers(run: VerifiedRun, kind: KindName, **of: str) -> VerifiedRun:
-    placed = tuple(replace(each, control=RobotControlEntry(id=of[each.name])) for each in run.cell.robots)
+    placed = tuple(replace(robot, control=RobotControlEntry(id=of[robot.name])) for robot in run.cell.robots)
     controllers = {name: ControllerEntry(kind=kind) for name in of.values()}
     return replace(run, cell=replace(run.cell, robots=placed, controllers=controllers), token=ACCESS_TOKEN)
 
@@ -205,9 +207,9 @@ def test_holders_of_different_cycles_are_named_where_they_strain_the_part(run: V
     apart = on_controllers(run, "other", left="a", right="b")
     cycles = {"left": 0.004, "right": 0.036}
     robots = tuple(
-        replace(each, control=each.control.changed(cycle_ms=1e3 * cycles[each.name]))
-        for each in apart.cell.robots
-        if each.control is not None
+        replace(robot, control=robot.control.changed(cycle_ms=1e3 * cycles[robot.name]))
+        for robot in apart.cell.robots
+        if robot.control is not None
     )
     strict = apart.cell.checks.changed(closure_mm=0.001)
     strained = replace(apart, cell=replace(apart.cell, robots=robots, checks=strict), token=ACCESS_TOKEN)

@@ -118,13 +118,13 @@ def test_no_tool_is_moved_farther_on_the_part_than_its_bound(scene: Scene, seed:
             most = allowed[step] + s * (allowed[step + 1] - allowed[step])
             for parts in [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0), *rng.uniform(0.0, 1.0, (3, 2))]:
                 moved = at.copy()
-                for part, own in zip(parts, columns, strict=True):
-                    moved[own] += part * off[own]
-                one, other = (_on_part(scene, task.robot, each) for each in (at, moved))
+                for part, column in zip(parts, columns, strict=True):
+                    moved[column] += part * off[column]
+                one, other = (_on_part(scene, task.robot, entry) for entry in (at, moved))
                 turn = np.arccos(np.clip(0.5 * (np.trace(one[:3, :3].T @ other[:3, :3]) - 1.0), -1.0, 1.0))
-                found = np.array([np.linalg.norm(one[:3, 3] - other[:3, 3]), turn])
-                assert np.all(found <= most + 1e-9)
-                largest = np.maximum(largest, found)
+                moved_by = np.array([np.linalg.norm(one[:3, 3] - other[:3, 3]), turn])
+                assert np.all(moved_by <= most + 1e-9)
+                largest = np.maximum(largest, moved_by)
     assert np.all(allowed.max(axis=0) <= 1.25 * largest)
 
 
@@ -133,8 +133,8 @@ def _on_part(scene: Scene, robot: str, q: np.ndarray) -> np.ndarray:
     cell = scene.cell
     holder = cell.part.held_by[0].robot
     X = {name: scene.chains[name].tool_poses(q[None, cell.columns(name)])[0] for name in (robot, holder)}
-    found: np.ndarray = np.linalg.inv(X[holder] @ cell.part.X_CP) @ X[robot]
-    return found
+    X_PT: np.ndarray = np.linalg.inv(X[holder] @ cell.part.X_CP) @ X[robot]
+    return X_PT
 
 
 def test_pairs_are_to_keep_what_joints_may_be_off_besides(scene: Scene) -> None:

@@ -59,8 +59,8 @@ def stretches(played: RunProgram) -> list[OrderStretch]:
 def least_distance(played: RunProgram, first: int, last: int) -> float:
     """Distance of the balls over all orders between two rows, in closed form."""
     nearest = [
-        max(0.0, float(np.min(own)), -float(np.max(own)))
-        for own in (played.q[first : last + 1, 0], played.q[first : last + 1, 1])
+        max(0.0, float(np.min(rows)), -float(np.max(rows)))
+        for rows in (played.q[first : last + 1, 0], played.q[first : last + 1, 1])
     ]
     return float(np.hypot(*nearest)) - 2.0 * RADIUS
 
@@ -69,16 +69,16 @@ def test_all_orders_between_marks_are_clear_and_no_mark_can_be_left_out() -> Non
     played = crossing()
     assert least_distance(played, 0, ROWS - 1) < 0.0  # without marks they can meet
 
-    found = stretches(played)
+    result = stretches(played)
 
-    assert [found[0].first, found[-1].last] == [0, ROWS - 1]
-    assert all(one.last == other.first for one, other in pairwise(found))
-    assert len(found) >= 2
-    for stretch in found:
+    assert [result[0].first, result[-1].last] == [0, ROWS - 1]
+    assert all(one.last == other.first for one, other in pairwise(result))
+    assert len(result) >= 2
+    for stretch in result:
         assert least_distance(played, stretch.first, stretch.last) >= CLEARANCE
         assert stretch.pairs == (("a", "b"),)
         assert CLEARANCE <= stretch.proved <= least_distance(played, stretch.first, stretch.last) + 1e-9
-    for stretch in found[:-1]:  # one row more would be too much
+    for stretch in result[:-1]:  # one row more would be too much
         assert least_distance(played, stretch.first, stretch.last + 1) < CLEARANCE
 
 
@@ -96,10 +96,10 @@ def test_no_tool_waits_while_it_is_in_process() -> None:
     process = np.zeros(ROWS, dtype=bool)
     process[free[0].last - 3 : free[0].last + 2] = True
 
-    found = stretches(program(played.q[:, 0], played.q[:, 1], process))
+    result = stretches(program(played.q[:, 0], played.q[:, 1], process))
 
-    assert found[0].last == free[0].last - 3  # the process begins there
-    for stretch in found:
+    assert result[0].last == free[0].last - 3  # the process begins there
+    for stretch in result:
         assert not process[stretch.first - 1 : stretch.first + 2].all() or stretch.first == 0
         assert least_distance(played, stretch.first, stretch.last) >= CLEARANCE
 

@@ -42,9 +42,9 @@ def controllers(*names: str, kind: KindName = "kuka", latency_ms: float | None =
 
 
 def test_robots_without_controllers_are_timed_for_one_controller(run: VerifiedRun) -> None:
-    found = choose_promise(run, CSV, EVERY)
+    promise = choose_promise(run, CSV, EVERY)
 
-    assert (found.promise, found.reasons, found.remarks) == (Promise.TIMED, (), (ONE_CLOCK,))
+    assert (promise.promise, promise.reasons, promise.remarks) == (Promise.TIMED, (), (ONE_CLOCK,))
 
 
 def test_robots_of_one_controller_share_its_clock(run: VerifiedRun) -> None:
@@ -61,9 +61,9 @@ def test_an_interface_that_lags_needs_its_latency(run: VerifiedRun, form: str, k
 
     with pytest.raises(InputError, match=rf"controllers\.c\.latency_ms: expected .* {form} sends to them, got none"):
         choose_promise(bare, dialect, EVERY)
-    found = choose_promise(stated, dialect, EVERY)
-    assert found.promise is Promise.TIMED
-    assert "controller c follows 50 ms late: start it that much earlier" in found.remarks
+    promise = choose_promise(stated, dialect, EVERY)
+    assert promise.promise is Promise.TIMED
+    assert "controller c follows 50 ms late: start it that much earlier" in promise.remarks
     assert choose_promise(bare, dialect, ("right",)).promise is Promise.TIMED  # the other one is not exported
 
 
@@ -79,17 +79,17 @@ def test_a_stated_skew_beyond_the_allowed_one_is_not_timed(run: VerifiedRun) -> 
     alone = choose_promise(run, CSV, ("right",), skew=skew)
     assert alone.promise is Promise.TIMED
     assert any(remark.startswith("not to be played together with") for remark in alone.remarks)
-    kept = replace(skew, pairs=(replace(skew.pairs[0], stated=0.01),))
-    assert choose_promise(run, CSV, EVERY, skew=kept).promise is Promise.TIMED
+    skewed = replace(skew, pairs=(replace(skew.pairs[0], stated=0.01),))
+    assert choose_promise(run, CSV, EVERY, skew=skewed).promise is Promise.TIMED
 
 
 def test_two_robots_of_one_controller_are_synchronised(run: VerifiedRun) -> None:
     both = on_controllers(run, controllers("c", "d"), left="c", right="c", idle="d")
 
-    found = choose_promise(both, IN_STEP, ("left", "right"))
+    promise = choose_promise(both, IN_STEP, ("left", "right"))
 
-    assert found.promise is Promise.SYNCHRONISED
-    assert found.reasons == ("not timed: in-step programs cannot state it",)
+    assert promise.promise is Promise.SYNCHRONISED
+    assert promise.reasons == ("not timed: in-step programs cannot state it",)
 
 
 @pytest.mark.parametrize(
@@ -186,5 +186,5 @@ def test_robots_that_are_exported_apart_start_and_end_together(run: VerifiedRun)
     )
 
     assert left.lead == right.lead == both.lead == pytest.approx(0.108, abs=1e-12)
-    ends = [own.times[-1] for made in (left, right, both) for own in made.job.programs[0].robots.values()]
+    ends = [rows.times[-1] for made in (left, right, both) for rows in made.job.programs[0].robots.values()]
     assert ends == pytest.approx([ends[0]] * 5, abs=1e-9)

@@ -12,7 +12,7 @@ from cellplan.checks.joints.accelerations import point_accelerations
 from cellplan.errors import InputError
 from cellplan.model.cell import Cell
 from cellplan.model.exported import ProgramRows, RobotRows
-from cellplan.pipeline.export.interpolant import resting, row_speeds
+from cellplan.pipeline.export.interpolant import resting, row_velocities
 from cellplan.pipeline.export.resample import lead_time, resampled
 
 CYCLES = {"table": 0.012, "kuka": 0.004}
@@ -31,33 +31,33 @@ def test_a_finer_cycle_keeps_the_peak_acceleration_where_straight_motion_between
     program = smooth_rows(cell, seed=1, count=201)
     rows = program.robots["kuka"]
 
-    found = resampled(cell, program, CYCLES).robots["kuka"]
+    result = resampled(cell, program, CYCLES).robots["kuka"]
 
     peak = _peak(rows.times, rows.q)
-    linear = np.stack([np.interp(found.times - 0.108, rows.times, column) for column in rows.q.T], axis=1)
-    assert _peak(found.times, found.q) == pytest.approx(peak, rel=0.01)
-    assert _peak(found.times, linear) > 1.5 * peak
+    linear = np.stack([np.interp(result.times - 0.108, rows.times, column) for column in rows.q.T], axis=1)
+    assert _peak(result.times, result.q) == pytest.approx(peak, rel=0.01)
+    assert _peak(result.times, linear) > 1.5 * peak
 
 
 def test_the_motion_is_that_of_the_run_later_by_the_lead(cell: Cell) -> None:
     program = smooth_rows(cell, seed=2)
     lead = lead_time(CYCLES)
 
-    found = resampled(cell, program, CYCLES)
+    result = resampled(cell, program, CYCLES)
 
-    for name, rows in found.robots.items():
+    for name, rows in result.robots.items():
         full = program.robots[name]
-        own = np.stack([np.interp(rows.times - lead, full.times, column) for column in full.q.T], axis=1)
-        np.testing.assert_allclose(rows.q, own, atol=3e-5)  # a sag of 1.2 rad/s2 over 10 ms is 1.5e-5 rad
+        expected = np.stack([np.interp(rows.times - lead, full.times, column) for column in full.q.T], axis=1)
+        np.testing.assert_allclose(rows.q, expected, atol=3e-5)  # a sag of 1.2 rad/s2 over 10 ms is 1.5e-5 rad
         shared = np.isin(np.round(rows.times - lead, 9), np.round(full.times, 9))
-        np.testing.assert_allclose(rows.q[shared], own[shared], atol=1e-12)
+        np.testing.assert_allclose(rows.q[shared], expected[shared], atol=1e-12)
 
 
 def test_all_robots_rest_at_both_ends_and_end_together_after_whole_cycles(cell: Cell) -> None:
-    found = resampled(cell, smooth_rows(cell, seed=3, count=397), CYCLES).robots
+    result = resampled(cell, smooth_rows(cell, seed=3, count=397), CYCLES).robots
 
-    assert {float(rows.times[-1]) for rows in found.values()} == {4.176}
-    for name, rows in found.items():
+    assert {float(rows.times[-1]) for rows in result.values()} == {4.176}
+    for name, rows in result.items():
         np.testing.assert_allclose(np.diff(rows.times), CYCLES[name], atol=1e-12)
         for rest in (rows.times <= 0.1, rows.times >= rows.times[-1] - 0.1):
             assert np.ptp(rows.q[rest], axis=0).max() == 0.0
@@ -69,9 +69,9 @@ def test_the_process_and_the_marks_stay_with_the_motion(cell: Cell) -> None:
     marked = {name: replace(rows, marks=(0, 100, 300, 400)) for name, rows in program.robots.items()}
     lead = lead_time(CYCLES)
 
-    found = resampled(cell, replace(program, robots=marked), CYCLES).robots
+    result = resampled(cell, replace(program, robots=marked), CYCLES).robots
 
-    for name, rows in found.items():
+    for name, rows in result.items():
         on = rows.times[rows.process] - lead
         assert 1.0 <= on[0] < 1.0 + CYCLES[name]
         assert 3.0 - CYCLES[name] <= on[-1] < 3.0
@@ -85,12 +85,12 @@ def test_a_joint_that_runs_at_its_limit_is_not_taken_beyond_it(cell: Cell) -> No
     times = 0.01 * np.arange(101)
     q = np.zeros((101, 6)) + 0.5 * (lower + upper)
     q[:, 0] = np.minimum(upper[0], upper[0] - 0.5 + 0.51 * np.sin(np.pi * times) ** 2)
-    qd = row_speeds(times, q, rests=resting(q), lower=lower, upper=upper)
+    qd = row_velocities(times, q, rests=resting(q), lower=lower, upper=upper)
     rows = RobotRows(robot="kuka", q=q, times=times, qd=qd)
 
-    found = resampled(cell, ProgramRows(name=None, robots={"kuka": rows}), {"kuka": 0.004})
+    result = resampled(cell, ProgramRows(name=None, robots={"kuka": rows}), {"kuka": 0.004})
 
-    assert found.robots["kuka"].q[:, 0].max() == upper[0]
+    assert result.robots["kuka"].q[:, 0].max() == upper[0]
 
 
 def test_cycles_that_do_not_meet_within_a_second_are_refused(cell: Cell) -> None:

@@ -30,8 +30,8 @@ Read = tuple[np.ndarray, np.ndarray, list[list[float] | None]]
 def moves_of(text: str, *, is_arm: bool) -> Read:
     """Joints in [rad], times in [s] and zones of all rows of a module."""
     zones = {
-        found[1]: [float(number) for number in found[2].split(",")]
-        for found in re.finditer(r"zonedata (\w+) := \[FALSE,([^\]]*)\]", text)
+        zone[1]: [float(number) for number in zone[2].split(",")]
+        for zone in re.finditer(r"zonedata (\w+) := \[FALSE,([^\]]*)\]", text)
     }
     moves = list(MOVE.finditer(text))
     numbers = [move[1 if is_arm else 2].replace(",9E9", "").split(",") for move in moves]
@@ -102,11 +102,15 @@ def test_tools_keep_their_tolerance_on_the_part_at_rounded_rows(cells: Path, tmp
     files = {name: (tmp_path / "rapid" / name).read_text(encoding="utf-8") for name in names}
     assert record["blend"] > 0.0
     assert record["rounded"]["rows"] > 0.9 * record["rounded"]["of"]
-    corner = max(each["largest"] for each in record["rounded"]["corners"] if each["unit"] == "mm")
-    straight = max(each["largest"] for each in record["deviations"] if "tool" in each["of"] and each["unit"] == "mm")
-    found = largest_error(run.cell, files)
-    assert found <= DEMAND
-    assert found <= straight + corner
+    corner = max(corner["largest"] for corner in record["rounded"]["corners"] if corner["unit"] == "mm")
+    straight = max(
+        deviation["largest"]
+        for deviation in record["deviations"]
+        if "tool" in deviation["of"] and deviation["unit"] == "mm"
+    )
+    result = largest_error(run.cell, files)
+    assert result <= DEMAND
+    assert result <= straight + corner
     assert "rounded within" in " ".join(files["left.mod"].replace("\n  !", " ").split())
     assert verify_export(read_stored_export(tmp_path / "rapid"), run).record == record
 
@@ -137,11 +141,11 @@ def test_a_robot_that_works_on_a_part_at_rest_stops_at_few_rows(cells: Path, tmp
     for row in np.flatnonzero(written.process[1:-1] & written.process[:-2]) + 1:
         back, on = np.sort(rng.uniform(0.0, 1.0, (2, 100)), axis=0)
         back, on = np.append(back, 0.5), np.append(1.0 - on, 0.5)  # the middle of the chord too
-        ways = rows.rounding[row] * (rows.q[[row - 1, row + 1]] - rows.q[row])
+        offsets = rows.rounding[row] * (rows.q[[row - 1, row + 1]] - rows.q[row])
         holder = np.array([np.interp(written.times[row], tables["reis"].times, c) for c in tables["reis"].q.T])
-        off = off_the_circle(run.cell, rows.q[row] + back[:, None] * ways[0] + on[:, None] * ways[1], holder)
+        off = off_the_circle(run.cell, rows.q[row] + back[:, None] * offsets[0] + on[:, None] * offsets[1], holder)
         worst = max(worst, float(off.max()))
-    found = judged(run, prepared, (read,))
-    proved = max(each.largest for each in found.corners if each.unit == "mm")
+    judgement = judged(run, prepared, (read,))
+    proved = max(corner.largest for corner in judgement.corners if corner.unit == "mm")
     assert worst <= 0.1
     assert 0.7 * proved <= worst <= proved + 1e-3

@@ -21,7 +21,7 @@ from cellplan.pipeline.export.schedule_at import schedule_at
 from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +63,10 @@ def test_only_the_robot_whose_tool_works_is_in_process(run: VerifiedRun) -> None
 def test_desired_poses_at_the_rows_themselves_are_those_of_the_run(run: VerifiedRun) -> None:
     schedule = run.motions[0].schedule
 
-    found = schedule_at(schedule, schedule.times)
+    at_rows = schedule_at(schedule, schedule.times)
 
-    np.testing.assert_allclose(found.tasks[0].X_PT, schedule.tasks[0].X_PT, atol=1e-15)
-    np.testing.assert_allclose(found.tasks[0].travelled, schedule.tasks[0].travelled, atol=1e-15)
+    np.testing.assert_allclose(at_rows.tasks[0].X_PT, schedule.tasks[0].X_PT, atol=1e-15)
+    np.testing.assert_allclose(at_rows.tasks[0].travelled, schedule.tasks[0].travelled, atol=1e-15)
 
 
 def test_desired_poses_between_the_rows_are_where_the_tool_is(run: VerifiedRun) -> None:
@@ -80,11 +80,11 @@ def test_desired_poses_between_the_rows_are_where_the_tool_is(run: VerifiedRun) 
     chains = {robot.name: ScrewChain(robot) for robot in run.cell.robots}
     X_PT = inverse(part_poses(run.cell, chains, q)) @ chains["right"].tool_poses(q["right"])
 
-    found = schedule_at(motion.schedule, times).tasks[0]
+    result = schedule_at(motion.schedule, times).tasks[0]
 
-    assert np.linalg.norm(found.X_PT[:, :2, 3] - X_PT[:, :2, 3], axis=1).max() < 1e-4
-    moved = np.linalg.norm(np.diff(found.X_PT[:, :3, 3], axis=0), axis=1)
-    np.testing.assert_allclose(np.diff(found.travelled), moved, atol=1e-5)
+    assert np.linalg.norm(result.X_PT[:, :2, 3] - X_PT[:, :2, 3], axis=1).max() < 1e-4
+    moved = np.linalg.norm(np.diff(result.X_PT[:, :3, 3], axis=0), axis=1)
+    np.testing.assert_allclose(np.diff(result.travelled), moved, atol=1e-5)
 
 
 def test_a_schedule_without_paths_is_refused(run: VerifiedRun) -> None:
@@ -96,15 +96,15 @@ def test_a_schedule_without_paths_is_refused(run: VerifiedRun) -> None:
 
 @pytest.mark.slow
 def test_all_phases_and_cycles_of_a_program_are_kept_and_judged(home: VerifiedRun) -> None:
-    (program,), (kept,) = full_rows(home), essential_rows(home)
+    (program,), (essential,) = full_rows(home), essential_rows(home)
     phases = home.motion.plan.program
     scene, names = Scene.from_cell(home.cell), [robot.name for robot in home.cell.robots]
     limits = ThinningLimits(turn=1e-3, slide=1e-3, tool=1e-4)
 
-    few = thinned(scene, program, groups=[names], limits=limits, essential_rows=kept)
+    few = thinned(scene, program, groups=[names], limits=limits, essential_rows=essential)
 
-    assert {home.motion.rows(phase).start for phase in phases} <= set(kept.rows)
-    assert len(kept.work) == len(phases)
+    assert {home.motion.rows(phase).start for phase in phases} <= set(essential.rows)
+    assert len(essential.work) == len(phases)
     job = job_of(home, [few], promise=Promise.SEQUENCE_ONLY)
     sparse = dialect(decimals=5, is_thinned=True)
     assert judge(home, sparse, job, read_back(job, decimals=5, with_times=False)).findings == ()
@@ -119,6 +119,6 @@ def test_a_row_that_is_wrong_in_the_second_cycle_only_is_found(home: VerifiedRun
     q[worked[-30], 2] += np.deg2rad(1.0)
     job = job_of(home, [replace(program, robots={**program.robots, "pen": replace(rows, q=q)})])
 
-    found = judge(home, dialect(decimals=9), job, read_back(job, decimals=9)).findings
+    result = judge(home, dialect(decimals=9), job, read_back(job, decimals=9)).findings
 
-    assert any("position error of task" in finding for finding in found)
+    assert any("position error of task" in finding for finding in result)

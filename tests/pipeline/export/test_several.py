@@ -35,36 +35,36 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_all_formats_are_written_or_refused_with_the_reason(all_of: tuple[Exported, ...]) -> None:
-    refused = {each.form: str(each.refusal) for each in all_of if each.refusal is not None}
+    refused = {entry.form: str(entry.refusal) for entry in all_of if entry.refusal is not None}
 
-    assert [each.form for each in all_of] == list(EXPORTERS)
+    assert [entry.form for entry in all_of] == list(EXPORTERS)
     assert set(refused) == {"krl", "rapid", "urscript", "val3"}
     for form, reason in refused.items():
         assert reason.splitlines() == [
             f"robots.{robot}.controller: expected the controller that plays {form}, got none"
             for robot in ("left", "right", "idle")
         ]
-    for each in all_of:
-        assert each.folder.exists() is (each.refusal is None)
-        assert not each.is_named
+    for entry in all_of:
+        assert entry.folder.exists() is (entry.refusal is None)
+        assert not entry.is_named
 
 
 @pytest.mark.parametrize("form", ["csv", "json", "ros2", "stream", "wide"])
 def test_a_format_among_several_is_the_same_as_alone(
     form: str, run: VerifiedRun, all_of: tuple[Exported, ...], tmp_path: Path
 ) -> None:
-    found = next(each for each in all_of if each.form == form)
+    result = next(entry for entry in all_of if entry.form == form)
 
     files = export_program(run, tmp_path / form, form=form)
 
-    assert files == found.files
-    assert contents(tmp_path / form) == contents(found.folder)
+    assert files == result.files
+    assert contents(tmp_path / form) == contents(result.folder)
 
 
 def test_formats_are_taken_once_in_the_order_in_which_they_are_asked_for(run: VerifiedRun, tmp_path: Path) -> None:
-    found = export_programs(run, tmp_path, formats=["json", "krl", "csv", "json"])
+    exports = export_programs(run, tmp_path, formats=["json", "krl", "csv", "json"])
 
-    assert [(each.form, each.is_named, each.refusal is None) for each in found] == [
+    assert [(entry.form, entry.is_named, entry.refusal is None) for entry in exports] == [
         ("json", True, True),
         ("krl", True, False),
         ("csv", True, True),
@@ -100,10 +100,10 @@ def test_a_folder_of_other_things_is_refused_before_anything_is_written(run: Ver
 
 
 def test_a_choice_that_a_format_cannot_hold_refuses_that_format_only(run: VerifiedRun, tmp_path: Path) -> None:
-    found = export_programs(run, tmp_path, formats=["csv", "ros2"], choice=Choice(split=50))
+    exports = export_programs(run, tmp_path, formats=["csv", "ros2"], choice=Choice(split=50))
 
-    assert str(found[0].refusal) == "--split: expected no --split with csv, whose files have no limit"
-    assert found[1].files[0] == "left_1_of_1.yaml"
+    assert str(exports[0].refusal) == "--split: expected no --split with csv, whose files have no limit"
+    assert exports[1].files[0] == "left_1_of_1.yaml"
 
 
 def test_a_format_whose_rows_fail_is_refused_and_leaves_the_others(
@@ -118,10 +118,10 @@ def test_a_format_whose_rows_fail_is_refused_and_leaves_the_others(
     broken = replace(DIALECTS["csv"], name="broken", read=off)
     monkeypatch.setitem(DIALECTS, "broken", broken)  # type: ignore[arg-type]
 
-    found = export_programs(run, tmp_path, formats=["csv", "broken", "json"])
+    exports = export_programs(run, tmp_path, formats=["csv", "broken", "json"])
 
-    assert [each.refusal is None for each in found] == [True, False, True]
-    assert "robot 'right': row 21: expected joint B" in str(found[1].refusal)
+    assert [entry.refusal is None for entry in exports] == [True, False, True]
+    assert "robot 'right': row 21: expected joint B" in str(exports[1].refusal)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["csv", "json"]
 
 
@@ -140,17 +140,17 @@ def test_rows_that_are_played_alike_are_judged_once_and_any_others_again(
     run: VerifiedRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     counted: list[object] = []
-    found = judging._program_findings
+    result = judging._program_findings
 
     def counting(*words: object) -> object:
         counted.append(words)
-        return found(*words)  # type: ignore[arg-type]
+        return result(*words)  # type: ignore[arg-type]
 
     monkeypatch.setattr(judging, "_program_findings", counting)
     shared, job = Shared(run), job_of(run, full_rows(run))
     read = read_back(job, decimals=9)
 
-    def count(own: object = None, changed: Callable[[RobotRows], RobotRows] | None = None, **other: object) -> int:
+    def count(program: object = None, changed: Callable[[RobotRows], RobotRows] | None = None, **other: object) -> int:
         (first,) = read
         rows = (
             read
@@ -158,14 +158,14 @@ def test_rows_that_are_played_alike_are_judged_once_and_any_others_again(
             else (replace(first, robots={**first.robots, "idle": changed(first.robots["idle"])}),)
         )
         counted.clear()
-        judging.judge(run, dialect(decimals=9, **other), own or job, rows, shared=shared)  # type: ignore[arg-type]
+        judging.judge(run, dialect(decimals=9, **other), program or job, rows, shared=shared)  # type: ignore[arg-type]
         return len(counted)
 
     assert (count(), count()) == (1, 0)
     assert count(changed=_later) == 1
     assert count(interpolation=Interpolation.CUBIC) == 1
     assert count(is_thinned=True) == 1
-    assert count(own=replace(job, blend=0.1)) == 1
+    assert count(program=replace(job, blend=0.1)) == 1
     assert count() == 0
     shared = Shared(run)
     assert count() == 1

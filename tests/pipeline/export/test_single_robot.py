@@ -94,4 +94,4 @@ def test_long_steps_are_named_where_accelerations_between_them_are_too_large(
 
     assert "exceeds its acceleration limit" in refusal.value.findings[0]
     expected = ["  motion.step_s: 0.02 is stated; steps of 0.004, a controller's cycle, resolve accelerations"]
-    assert [each for each in refusal.value.findings if each.startswith("  ")] == expected[:details]
+    assert [finding for finding in refusal.value.findings if finding.startswith("  ")] == expected[:details]

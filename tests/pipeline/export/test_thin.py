@@ -18,7 +18,7 @@ from cellplan.pipeline.export.thin import ThinningLimits, thinned
 from cellplan.scene.scene import Scene
 
 LIMITS = ThinningLimits(turn=2e-3, slide=1e-3, tool=1e-4)
-BESIDE = 1e-5  # [m] by which a tool may leave its tolerance between two rows of the run
+OFF_TOL = 1e-5  # [m] by which a tool may leave its tolerance between two rows of the run
 
 
 def _work(cell: Cell, program: ProgramRows) -> EssentialRows:
@@ -28,7 +28,7 @@ def _work(cell: Cell, program: ProgramRows) -> EssentialRows:
 
 def _tool_errors(cell: Cell, one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> np.ndarray:
     """How far the tools of all tasks are apart on the part in two motions, by pinocchio, shape (N, tasks, 2)."""
-    model, found = CombinedModel(cell), []
+    model, errors = CombinedModel(cell), []
     stacks = [np.concatenate([q[robot.name] for robot in cell.robots], axis=1) for q in (one, other)]
     for rows in zip(*stacks, strict=True):
         poses = []
@@ -40,8 +40,8 @@ def _tool_errors(cell: Cell, one: dict[str, np.ndarray], other: dict[str, np.nda
         for X, Y in zip(*poses, strict=True):
             turn = rotation_vector((Y[:3, :3] @ X[:3, :3].T)[None])[0]
             apart.append((np.linalg.norm(Y[:3, 3] - X[:3, 3]), np.linalg.norm(turn)))
-        found.append(apart)
-    return np.array(found)
+        errors.append(apart)
+    return np.array(errors)
 
 
 @pytest.mark.parametrize(("name", "seed"), [("turntable", 11), ("rail", 12), ("fixed_part", 13)])
@@ -50,19 +50,19 @@ def test_joints_and_tools_keep_their_tolerances_between_rows_too(cells: Path, na
     program = smooth_rows(cell, seed=seed)
     names = [robot.name for robot in cell.robots]
 
-    found = thinned(Scene.from_cell(cell), program, groups=[names], limits=LIMITS, essential_rows=_work(cell, program))
+    thin = thinned(Scene.from_cell(cell), program, groups=[names], limits=LIMITS, essential_rows=_work(cell, program))
 
     times = np.linspace(0.0, 4.0, 371)
-    full, fewer = linear_at(program.robots, times), linear_at(found.robots, times)
+    full, fewer = linear_at(program.robots, times), linear_at(thin.robots, times)
     errors = _tool_errors(cell, full, fewer)
     for robot in cell.robots:
         for index, joint in enumerate(robot.model.joints):
             allowed = LIMITS.turn if joint.is_revolute else LIMITS.slide
             assert np.abs(full[robot.name] - fewer[robot.name])[:, index].max() <= allowed + 1e-12
     demanded = np.array([task.tolerance.between for task in cell.tasks])
-    assert np.all(errors[..., 0] <= np.minimum(LIMITS.tool, demanded[:, 0]) + BESIDE)
+    assert np.all(errors[..., 0] <= np.minimum(LIMITS.tool, demanded[:, 0]) + OFF_TOL)
     assert np.all(errors[..., 1] <= demanded[:, 1] + 1e-5)
-    assert len(next(iter(found.robots.values()))) < 401
+    assert len(next(iter(thin.robots.values()))) < 401
 
 
 def test_robots_of_a_controller_share_rows_and_others_have_their_own(cells: Path) -> None:
@@ -80,18 +80,18 @@ def test_robots_of_a_controller_share_rows_and_others_have_their_own(cells: Path
     assert not np.array_equal(apart["table"].times, apart["kuka"].times)
     times = np.linspace(0.0, 4.0, 151)
     errors = _tool_errors(cell, linear_at(program.robots, times), linear_at(apart, times))
-    assert errors[..., 0].max() <= LIMITS.tool + BESIDE
+    assert errors[..., 0].max() <= LIMITS.tool + OFF_TOL
 
 
 def test_only_robots_of_a_group_are_written(cells: Path) -> None:
     cell = load_cell(cells / "turntable.yaml")
     program = smooth_rows(cell, seed=14)
 
-    found = thinned(
+    thin = thinned(
         Scene.from_cell(cell), program, groups=[["kuka"]], limits=LIMITS, essential_rows=_work(cell, program)
     )
 
-    assert list(found.robots) == ["kuka"]
+    assert list(thin.robots) == ["kuka"]
 
 
 def test_what_must_stay_stays(cells: Path) -> None:
@@ -105,7 +105,7 @@ def test_what_must_stay_stays(cells: Path) -> None:
     program = replace(program, robots=robots)
     loose = ThinningLimits(turn=0.5, slide=0.5, tool=1.0)
 
-    found = thinned(
+    result = thinned(
         Scene.from_cell(cell),
         program,
         groups=[["table", "kuka"]],
@@ -113,7 +113,7 @@ def test_what_must_stay_stays(cells: Path) -> None:
         essential_rows=EssentialRows((33, 222), ()),
     ).robots
 
-    rows = found["kuka"]
+    rows = result["kuka"]
     chosen = np.rint(rows.times / 0.01).astype(int)
     assert {0, 33, 77, 100, 150, 169, 222, 300, 400} <= {*chosen.tolist()}
     assert [int(chosen[mark]) for mark in rows.marks] == [0, 77, 400]

@@ -10,7 +10,7 @@ from cellplan import open_gate
 from cellplan.errors import InputError
 from cellplan.pipeline.gate.compare_drawings import foreign_piece, is_same_drawing
 
-DRAWN = (
+SVG = (
     '<svg class="still-sheet" viewBox="0 0 7200 4600">\n<title id="a">Clearance too small at 1.250 s</title>\n'
     "<style>.still-sheet .c1{fill:#102030}</style>\n"
     '<path class="c1" d="M1217 1083l40 -12 3 80z"/>\n<circle class="ring" cx="120" cy="80" r="150"/>\n'
@@ -20,20 +20,20 @@ DRAWN = (
 
 @pytest.mark.parametrize(("old", "new"), [("M1217 1083l40", "M1218 1083l39"), ('x="12.5"', 'x="12.6"'), ("", "")])
 def test_a_drawing_that_differs_by_rounding_is_the_same(old: str, new: str) -> None:
-    other = DRAWN.replace(old, new)
+    other = SVG.replace(old, new)
 
-    assert is_same_drawing(other, DRAWN)
-    assert foreign_piece(other, DRAWN) is None
+    assert is_same_drawing(other, SVG)
+    assert foreign_piece(other, SVG) is None
 
 
 @pytest.mark.parametrize(
     ("old", "new"), [("M1217 1083l40", "M1317 1083l40"), ("l40 -12 3 80z", "l40 -12z"), ('cx="120"', 'cx="240"')]
 )
 def test_a_course_that_is_another_is_told_and_is_no_foreign_piece(old: str, new: str) -> None:
-    other = DRAWN.replace(old, new)
+    other = SVG.replace(old, new)
 
-    assert not is_same_drawing(other, DRAWN)
-    assert foreign_piece(other, DRAWN) is None
+    assert not is_same_drawing(other, SVG)
+    assert foreign_piece(other, SVG) is None
 
 
 @pytest.mark.parametrize(
@@ -52,11 +52,11 @@ def test_a_course_that_is_another_is_told_and_is_no_foreign_piece(old: str, new:
     ],
 )
 def test_words_elements_and_attributes_must_be_those_that_are_drawn(old: str, new: str, piece: str) -> None:
-    other = DRAWN.replace(old, new)
+    other = SVG.replace(old, new)
 
-    assert other != DRAWN
-    assert piece in str(foreign_piece(other, DRAWN))
-    assert not is_same_drawing(other, DRAWN)
+    assert other != SVG
+    assert piece in str(foreign_piece(other, SVG))
+    assert not is_same_drawing(other, SVG)
 
 
 def forged(sound: Path, folder: Path, name: str, old: str, new: str) -> Copy:

@@ -79,9 +79,9 @@ def test_a_singularity_beside_a_demanded_feed_fails_with_place_and_joint(stretch
 
 
 def _match(pattern: str, text: str) -> str:
-    found = re.search(pattern, text)
-    assert found, text
-    return found.group(1)
+    match = re.search(pattern, text)
+    assert match, text
+    return match.group(1)
 
 
 def test_all_feeds_hold_where_only_the_approach_has_to_slow_down(
@@ -107,10 +107,10 @@ def test_processes_delays_and_dwells_last_as_long_as_the_cell_says(
     solved: tuple[Path, Solution], as_written: Solution
 ) -> None:
     """On for the delays, two half ramps more than length through feed: 0.1 + 100/40 + 0.1 + 0.1, 0.2 + 100/50 + 0.1."""
-    asked = {"bead": 2.8, "seam": 2.3, "ring": 0.1 + 60.0 * np.pi / 60.0}
+    demanded = {"bead": 2.8, "seam": 2.3, "ring": 0.1 + 60.0 * np.pi / 60.0}
     for solution in (as_written, solved[1]):
         clock = clock_of(solution)
-        for task, seconds in asked.items():
+        for task, seconds in demanded.items():
             on = clock.times[clock.process[task]]
             assert on[-1] - on[0] == pytest.approx(seconds, abs=0.021)
         s = clock.lengths["seam"]

@@ -18,7 +18,7 @@ from cellplan.io.run.clock_table import parse_clock
 from cellplan.kinematics.pinocchio_model import CombinedModel
 from cellplan.model.cell import Cell
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 PHASES = (
     *("transfer-1", "grip", "lift", "transfer-2", "work-1", "transfer-3", "work-2"),
@@ -109,7 +109,7 @@ def test_the_rows_in_which_phases_meet_are_judged_by_the_steps_on_both_sides(sol
     bends = np.abs(q[[row + 1 for row in joins]] - 2.0 * q[joins] + q[[row - 1 for row in joins]]) / step**2
     limits = np.concatenate([robot.model.velocity for robot in cell.robots]) / 0.25
 
-    (check,) = [each for each in reports[0].checks if each.name == "joint_acceleration_between_phases"]
+    (check,) = [check for check in reports[0].checks if check.name == "joint_acceleration_between_phases"]
     assert check.passed
     assert check.value / check.limit <= (bends / limits).max() * (1.0 + 1e-6) * 0.25 / 0.15
 
@@ -150,10 +150,10 @@ def test_it_is_exported_as_one_program_for_each_robot(solved: tuple[Path, Soluti
 
 
 def test_the_record_says_how_each_transfer_was_found(solved: tuple[Path, Solution]) -> None:
-    found = {name: text for run in solved[1].runs for name, text in run.transfers.items()}
+    texts = {name: text for run in solved[1].runs for name, text in run.transfers.items()}
 
-    assert set(found) == {"transfer-1", "transfer-2", "transfer-3", "transfer-4", "transfer-5"}
-    assert found["transfer-1"] == "holder straight"
+    assert set(texts) == {"transfer-1", "transfer-2", "transfer-3", "transfer-4", "transfer-5"}
+    assert texts["transfer-1"] == "holder straight"
 
 
 def _row(run: Path, robot: str, place: int) -> tuple[list[str], int]:
@@ -214,7 +214,7 @@ LATE = {"home", "jump", "start"}  # are refused by or after the checks of all mo
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(each, marks=pytest.mark.slow if each in LATE else ()) for each in FORGERIES]
+    "name", [pytest.param(forgery, marks=pytest.mark.slow if forgery in LATE else ()) for forgery in FORGERIES]
 )
 def test_forged_programs_are_refused_with_their_place(name: str, solved: tuple[Path, Solution], tmp_path: Path) -> None:
     edit, words = FORGERIES[name]

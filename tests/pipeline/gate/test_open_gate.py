@@ -25,7 +25,7 @@ from cellplan.model.verified_run import ACCESS_TOKEN, VerifiedRun
 from cellplan.pipeline.export.program import EXPORTERS
 from cellplan.pipeline.overrides import with_overrides
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 PACKAGE = Path(__file__).resolve().parents[3] / "cellplan"
 
@@ -98,7 +98,7 @@ def test_the_seal_is_held_by_the_gate_alone() -> None:
 def test_every_format_takes_a_job_or_a_verified_run_and_nothing_else() -> None:
     for name, exporter in EXPORTERS.items():
         signature = inspect.signature(exporter.render)
-        taken = [each.annotation for each in signature.parameters.values()]
+        taken = [parameter.annotation for parameter in signature.parameters.values()]
         assert taken == ([ExportJob] if isinstance(exporter, Dialect) else [VerifiedRun]), name
     assert next(iter(inspect.signature(export_program).parameters.values())).annotation is VerifiedRun
 
@@ -260,11 +260,11 @@ def seal_again(run: Path) -> None:
     edit_json(run / "manifest.json", change)
 
 
-def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, own_cache: Path) -> None:
+def test_a_forged_cache_entry_moves_nothing_that_is_verified(copy: Path, cache_folder: Path) -> None:
     cell = copy / "cell" / "small.yaml"
     isolated_call._end_child()  # the next one knows this cache
     load_cell(cell)
-    for path in own_cache.iterdir():
+    for path in cache_folder.iterdir():
         vertices, *others = store._unpacked(path.read_bytes())
         path.write_bytes(store._packed((vertices + 6.0, *others)))
     store.forget()

@@ -4,7 +4,7 @@ import pytest
 
 from cellplan.pipeline.gate.picture_text import foreign_piece
 
-DRAWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 100">
+PICTURE = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 100">
 <path d="M0 1L2 3" fill="none" stroke="#123456"/>
 <text x="1" y="2" fill="#123456">0.5</text>
 <text x="3" y="4" fill="#123456">error in mm</text>
@@ -26,7 +26,7 @@ DRAWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 100">
     ],
 )
 def test_other_figures_and_curves_are_taken_for_rounding(old: str, new: str) -> None:
-    assert foreign_piece(DRAWN.replace(old, new, 1), DRAWN) is None
+    assert foreign_piece(PICTURE.replace(old, new, 1), PICTURE) is None
 
 
 @pytest.mark.parametrize(
@@ -53,4 +53,4 @@ def test_other_figures_and_curves_are_taken_for_rounding(old: str, new: str) -> 
     ],
 )
 def test_words_elements_and_attributes_of_others_are_named(old: str, new: str, reported: str) -> None:
-    assert reported in str(foreign_piece(DRAWN.replace(old, new, 1), DRAWN))
+    assert reported in str(foreign_piece(PICTURE.replace(old, new, 1), PICTURE))

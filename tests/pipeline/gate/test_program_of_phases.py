@@ -15,7 +15,7 @@ from cellplan.io.run.clock_table import parse_clock
 from cellplan.io.run.joint_tables import parse_table
 from cellplan.model.phase import Hold, Transfer
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 ROWS = 201  # of each phase: 2 s in steps of 10 ms
 

@@ -92,7 +92,7 @@ def test_a_demanded_cycle_is_kept_to_the_row_and_a_shorter_one_refused(
     slower = solve(cell.with_values({"motion.timing": {"cycle_s": 1.5}}), task="first")
 
     assert slower.motion.times[-1] == 1.5
-    fast, slow = (each.runs[0].report.accelerations.process["first"].peak for each in (solved[1], slower))
+    fast, slow = (entry.runs[0].report.accelerations.process["first"].peak for entry in (solved[1], slower))
     assert slow == pytest.approx(fast * least / 1.5, rel=0.01)
     with pytest.raises(InputError, match=rf"motion\.timing: expected a cycle of at least {least:g} s, in which all"):
         solve(cell.with_values({"motion.timing": {"cycle_s": 0.5}}), task="first")

@@ -39,4 +39,4 @@ def test_margins_and_distances_are_missed_where_the_report_has_them(program: Tim
     scale = SPAN / program.cycle
     assert margins_missed_at(program, 1.001 * least.margin, SPAN) == pytest.approx((least.margin_at_s * scale,))
     assert margins_missed_at(program, 0.999 * least.margin, SPAN) == ()
-    assert distances_missed_at(program, SPAN, is_own=False) == ()
+    assert distances_missed_at(program, SPAN, within_robot=False) == ()

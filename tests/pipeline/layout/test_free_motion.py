@@ -55,7 +55,7 @@ def test_bases_and_tools_stay_whatever_the_cell_says() -> None:
 
     assert settings is not None
     assert settings.margin > 0.0
-    assert {str(each.kind) for each in settings.ranges} == {"start", "weight"}
+    assert {str(range_.kind) for range_ in settings.ranges} == {"start", "weight"}
 
 
 @pytest.mark.slow
@@ -138,14 +138,14 @@ def test_paths_begin_at_the_last_motion_that_they_can_follow(
 
 
 @pytest.fixture(scope="module")
-def found(request_of_path: LayoutRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[LayoutResult, Path]:
+def searched(request_of_path: LayoutRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[LayoutResult, Path]:
     folder = tmp_path_factory.mktemp("path") / "study"
     return search_layout(request_of_path, folder, stop=Stop(trials=1)), folder
 
 
 @pytest.mark.slow
-def test_the_written_path_passes_solve_and_is_searched_further(found: tuple[LayoutResult, Path]) -> None:
-    result, folder = found
+def test_the_written_path_passes_solve_and_is_searched_further(searched: tuple[LayoutResult, Path]) -> None:
+    result, folder = searched
     best = result.record["best"]
     assert best is not None
     assert best["cycle_s"] is not None

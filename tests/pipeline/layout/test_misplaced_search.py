@@ -16,31 +16,31 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    found = tmp_path_factory.mktemp("misplaced") / "study"
-    options = ["--misplacement", "0.4mm,0.2deg", "--trials", "1", "--workers", "1", "-o", str(found)]
+    result = tmp_path_factory.mktemp("misplaced") / "study"
+    options = ["--misplacement", "0.4mm,0.2deg", "--trials", "1", "--workers", "1", "-o", str(result)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("cellplan.search.misplacement.robust.SEEDED", 4)
         assert run(["layout", str(PAIR), *SETTINGS, *options]) == 0
-    return found
+    return result
 
 
 def test_all_sampled_displacements_are_verified_in_one_cycle(folder: Path) -> None:
     record = json.loads((folder / "study.json").read_text())
 
-    found = record["misplacement"]
+    result = record["misplacement"]
     assert record["status"] == "certified"
-    assert (found["seeded"], found["seeded_kept"]) == (4, 4)
-    assert found["ends_kept"] == found["ends"] == 16
-    assert found["by_derivatives_kept"] == found["by_derivatives"] > 0
-    assert found["cycle_s"] == pytest.approx(record["best"]["cycle_s"])
-    assert all(not each["reason"] for each in found["solved"])
+    assert (result["seeded"], result["seeded_kept"]) == (4, 4)
+    assert result["ends_kept"] == result["ends"] == 16
+    assert result["by_derivatives_kept"] == result["by_derivatives"] > 0
+    assert result["cycle_s"] == pytest.approx(record["best"]["cycle_s"])
+    assert all(not entry["reason"] for entry in result["solved"])
     assert "sampled" in (folder / "study.html").read_text().lower()
 
 
 def test_a_tolerance_passes_solve_and_what_is_beyond_it_fails(folder: Path) -> None:
     record = json.loads((folder / "study.json").read_text())
-    found = record["misplacement"]["tolerances"]
-    height = next(each for each in found if each["robot"] == "left" and each["direction"] == "z")
+    result = record["misplacement"]["tolerances"]
+    height = next(entry for entry in result if entry["robot"] == "left" and entry["direction"] == "z")
     best = load_cell(folder / "best.yaml")
 
     def checks(by: float) -> bool:

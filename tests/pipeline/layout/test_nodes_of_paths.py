@@ -76,12 +76,12 @@ def test_a_layout_that_solve_passes_is_followed_and_certified(tmp_path: Path, po
     given = load_cell(request.cell).with_values({"motion.duration_s": 60, "motion.step_s": 0.02})
     assert solve(given).passed
 
-    found = search_layout(request, tmp_path / "study", stop=Stop(trials=1), workers=InThisProcess())
+    searched = search_layout(request, tmp_path / "study", stop=Stop(trials=1), workers=InThisProcess())
 
-    assert found.record["status"] == "certified"
-    assert found.record["given"]["status"] == "conforming"
-    assert found.record["given"]["cycle_s"] is None  # another objective is sought
-    assert layout_lines(found.record, tmp_path / "study")[1] == "  as given: conforms"
+    assert searched.record["status"] == "certified"
+    assert searched.record["given"]["status"] == "conforming"
+    assert searched.record["given"]["cycle_s"] is None  # another objective is sought
+    assert layout_lines(searched.record, tmp_path / "study")[1] == "  as given: conforms"
 
 
 def test_the_shortest_cycle_of_the_given_motion_is_one_that_solve_passes(tmp_path: Path) -> None:

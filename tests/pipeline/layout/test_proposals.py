@@ -20,7 +20,7 @@ def ended(number: int, cycle: float, status: TrialStatus = TrialStatus.PASSED) -
 def test_the_first_round_begins_with_the_given_layout_and_those_of_the_user() -> None:
     request = LayoutRequest(cell=Path("cell.yaml"), attempts=(Path("one.yaml"), Path("two.yaml")))
 
-    kinds = [each["kind"] for each in Proposals(request=request)([])]
+    kinds = [entry["kind"] for entry in Proposals(request=request)([])]
 
     assert kinds[:3] == ["given", "attempt", "attempt"]
     assert len(kinds) == SIZE
@@ -34,8 +34,8 @@ def test_every_combination_of_choices_is_tried_from_the_given_layout() -> None:
     for _ in range(2):
         tried += proposals([ended(number, 1.0) for number in range(len(tried))])
 
-    assert [each["choice"] for each in tried if each["kind"] == "given"] == choices
-    assert [each["choice"] for each in tried if each["kind"] == "sampled"][:2] == choices[1:]
+    assert [entry["choice"] for entry in tried if entry["kind"] == "given"] == choices
+    assert [entry["choice"] for entry in tried if entry["kind"] == "sampled"][:2] == choices[1:]
     assert len(tried) == 2 * SIZE
     assert [choice_text(choice) for choice in choices] == ["", "tasks.a.robot = two", "tasks.a.robot = three"]
 
@@ -45,7 +45,7 @@ def test_other_branches_are_tried_as_they_are() -> None:
 
     first = Proposals(request=REQUEST, branches=branches)([])
 
-    assert [each["start"] for each in first if each["kind"] == "branch"] == [[1.0], [2.0]]
+    assert [entry["start"] for entry in first if entry["kind"] == "branch"] == [[1.0], [2.0]]
     assert origin_text(first[1]) == "the given layout, another branch"
 
 
@@ -56,7 +56,7 @@ def test_later_rounds_go_on_from_the_best_trial_of_finished_rounds() -> None:
 
     assert (following[0]["kind"], following[0]["of"], following[0]["x"]) == ("perturbed", 1, [1.0])
     assert (following[1]["kind"], following[1]["of"]) == ("perturbed", None)
-    assert {each.get("give_up_above_s") for each in following} == {1.25}
+    assert {entry.get("give_up_above_s") for entry in following} == {1.25}
     assert Proposals(request=REQUEST)(finished) == following
 
 
@@ -65,8 +65,8 @@ def test_while_nothing_conforms_every_round_has_a_sample() -> None:
 
     rounds = [Proposals(request=REQUEST)(failed[: SIZE * count]) for count in (1, 2, 3)]
 
-    assert ["sampled" in {each["kind"] for each in tried} for tried in rounds] == [True, True, True]
-    assert not any("give_up_above_s" in each for tried in rounds for each in tried)
+    assert ["sampled" in {entry["kind"] for entry in tried} for tried in rounds] == [True, True, True]
+    assert not any("give_up_above_s" in entry for tried in rounds for entry in tried)
 
 
 def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> None:
@@ -75,7 +75,7 @@ def test_another_seed_begins_a_search_for_any_conforming_layout_elsewhere() -> N
         for seed in (0, 1)
     ]
 
-    assert [each["kind"] for each in begins] == ["given", "perturbed"]
+    assert [begin["kind"] for begin in begins] == ["given", "perturbed"]
 
 
 def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
@@ -84,8 +84,8 @@ def test_where_the_given_layout_leads_nowhere_samples_take_its_place() -> None:
 
     following = Proposals(request=REQUEST)(finished)
 
-    assert [each["kind"] for each in following] == ["sampled"] * SIZE
-    assert len({each["index"] for each in following}) == SIZE
+    assert [entry["kind"] for entry in following] == ["sampled"] * SIZE
+    assert len({entry["index"] for entry in following}) == SIZE
 
 
 def test_a_rejected_trial_is_not_built_on() -> None:

@@ -14,7 +14,7 @@ from cellplan.pipeline.layout.record import layout_schema
 from cellplan.pipeline.layout.result import layout_lines
 from cellplan.study.folder import prepare_folder
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -23,14 +23,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(folder: Path) -> LayoutResult:
+def searched(folder: Path) -> LayoutResult:
     return searched_pair(folder)
 
 
-def test_the_result_is_a_cell_file_that_passes_solve(found: LayoutResult, folder: Path) -> None:
+def test_the_result_is_a_cell_file_that_passes_solve(searched: LayoutResult, folder: Path) -> None:
     solution = solve(load_cell(folder / "study" / "best.yaml"))
 
-    best = found.record["best"]
+    best = searched.record["best"]
     assert best is not None
     assert solution.passed
     assert solution.motion.times[-1] == best["cycle_s"]
@@ -39,16 +39,16 @@ def test_the_result_is_a_cell_file_that_passes_solve(found: LayoutResult, folder
     assert min(margins) >= 10.0
 
 
-def test_the_result_keeps_the_words_of_the_given_file(found: LayoutResult, folder: Path) -> None:
+def test_the_result_keeps_the_words_of_the_given_file(searched: LayoutResult, folder: Path) -> None:
     given, best = ((folder / name).read_text().splitlines() for name in ("given.yaml", "study/best.yaml"))
 
     left = [line for line in given if line not in best]
-    assert found.record["status"] == "certified"
+    assert searched.record["status"] == "certified"
     assert any("was xyz_mm: [1900, 300, 500]" in line for line in best)
     assert all(any(key in line for key in ("base:", "start_deg:", "motion:")) for line in left)
 
 
-def test_an_earlier_search_is_replaced_unless_its_result_was_changed(found: LayoutResult, folder: Path) -> None:
+def test_an_earlier_search_is_replaced_unless_its_result_was_changed(searched: LayoutResult, folder: Path) -> None:
     study = shutil.copytree(folder / "study", folder / "again")
     prepare_folder(study, resume=False)
     left = [entry.name for entry in study.iterdir() if not entry.name.startswith(".")]
@@ -66,45 +66,45 @@ def test_an_earlier_search_is_replaced_unless_its_result_was_changed(found: Layo
 def test_cells_of_other_kinds_are_improved(name: str, limit: float, tmp_path: Path) -> None:
     request = LayoutRequest(cell=CELL.parent / "layout" / f"{name}.yaml")
 
-    found = search_layout(request, tmp_path / "study", stop=Stop(trials=4))
+    searched = search_layout(request, tmp_path / "study", stop=Stop(trials=4))
 
-    best = found.record["best"]
+    best = searched.record["best"]
     assert best is not None
     assert best["cycle_s"] <= limit
     assert solve(load_cell(tmp_path / "study" / "best.yaml")).passed
 
 
-def test_the_cycle_is_the_shortest_of_this_motion(found: LayoutResult, folder: Path) -> None:
+def test_the_cycle_is_the_shortest_of_this_motion(searched: LayoutResult, folder: Path) -> None:
     cell = load_cell(folder / "study" / "best.yaml")
     step = cell.motion.step
     faster = cell.with_values({"motion.duration_s": (cell.motion.duration or 0.0) - step})
 
-    assert found.record["given"]["status"] in {"conforming", "violating"}
+    assert searched.record["given"]["status"] in {"conforming", "violating"}
     assert not solve(faster).passed
 
 
-def test_record_page_and_console_say_the_same(found: LayoutResult, folder: Path) -> None:
+def test_record_page_and_console_say_the_same(searched: LayoutResult, folder: Path) -> None:
     record = json.loads((folder / "study" / "study.json").read_text())
     page = (folder / "study" / "study.html").read_text()
 
     lines = layout_lines(record, folder / "study")
-    assert record == found.record
+    assert record == searched.record
     assert lines[0].startswith("planar-pair: CERTIFIED: cycle ")
     assert lines[0].partition(": ")[2] in page
     assert lines[-2] == f"next: cellplan solve {folder / 'study' / 'best.yaml'} -o {folder / 'study'}-run"
     assert page.count("<svg") >= 2
 
 
-def test_the_record_is_of_its_schema_without_further_keys(found: LayoutResult) -> None:
+def test_the_record_is_of_its_schema_without_further_keys(searched: LayoutResult) -> None:
     schema = layout_schema()
 
-    errors = [error.message for error in Draft202012Validator(schema).iter_errors(found.record)]
+    errors = [error.message for error in Draft202012Validator(schema).iter_errors(searched.record)]
     assert errors == []
-    assert set(found.record) == set(schema["$defs"]["LayoutRecord"]["properties"])
+    assert set(searched.record) == set(schema["$defs"]["LayoutRecord"]["properties"])
 
 
-def test_effects_of_the_variables_are_derivatives_of_the_cycle(found: LayoutResult) -> None:
-    best = found.best
+def test_effects_of_the_variables_are_derivatives_of_the_cycle(searched: LayoutResult) -> None:
+    best = searched.best
     assert best is not None
     problem, x = best.standing.problem, best.standing.measures.point.x
     step = 1e-5
@@ -117,7 +117,7 @@ def test_effects_of_the_variables_are_derivatives_of_the_cycle(found: LayoutResu
         changed.append(abs(point.qd[node, column]) / problem.limits.velocity[column])
 
     slope = (changed[0] - changed[1]) / (2.0 * step) * float(problem.times[-1]) * 0.1  # of 100 mm
-    assert found.record["variables"][0]["cycle_s"] == pytest.approx(slope, rel=0.05, abs=1e-3)
+    assert searched.record["variables"][0]["cycle_s"] == pytest.approx(slope, rel=0.05, abs=1e-3)
 
 
 @pytest.mark.slow

@@ -18,8 +18,8 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Cell:
 
 
 def test_a_program_as_written_has_every_so_many_rows_of_the_finer_one(cell: Cell) -> None:
-    own = cell.with_values({"solver.integrator": "euler"})
-    fine, coarse = (solve(each, task="first").motion for each in (own, own.with_values({"motion.grid_ms": 20})))
+    euler = cell.with_values({"solver.integrator": "euler"})
+    fine, coarse = (solve(entry, task="first").motion for entry in (euler, euler.with_values({"motion.grid_ms": 20})))
 
     assert coarse.times.tolist() == np.round(0.02 * np.arange(102), 12).tolist()  # the last step is a whole one
     assert np.abs(coarse.q[:101] - fine.q[:401:4]).max() < 1e-9
@@ -27,7 +27,7 @@ def test_a_program_as_written_has_every_so_many_rows_of_the_finer_one(cell: Cell
 
 def test_a_retimed_program_on_a_grid_loses_a_step_at_most_and_keeps_every_limit(cell: Cell) -> None:
     fast = cell.with_values({"motion.timing": "fastest", "tasks.first.tolerance.between_rows_mm": 10})
-    fine, coarse = (solve(each, task="first") for each in (fast, fast.with_values({"motion.grid_ms": 20})))
+    fine, coarse = (solve(entry, task="first") for entry in (fast, fast.with_values({"motion.grid_ms": 20})))
 
     assert coarse.passed
     assert coarse.motion.times.tolist() == np.round(0.02 * np.arange(len(coarse.motion.times)), 12).tolist()

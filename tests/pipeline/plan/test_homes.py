@@ -23,10 +23,10 @@ from cellplan.pipeline.plan.run import PlannedRun
 from cellplan.planning.modes import plan_phases
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 BLOCK = Box((0.1, 0.1, 0.1))
-ROOM = 0.055  # [m] the demanded clearance, and what a home keeps beyond it where it can
+SPARE = 0.055  # [m] the demanded clearance, and what a home keeps beyond it where it can
 
 
 def slider(name: str, *, axis=(1.0, 0.0, 0.0), limit: float = 3.0, height: float = 0.0) -> Robot:
@@ -42,13 +42,13 @@ def in_turns(*robots: Robot, things=()) -> Cell:
     return replace(cell, motion=replace(cell.motion, mode=Mode.PAIRWISE))
 
 
-def homes(cell: Cell, worker: str, ways: Mapping[str, Array], *, only: bool = True) -> Mapping[str, Array]:
+def homes(cell: Cell, worker: str, motions: Mapping[str, Array], *, only: bool = True) -> Mapping[str, Array]:
     """Homes of the robots that are idle while one moves along rows of positions of its own."""
     runs = []
     for phase in plan_phases(cell, only=f"work_of_{worker}" if only else None).program:
         (name,) = phase.moving
-        q = np.zeros((len(ways[name]), cell.joint_count))
-        q[:, cell.columns(name)] = ways[name][:, None]
+        q = np.zeros((len(motions[name]), cell.joint_count))
+        q[:, cell.columns(name)] = motions[name][:, None]
         clock = schedule(len(q), cell.task(phase.tasks[0]))
         runs.append(PlannedRun(phase=phase, schedule=clock, motion=Motion(times=clock.times, q=q)))
     return find_homes(Scene.from_cell(cell), runs)
@@ -65,18 +65,18 @@ def test_a_robot_in_the_way_stands_aside_even_when_no_sample_shows_it(samples: i
     """With two samples the saw passes the pen between them."""
     cell = in_turns(slider("saw", axis=(0.0, 1.0, 0.0)), slider("pen"))
 
-    found = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, samples)})
+    home = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, samples)})
 
-    assert list(found) == ["pen"]
-    assert 0.1 + ROOM <= abs(found["pen"][0]) <= 0.24  # 0.24 m is the nearest move of a single joint that is enough
+    assert list(home) == ["pen"]
+    assert 0.1 + SPARE <= abs(home["pen"][0]) <= 0.24  # 0.24 m is the nearest move of a single joint that is enough
 
 
 def test_without_room_to_spare_the_demanded_clearance_is_enough() -> None:
     cell = in_turns(slider("saw", axis=(0.0, 1.0, 0.0)), slider("pen", limit=0.108))
 
-    found = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, 50)})
+    home = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, 50)})
 
-    assert 0.105 <= abs(found["pen"][0]) <= 0.108
+    assert 0.105 <= abs(home["pen"][0]) <= 0.108
 
 
 def test_a_robot_that_cannot_leave_is_named_with_what_is_in_its_way() -> None:
@@ -95,26 +95,26 @@ def test_a_robot_that_cannot_leave_is_named_with_what_is_in_its_way() -> None:
 def test_robots_that_are_idle_together_keep_apart_in_any_order_of_the_file() -> None:
     robots = [slider("saw", axis=(0.0, 1.0, 0.0)), slider("one"), slider("two")]
     fence = thing("fence", Box((0.1, 1.0, 0.1)), pose((-0.4, 0.0, 0.0)))
-    found = [
+    result = [
         homes(in_turns(*order, things=(fence,)), "saw", {"saw": np.linspace(-1.0, 1.0, 30)})
         for order in (robots, robots[::-1])
     ]
 
-    assert all(dict(each) == found[0] for each in found)
-    places = sorted(float(found[0][name][0]) for name in ("one", "two"))
-    assert all(abs(place) >= 0.1 + ROOM for place in places)
-    assert places[1] - places[0] >= 0.1 + ROOM
+    assert all(dict(entry) == result[0] for entry in result)
+    places = sorted(float(result[0][name][0]) for name in ("one", "two"))
+    assert all(abs(place) >= 0.1 + SPARE for place in places)
+    assert places[1] - places[0] >= 0.1 + SPARE
     assert all(abs(place + 0.4) >= 0.105 for place in places)
 
 
 def test_one_home_serves_all_runs_of_a_robot() -> None:
     cell = in_turns(slider("saw", axis=(0.0, 1.0, 0.0)), slider("pen"), slider("axe", axis=(0.6, 0.8, 0.0)))
-    way = np.linspace(-1.0, 1.0, 50)
+    path = np.linspace(-1.0, 1.0, 50)
 
-    found = homes(cell, "", dict.fromkeys(("saw", "pen", "axe"), way), only=False)
+    home = homes(cell, "", dict.fromkeys(("saw", "pen", "axe"), path), only=False)
 
-    assert sorted(found) == ["axe", "pen", "saw"]
-    assert abs(found["pen"][0]) >= 0.1 + ROOM
+    assert sorted(home) == ["axe", "pen", "saw"]
+    assert abs(home["pen"][0]) >= 0.1 + SPARE
 
 
 def test_an_idle_tool_keeps_away_from_the_part_that_it_works_on() -> None:
@@ -125,9 +125,9 @@ def test_an_idle_tool_keeps_away_from_the_part_that_it_works_on() -> None:
     part = fixed_part(Box((0.4, 0.4, 0.1)), pose((0.0, 0.0, -0.15)))
     cell = replace(in_turns(slider("saw", height=5.0), pen), part=part)
 
-    found = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, 20)})
+    home = homes(cell, "saw", {"saw": np.linspace(-1.0, 1.0, 20)})
 
-    assert found["pen"][0] >= ROOM
+    assert home["pen"][0] >= SPARE
 
 
 def test_a_home_that_is_given_is_not_searched() -> None:

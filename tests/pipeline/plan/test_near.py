@@ -205,7 +205,7 @@ def test_every_block_of_a_program_keeps_its_branch(tmp_path: Path) -> None:
             for joint, curves in joints.items():
                 assert after[robot][joint]["position_deg"][0] == pytest.approx(curves["position_deg"][0], abs=10.0)
     record = json.loads((tmp_path / "c" / "report.json").read_text(encoding="utf-8"))
-    assert {each["task"] for each in record["solver"]["moved_starts"]} == {"seam", "ring"}
+    assert {moved_start["task"] for moved_start in record["solver"]["moved_starts"]} == {"seam", "ring"}
     assert run(["verify", str(tmp_path / "c"), "--cell", str(second), "-q"]) == 0
 
 

@@ -38,7 +38,7 @@ def test_rows_that_are_slower_by_a_factor_need_to_be_slower_by_that_much_less(
     motion = fastest.motion
     slow = replace(limits, step=factor * limits.step)
 
-    at_rows, when_slower = (each.shares(np.arange(len(motion.q)) * each.step, motion.q) for each in (limits, slow))
+    at_rows, when_slower = (entry.shares(np.arange(len(motion.q)) * entry.step, motion.q) for entry in (limits, slow))
 
     for power, share, slower in zip((1, 2), at_rows[:2], when_slower[:2], strict=True):
         np.testing.assert_allclose(slower, share / factor**power, rtol=2e-2)

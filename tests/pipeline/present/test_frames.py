@@ -22,7 +22,7 @@ from cellplan.pipeline.wide_table import render_wide_tables
 from cellplan.planning.layout_screening import Candidates, Screening
 from cellplan.report.record.figures import KEY, figures_of
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 UNITS = re.compile(r"_(s|mm|deg|rad|ms|mm_s|deg_s|mm_s2|deg_s2)$|\.(x|y|z|rx|ry|rz)$|_per_h$|_m_or_rad$")
 UNIT_BESIDE = {"value", "limit", "min", "max", "lower", "upper", "margin", "travel", "start", "busiest_joint_travel"}
@@ -107,8 +107,8 @@ def test_all_ways_to_a_run_give_the_same_frames(
         for other in (solution, sound / "run"):
             pd.testing.assert_frame_equal(to_frame(other, name), frame, rtol=1e-6, atol=1e-9)
         if name in tables(report):
-            own = report.to_frame(name)
-            pd.testing.assert_frame_equal(own, frame[list(own.columns)], rtol=1e-6, atol=1e-9)
+            frame_ = report.to_frame(name)
+            pd.testing.assert_frame_equal(frame_, frame[list(frame_.columns)], rtol=1e-6, atol=1e-9)
     pd.testing.assert_frame_equal(solution.to_frame("joints"), to_frame(solution, "joints"))
 
 
@@ -129,23 +129,23 @@ def test_curves_are_those_of_series_json(sound: Path, report: Report) -> None:
             assert list(frame[f"{robot}.{joint}.speed_deg_s"][:-1]) == curves["speed_deg_s"]
             assert np.isnan(frame[f"{robot}.{joint}.speed_deg_s"].iloc[-1])
     pd.testing.assert_frame_equal(to_frame(sound / "run", "curves").drop(columns="phase"), frame, check_dtype=False)
-    own = report.to_frame("curves")
-    pd.testing.assert_frame_equal(own, frame[list(own.columns)], rtol=1e-6, atol=1e-6, check_dtype=False)
+    frame_ = report.to_frame("curves")
+    pd.testing.assert_frame_equal(frame_, frame[list(frame_.columns)], rtol=1e-6, atol=1e-6, check_dtype=False)
 
 
 def test_plain_readers_read_what_our_own_reader_reads(sound: Path) -> None:
     """One line of pandas and one of numpy, as the guide shows them."""
     path = sound / "run" / "tables" / "right.csv"
-    own = parse_table(path.read_text(encoding="utf-8"), "right.csv")
+    table = parse_table(path.read_text(encoding="utf-8"), "right.csv")
     frame = pd.read_csv(path, comment="#")
     with path.open(encoding="utf-8") as file:
         array = np.genfromtxt((line for line in file if not line.startswith("#")), delimiter=",", names=True)
 
-    assert list(frame.columns) == list(array.dtype.names) == ["time_s", *(f"{joint}_deg" for joint in own.joints)]
+    assert list(frame.columns) == list(array.dtype.names) == ["time_s", *(f"{joint}_deg" for joint in table.joints)]
     for column in frame.columns:
         assert np.array_equal(frame[column], array[column])
-    assert np.array_equal(frame["time_s"], own.times)
-    np.testing.assert_allclose(np.deg2rad(frame.iloc[:, 1:]), own.q, rtol=1e-15)
+    assert np.array_equal(frame["time_s"], table.times)
+    np.testing.assert_allclose(np.deg2rad(frame.iloc[:, 1:]), table.q, rtol=1e-15)
 
 
 def test_a_program_in_turns_names_its_phases(sound: Path) -> None:

@@ -55,7 +55,7 @@ def accuracy(size):
 
 
 def trial(size, shares=(8.0, 2.0, 1.0)):
-    drawn = RobotDraw(
+    sample = RobotDraw(
         joint_offsets=np.deg2rad([0.1, 0.2, 0.3]), link_lengths=np.zeros(3), X_base=pose([1e-3, 0, 0]), X_tool=np.eye(4)
     )
     rounds = tuple(
@@ -71,7 +71,7 @@ def trial(size, shares=(8.0, 2.0, 1.0)):
         q=np.zeros((N, 6)),
     )
     return Trial(
-        draw=Draw(robots={"left": drawn, "right": drawn}, X_grasps={"left": np.eye(4)}),
+        draw=Draw(robots={"left": sample, "right": sample}, X_grasps={"left": np.eye(4)}),
         before=(accuracy(size),),
         correction=correction,
         in_pass=None,
@@ -124,14 +124,14 @@ def test_rounds_state_the_factor_of_the_contraction(rehearsal):
     correction = rehearsal_record(rehearsal, provenance=PROVENANCE)["runs"][0]["trials"][0]["correction"]
 
     assert correction["outcome"] == "converged"
-    assert [each["factor"] for each in correction["rounds"]] == [None, 0.25, 0.5]
+    assert [entry["factor"] for entry in correction["rounds"]] == [None, 0.25, 0.5]
 
 
 def test_draws_are_written_out_with_their_units(rehearsal):
-    drawn = rehearsal_record(rehearsal, provenance=PROVENANCE)["runs"][0]["trials"][1]["drawn"]
+    sample = rehearsal_record(rehearsal, provenance=PROVENANCE)["runs"][0]["trials"][1]["drawn"]
 
-    assert drawn["robots"]["left"]["joint_offsets"] == {"A_deg": 0.1, "B_deg": 0.2, "C_deg": 0.3}
-    assert drawn["robots"]["right"]["base"]["xyz_mm"] == [1.0, 0.0, 0.0]
+    assert sample["robots"]["left"]["joint_offsets"] == {"A_deg": 0.1, "B_deg": 0.2, "C_deg": 0.3}
+    assert sample["robots"]["right"]["base"]["xyz_mm"] == [1.0, 0.0, 0.0]
 
 
 def test_no_path_of_this_machine_stands_in_the_record(rehearsal):

@@ -16,7 +16,7 @@ from cellplan.model.settings.cell_errors import MeasurementEntry, PoseErrorEntry
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.pipeline.overrides import with_overrides
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 TOLERANCE = ToleranceEntry(position_mm=0.1, orientation_deg=0.01)
 SMALL = CellErrors(
@@ -46,8 +46,8 @@ def test_an_exact_cell_shows_the_errors_of_the_program_and_nothing_else(pair):
     (run,) = rehearse(pair, CellErrors()).runs
 
     (planned,) = solve(pair).runs[0].report.accuracy
-    (found,) = run.trials[0].before
-    np.testing.assert_allclose(found.position_error, planned.position_error, atol=1e-14)  # rounding
+    (before,) = run.trials[0].before
+    np.testing.assert_allclose(before.position_error, planned.position_error, atol=1e-14)  # rounding
 
 
 def test_one_joint_offset_displaces_the_tool_by_lever_times_angle(pair):
@@ -70,7 +70,7 @@ def test_feedback_brings_the_planar_pair_within_tolerance_pass_by_pass(pair):
     (run,) = made.runs
     (trial,) = run.trials
     correction = trial.correction
-    shares = [each.share for each in correction.rounds]
+    shares = [entry.share for entry in correction.rounds]
     assert correction.outcome is Outcome.CONVERGED
     assert shares[0] > 10.0
     assert all(now < 0.1 * last for last, now in pairwise(shares))  # a contraction
@@ -125,7 +125,7 @@ def test_used_up_rounds_are_reported(pair):
     (trial,) = rehearse(pair, SMALL, feedback=True, rounds=1).runs[0].trials
 
     assert trial.correction.outcome is Outcome.UNFINISHED
-    assert [each.number for each in trial.correction.rounds] == [0, 1]
+    assert [entry.number for entry in trial.correction.rounds] == [0, 1]
 
 
 def test_errors_that_lead_the_arms_away_diverge_and_the_solved_program_is_kept(pair):
@@ -147,10 +147,10 @@ def test_a_normal_shift_of_one_base_repeats_as_its_distribution_says(pair):
 
     figures = run.before["circle"]
     expected = sigma * (np.sqrt(2 / np.pi) + 3 * np.sqrt(1 - 2 / np.pi))
-    drawn = np.array([trial.draw.robots["right"].X_base[1, 3] for trial in run.trials])
+    shifts = np.array([trial.draw.robots["right"].X_base[1, 3] for trial in run.trials])
     assert figures.poses[0].RP_l == pytest.approx(expected, rel=0.2)  # 4 / sqrt(2 * 200)
     assert figures.path.RT_p == pytest.approx(figures.poses[0].RP_l, rel=1e-6)  # the same shift at every instant
-    assert figures.poses[0].AP_p == pytest.approx(abs(drawn.mean()), abs=1e-7)  # the start is solved to less
+    assert figures.poses[0].AP_p == pytest.approx(abs(shifts.mean()), abs=1e-7)  # the start is solved to less
 
 
 def test_fixed_errors_make_one_trial_however_many_are_asked_for(pair):

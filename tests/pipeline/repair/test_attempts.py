@@ -52,7 +52,7 @@ def test_subsets_come_by_size_in_the_order_of_the_cell(cell: Cell) -> None:
     ]
     singles = {attempt.robots[0]: attempt.addresses for attempt in of_layout(cell, cell.layout, 1)}
     assert singles == owners(cell, cell.layout)
-    assert singles["abb"] == tuple(f"robots.abb.base.{each}" for each in ("x_mm", "y_mm", "z_mm", "yaw_deg"))
+    assert singles["abb"] == tuple(f"robots.abb.base.{entry}" for entry in ("x_mm", "y_mm", "z_mm", "yaw_deg"))
 
 
 def test_what_is_tied_changes_with_all_it_is_tied_to(cell: Cell) -> None:
@@ -62,11 +62,11 @@ def test_what_is_tied_changes_with_all_it_is_tied_to(cell: Cell) -> None:
     singles = {attempt.robots: attempt.addresses for attempt in of_layout(cell, tied, 1)}
     assert ("kuka",) not in singles
     assert ("staubli",) not in singles
-    assert singles["abb",] == tuple(f"robots.abb.base.{each}" for each in ("x_mm", "y_mm", "yaw_deg"))
+    assert singles["abb",] == tuple(f"robots.abb.base.{entry}" for entry in ("x_mm", "y_mm", "yaw_deg"))
     pairs = {attempt.robots: attempt.addresses for attempt in of_layout(cell, tied, 2)}
     assert pairs["kuka", "abb"] == singles["abb",]  # the heights are tied to that of staubli
     assert [address.rpartition(".")[2] for address in pairs["kuka", "staubli"]] == [*("x_mm", "y_mm", "yaw_deg")] * 2
-    (three,) = (each.addresses for each in of_layout(cell, tied, 3) if each.robots == ("kuka", "abb", "staubli"))
+    (three,) = (entry.addresses for entry in of_layout(cell, tied, 3) if entry.robots == ("kuka", "abb", "staubli"))
     assert len(three) == 12
 
 
@@ -120,7 +120,7 @@ def test_rows_are_halved_until_their_errors_fit() -> None:
 def test_changes_are_round_and_only_what_differs_is_written(cells: Path) -> None:
     request = LayoutRequest(cell=cells / "four_robots_initial.yaml", objective=Objective.CHANGE)
     ready = ready_cell(request)
-    (attempt,) = [each for each in of_layout(ready.cell, ready.variables.settings, 1) if each.robots == ("staubli",)]
+    (attempt,) = [entry for entry in of_layout(ready.cell, ready.variables.settings, 1) if entry.robots == ("staubli",)]
     only, start = with_attempt(ready, attempt), start_posture(ready)[0]
     assert only.variables.names == attempt.addresses
     x = only.variables.given + np.array([0.0123456, 0.00004, -0.1, np.radians(1.23456)])
@@ -130,7 +130,7 @@ def test_changes_are_round_and_only_what_differs_is_written(cells: Path) -> None
     assert values["robots.staubli.base.z_mm"] == 450.0 - 100.0
     assert values["robots.staubli.base.yaw_deg"] == pytest.approx(91.23)
     assert values.keys() == {
-        *(f"robots.staubli.base.{each}" for each in ("x_mm", "z_mm", "yaw_deg")),
+        *(f"robots.staubli.base.{entry}" for entry in ("x_mm", "z_mm", "yaw_deg")),
         "robots.staubli.start_deg",
     }
     text = change_text(ready.cell, attempt, values)

@@ -16,10 +16,10 @@ def test_one_robot_changes_and_the_margin_is_kept(cells: Path, tmp_path: Path, d
     request = LayoutRequest(
         cell=cells / "four_robots_initial.yaml", objective=Objective.CHANGE, duration=duration, margin=2.0
     )
-    found = repair(request)
-    write_repair(found, request, tmp_path / "out")
+    repaired = repair(request)
+    write_repair(repaired, request, tmp_path / "out")
 
-    first = found.record["remedies"][0]
+    first = repaired.record["remedies"][0]
     assert len(first["robots"]) == 1
     assert first["cost"] is not None
     assert first["cost"] <= 1.5
@@ -30,13 +30,13 @@ def test_one_robot_changes_and_the_margin_is_kept(cells: Path, tmp_path: Path, d
 
 def test_the_base_of_one_robot_where_the_holder_stays(cells: Path) -> None:
     request = LayoutRequest(cell=cells / "four_robots_initial.yaml", objective=Objective.CHANGE, duration=4.0)
-    found = repair(replace(request, fixed=("reis.start_deg",)))
+    repaired = repair(replace(request, fixed=("reis.start_deg",)))
 
-    first = found.record["remedies"][0]
+    first = repaired.record["remedies"][0]
     assert first["robots"] == ["staubli"]
     assert first["cost"] is not None
     assert first["cost"] <= 1.5
-    assert {check["subject"] for check in found.record["failed"] if check["name"] == "joint_position"} == {
+    assert {check["subject"] for check in repaired.record["failed"] if check["name"] == "joint_position"} == {
         "kuka/B2",
         "staubli/C4",
     }

@@ -14,7 +14,7 @@ from cellplan.pipeline.repair.repair import Repair, repair
 from cellplan.pipeline.repair.result import write_repair
 from cellplan.search.programs.objective import Objective
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 CLEARANCE = 200.0  # [mm] that the given cell misses by 59 mm
 
 
@@ -26,10 +26,10 @@ def request_of(cell: Path, **changes: object) -> LayoutRequest:
 def too_near(sound: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Repair, Path]:
     """The small cell, with more clearance demanded than it has, repaired; and the folder of the repair."""
     request = request_of(sound / "cell" / "small.yaml", clearance=CLEARANCE)
-    found = repair(request)
+    repaired = repair(request)
     folder = tmp_path_factory.mktemp("repair") / "found"
-    write_repair(found, request, folder)
-    return found, folder
+    write_repair(repaired, request, folder)
+    return repaired, folder
 
 
 def test_the_least_change_is_straight_down_by_what_is_missed(too_near: tuple[Repair, Path]) -> None:
@@ -50,46 +50,46 @@ def test_the_least_change_is_straight_down_by_what_is_missed(too_near: tuple[Rep
 
 
 def test_what_is_written_passes_when_it_is_solved(too_near: tuple[Repair, Path]) -> None:
-    found, folder = too_near
-    first = found.record["remedies"][0]
+    result, folder = too_near
+    first = result.record["remedies"][0]
     solution = solve(load_cell(folder / "best.yaml"))
     assert solution.passed
     closest = [run.report.clearance.closest[0].distance for run in solution.runs]
     assert 1000.0 * min(closest) == pytest.approx(first["smallest_clearance_mm"], abs=1e-6)
-    assert json.loads((folder / "advice.json").read_text()) == found.record
+    assert json.loads((folder / "advice.json").read_text()) == result.record
 
 
 def test_the_options_make_the_same_cell(too_near: tuple[Repair, Path], sound: Path) -> None:
-    found, _ = too_near
-    assert found.best is not None
-    pasted = with_overrides(load_cell(sound / "cell" / "small.yaml"), found.record["remedies"][0]["options"])
-    for robot, other in zip(pasted.robots, found.best.robots, strict=True):
+    result, _ = too_near
+    assert result.best is not None
+    pasted = with_overrides(load_cell(sound / "cell" / "small.yaml"), result.record["remedies"][0]["options"])
+    for robot, other in zip(pasted.robots, result.best.robots, strict=True):
         assert np.array_equal(robot.X_WB, other.X_WB)
         assert robot.start is not None or other.start is None
         assert other.start is None or np.array_equal(robot.start, other.start)
-    assert pasted.checks.clearance_mm.si == found.best.checks.clearance_mm.si
+    assert pasted.checks.clearance_mm.si == result.best.checks.clearance_mm.si
 
 
 def test_every_attempt_is_a_remedy_or_has_a_reason(too_near: tuple[Repair, Path]) -> None:
     record = too_near[0].record
-    assert all(each["reason"] for each in record["tried"])
-    assert {each["kind"] for each in record["tried"]} == {"layout", "spin", "free_spin", "duration", "weights"}
-    longer = next(each for each in record["tried"] if each["kind"] == "duration")
+    assert all(entry["reason"] for entry in record["tried"])
+    assert {entry["kind"] for entry in record["tried"]} == {"layout", "spin", "free_spin", "duration", "weights"}
+    longer = next(entry for entry in record["tried"] if entry["kind"] == "duration")
     assert longer["reason"] == f"not tried, as a slower motion does not help: {record['failed'][0]['message']}"
 
 
 def test_a_cell_that_passes_is_left_alone(sound: Path) -> None:
-    found = repair(request_of(sound / "cell" / "small.yaml"))
-    assert (found.record["status"], found.best) == ("passes", None)
-    assert found.record["remedies"] == found.record["tried"] == []
+    repaired = repair(request_of(sound / "cell" / "small.yaml"))
+    assert (repaired.record["status"], repaired.best) == ("passes", None)
+    assert repaired.record["remedies"] == repaired.record["tried"] == []
 
 
 @pytest.mark.slow
 def test_a_cycle_too_short_is_made_as_long_as_the_accelerations_ask(sound: Path) -> None:
     settings = ("motion.step_s=0.001", "layout.vary={right.base: {yaw_deg: [179, 181]}}")
-    found = repair(request_of(sound / "cell" / "small.yaml", duration=0.15, settings=settings))
-    longer = next(each for each in found.record["remedies"] if each["kind"] == "duration")
-    shares = [check["value"] / check["limit"] for check in found.record["failed"]]
+    repaired = repair(request_of(sound / "cell" / "small.yaml", duration=0.15, settings=settings))
+    longer = next(remedy for remedy in repaired.record["remedies"] if remedy["kind"] == "duration")
+    shares = [check["value"] / check["limit"] for check in repaired.record["failed"]]
     steps = np.ceil(0.15 * np.sqrt(max(shares)) / 0.001)  # an acceleration falls with the square of the time
     assert longer["settings"]["motion.duration_s"] == pytest.approx(0.001 * steps)
     assert longer["text"] == f"0.15 s -> {0.001 * steps:g} s"

@@ -28,7 +28,7 @@ def start(cell: Path) -> dict[str, Any]:
     return dict(view(ViewRequest(path=cell))[0])
 
 
-def beside(cell: Path, name: str, text: str) -> Path:
+def sibling(cell: Path, name: str, text: str) -> Path:
     """Another cell file in the folder of one."""
     path = cell.with_name(name)
     path.write_text(text, encoding="utf-8")
@@ -64,7 +64,7 @@ def test_a_moved_base_moves_what_stands_on_it(start: dict[str, Any], cell: Path)
 
 def test_a_wedge_below_a_leaning_base_has_its_outline_and_its_floor(cell: Path) -> None:
     leaning = "[0, 4000, 500], rpy_deg: [0, 20, 30]}\n    mount: {tilted: {box: {size_mm: [260, 200]}}}"
-    path = beside(cell, "tilted.yaml", cell.read_text().replace("[0, 4000, 500]}", leaning) + EXCLUDED)
+    path = sibling(cell, "tilted.yaml", cell.read_text().replace("[0, 4000, 500]}", leaning) + EXCLUDED)
     record = view(ViewRequest(path=path))[0]
     bodies = {body["name"]: body for body in record["scenes"][0]["bodies"]}
     path.unlink()
@@ -80,7 +80,7 @@ def test_a_wedge_below_a_leaning_base_has_its_outline_and_its_floor(cell: Path) 
 
 
 def test_what_touches_at_the_start_is_named_once_with_its_bodies(cell: Path) -> None:
-    crowded = beside(cell, "crowded.yaml", cell.read_text().replace("motion:", f"{BOX}motion:"))
+    crowded = sibling(cell, "crowded.yaml", cell.read_text().replace("motion:", f"{BOX}motion:"))
     scene = view(ViewRequest(path=crowded))[0]["scenes"][0]
     index = {body["name"]: place for place, body in enumerate(scene["bodies"])}
     crowded.unlink()
@@ -94,7 +94,7 @@ def test_what_touches_at_the_start_is_named_once_with_its_bodies(cell: Path) -> 
 
 
 def test_a_cell_without_a_start_is_shown_with_the_reason(cell: Path) -> None:
-    far = beside(cell, "far.yaml", cell.read_text().replace("[1900, 300, 480]", "[9000, 300, 480]"))
+    far = sibling(cell, "far.yaml", cell.read_text().replace("[1900, 300, 480]", "[9000, 300, 480]"))
     scene = view(ViewRequest(path=far))[0]["scenes"][0]
     far.unlink()
 
@@ -136,9 +136,9 @@ def test_a_layout_with_starts_is_shown_with_its_motion(cell: Path, sound: Path, 
     run = view(ViewRequest(path=sound / "run", cell=cell))[0]["scenes"][0]
     times, q = rows_of(dict(run["motion"]))
     for scene in scenes:
-        own_times, own = rows_of(dict(scene["motion"]))
-        assert np.array_equal(own_times, times)
-        assert np.abs(own - q).max() < 1e-5  # the idle robot's place does not matter to the others
+        times_, rows = rows_of(dict(scene["motion"]))
+        assert np.array_equal(times_, times)
+        assert np.abs(rows - q).max() < 1e-5  # the idle robot's place does not matter to the others
         assert min(scene["nearest"]["distances"]) == pytest.approx(min(run["nearest"]["distances"]), abs=1e-2)
 
 
@@ -150,10 +150,10 @@ def write_study(folder: Path, settings: list[dict[str, Any]]) -> Path:
             "trial": place,
             "origin": "given",
             "status": "conforming" if place else "certified",
-            "settings": own,
+            "settings": setting,
             **figures,
         }
-        for place, own in enumerate(settings)
+        for place, setting in enumerate(settings)
     ]
     (folder / "study.json").write_text(json.dumps({"schema": "cellplan.layout/1", "kind": "layout", "top": top}))
     return folder

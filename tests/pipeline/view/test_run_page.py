@@ -23,7 +23,7 @@ from cellplan.pipeline.view.run_scene import MOST_NUMBERS, motion_record, run_sc
 from cellplan.pipeline.view.write import ViewRequest, view, write_view
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -67,11 +67,12 @@ def test_meshes_lie_where_their_files_do(record: ViewRecord, scene: Scene) -> No
         shape = record["geometries"][next(body["geometry"] for body in page["bodies"] if body["name"] == name)]
         points = np.frombuffer(b64decode(shape["points"]), "<u2").reshape(-1, 3) / 65535 * shape["size"] + shape["low"]
         corners = points[np.frombuffer(b64decode(shape["triangles"]), "<u2").reshape(-1, 3)]
-        drawn, given = (
-            each[np.lexsort(each.reshape(len(each), -1).T)] for each in (corners, mesh.vertices[mesh.faces])
+        shown, given = (
+            triangles[np.lexsort(triangles.reshape(len(triangles), -1).T)]
+            for triangles in (corners, mesh.vertices[mesh.faces])
         )
 
-        assert np.abs(np.sort(drawn.ravel()) - np.sort(given.ravel())).max() <= shape["deviation"]
+        assert np.abs(np.sort(shown.ravel()) - np.sort(given.ravel())).max() <= shape["deviation"]
     assert {"right/b", "block"} <= meshes.keys()
 
 
@@ -102,9 +103,9 @@ def test_paths_lie_on_the_part_and_the_part_where_its_holder_has_it(record: View
 
 def test_pairs_that_are_not_checked_are_listed_with_their_reason(record: ViewRecord, scene: Scene) -> None:
     page = record["scenes"][0]
-    listed = {(tuple(pair), each["reason"]) for each in page["excluded"] for pair in each["pairs"]}
+    listed = {(tuple(pair), entry["reason"]) for entry in page["excluded"] for pair in entry["pairs"]}
 
-    assert {((each.first, each.second), each.reason) for each in scene.excluded} <= listed
+    assert {((entry.first, entry.second), entry.reason) for entry in scene.excluded} <= listed
 
 
 def test_the_same_run_gives_the_same_bytes_and_stays_sound(record: ViewRecord, sound: Path, tmp_path: Path) -> None:
@@ -131,11 +132,11 @@ def test_phases_follow_one_another_on_the_clock_of_the_program(sound: Path, tmp_
 
 def test_a_long_motion_is_thinned_and_keeps_its_last_row() -> None:
     q = np.zeros((MOST_NUMBERS // 2, 4))
-    found = motion_record(np.arange(len(q), dtype=float), q, [])
+    record = motion_record(np.arange(len(q), dtype=float), q, [])
 
-    times, kept = rows_of(dict(found))
-    assert (found["total"], times[0], times[-1]) == (len(q), 0.0, len(q) - 1.0)
-    assert kept.size <= MOST_NUMBERS + 8
+    times, rows = rows_of(dict(record))
+    assert (record["total"], times[0], times[-1]) == (len(q), 0.0, len(q) - 1.0)
+    assert rows.size <= MOST_NUMBERS + 8
 
 
 def test_meshes_share_the_triangles_of_a_page(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,13 +194,13 @@ def test_a_series_that_does_not_fit_is_named(sound: Path, message: str) -> None:
 
 def test_the_curve_over_the_time_line_is_what_the_report_certifies(record: ViewRecord, sound: Path) -> None:
     curve, whole = record["scenes"][0]["certified"], read_stored_run(sound / "run").record["clearance"]["whole"]
-    known = [each for each in curve["distances"] if each is not None]
+    known = [distance for distance in curve["distances"] if distance is not None]
 
     assert len(curve["times"]) == len(curve["distances"]) > 40
     assert min(known) == pytest.approx(whole["minimum_mm"], abs=1e-4)
     assert curve["times"][curve["distances"].index(min(known))] == pytest.approx(whole["at_s"], abs=1e-6)
     nearest = record["scenes"][0]["nearest"]
     for at, distance in zip(nearest["times"], nearest["distances"], strict=True):
-        before = max(i for i, each in enumerate(curve["times"]) if each <= at + 1e-9)
-        about = [each for each in curve["distances"][max(before - 1, 0) : before + 3] if each is not None]
+        before = max(i for i, time in enumerate(curve["times"]) if time <= at + 1e-9)
+        about = [distance for distance in curve["distances"][max(before - 1, 0) : before + 3] if distance is not None]
         assert min(about) <= distance + 0.1  # a block is never kept better than in one of its rows

@@ -60,7 +60,7 @@ def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str
     q, tasks = configurations(cell, LANES), BatchTasks(cell, relations(cell), everyone(cell))
     desired, X = random_desired(len(relations(cell)), LANES)
 
-    found = tasks.task_errors(q, desired[0], tasks.chains.placement(cell))
+    errors = tasks.task_errors(q, desired[0], tasks.chains.placement(cell))
 
     seen = seen_poses(cell, q.T)
     for lane in range(LANES):
@@ -68,9 +68,9 @@ def test_errors_are_those_of_the_planner_in_the_rows_that_a_task_keeps(name: str
         expected = pose_errors(X[lane], seen[lane], free)
         for index, task in enumerate(relations(cell)):
             rows = constraint_rows(task, X[lane, None, index])[0]
-            np.testing.assert_allclose(rows @ found[:, index, lane], rows @ expected[index], atol=1e-11)
-            kept = rows.T @ rows  # onto what the rows keep; nothing is left beside them
-            np.testing.assert_allclose(kept @ found[:, index, lane], found[:, index, lane], atol=1e-11)
+            np.testing.assert_allclose(rows @ errors[:, index, lane], rows @ expected[index], atol=1e-11)
+            projector = rows.T @ rows  # onto what the rows keep; nothing is left beside them
+            np.testing.assert_allclose(projector @ errors[:, index, lane], errors[:, index, lane], atol=1e-11)
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -81,16 +81,16 @@ def test_speeds_are_the_smallest_weighted_ones_and_the_drift_that_no_task_notice
     drift = np.random.default_rng(5).normal(size=cell.joint_count)
     linear = looked(cell, q, desired)
 
-    plain, drifting = linear.speeds(), linear.speeds(drift)
+    plain, drifting = linear.velocities(), linear.velocities(drift)
 
     for lane in range(LANES):
         dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=ONES[name])
         assert dense.rank == len(dense.J), "drawn so that all tasks can be done"
-        expected = dense.inverse.speeds(dense.twist, 0.0)
-        room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2  # damping of 1e-10, some ten rows
-        np.testing.assert_allclose(plain[:, lane], expected, atol=room * np.abs(expected).max())
+        expected = dense.inverse.velocities(dense.twist, 0.0)
+        tolerance = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2  # damping of 1e-10, some ten rows
+        np.testing.assert_allclose(plain[:, lane], expected, atol=tolerance * np.abs(expected).max())
         expected += dense.inverse.null_space_projection(drift)
-        np.testing.assert_allclose(drifting[:, lane], expected, atol=room * np.abs(expected).max())
+        np.testing.assert_allclose(drifting[:, lane], expected, atol=tolerance * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -101,15 +101,15 @@ def test_corrections_lead_onto_the_tasks_in_quadratic_steps(name: str) -> None:
     X = seen_poses(cell, goal.T)
     desired = np.moveaxis(X, (0, 1), (3, 2)), np.zeros((6, X.shape[1], LANES))
     q = goal + 2e-4 * configurations(cell, LANES, seed=9)
-    found = []
+    moves = []
     for _ in range(6):
         linear = looked(cell, q, desired)
-        found.append(np.abs(linear.errors).max())
+        moves.append(np.abs(linear.errors).max())
         q = q + linear.correction(np.zeros_like(q))
 
-    assert found[0] > 1e-5
-    assert found[-1] <= 1e-13 * 50.0  # lengths of some ten metres
-    assert any(after <= 1e4 * before**2 for before, after in pairwise(found) if before > 1e-6)
+    assert moves[0] > 1e-5
+    assert moves[-1] <= 1e-13 * 50.0  # lengths of some ten metres
+    assert any(after <= 1e4 * before**2 for before, after in pairwise(moves) if before > 1e-6)
 
 
 @pytest.mark.parametrize("name", CELLS)
@@ -123,8 +123,8 @@ def test_a_correction_allows_for_what_the_posture_moves_anyway(name: str) -> Non
 
     for lane in range(LANES):
         dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=ONES[name])
-        room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
-        np.testing.assert_allclose(dense.J @ total[:, lane], dense.error, atol=room * 10.0)
+        tolerance = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
+        np.testing.assert_allclose(dense.J @ total[:, lane], dense.error, atol=tolerance * 10.0)
 
 
 @pytest.mark.parametrize("name", [name for name in CELLS if name not in ("carried", "world", "mixed")])
@@ -136,7 +136,7 @@ def test_a_part_at_rest_is_left_to_the_operators(name: str) -> None:
     desired, X = random_desired(len(cell.tasks), LANES)
     linear = looked(at_rest, q, desired, moving=operators)
 
-    speeds = linear.speeds()
+    speeds = linear.velocities()
 
     for robot in cell.robots:
         assert robot.name in operators or not speeds[cell.columns(robot.name)].any()
@@ -159,14 +159,14 @@ def test_locked_joints_get_exactly_nothing_and_the_others_make_up_for_it(name: s
     linear = looked(cell, q, desired, mobile=mobile)
     drift = np.ones(cell.joint_count)
 
-    for found in (linear.speeds(), linear.speeds(drift), linear.correction(np.zeros_like(q))):
-        assert not found[mobile == 0.0].any()
+    for velocities in (linear.velocities(), linear.velocities(drift), linear.correction(np.zeros_like(q))):
+        assert not velocities[mobile == 0.0].any()
     for lane in range(LANES):
         dense = Dense(cell, q[:, lane], X[lane], desired[1][..., lane], moving=everyone(cell), mobile=mobile)
         if dense.rank == len(dense.J):
-            room = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
-            expected = dense.inverse.speeds(dense.twist, 0.0)
-            np.testing.assert_allclose(linear.speeds()[:, lane], expected, atol=room * np.abs(expected).max())
+            tolerance = 1e-8 * (dense.inverse.largest / dense.inverse.smallest) ** 2
+            expected = dense.inverse.velocities(dense.twist, 0.0)
+            np.testing.assert_allclose(linear.velocities()[:, lane], expected, atol=tolerance * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("name", ["plain", "sliding", "followers", "mixed", "fixture", "closed", "carried"])
@@ -175,16 +175,16 @@ def test_speeds_move_the_tools_as_desired(name: str) -> None:
     cell = CELLS[name]
     q = configurations(cell, LANES)
     desired, _ = random_desired(len(relations(cell)), LANES)
-    speeds = looked(cell, q, desired).speeds()
+    speeds = looked(cell, q, desired).velocities()
 
     ahead, behind = (seen_poses(cell, (q + h * speeds).T) for h in (H, -H))
 
     linear = (ahead - behind)[..., :3, 3] / (2.0 * H)
     angular = rotation_vector(ahead[..., :3, :3] @ np.swapaxes(behind[..., :3, :3], -1, -2)) / (2.0 * H)
-    found = np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, 0)
+    result = np.moveaxis(np.concatenate([linear, angular], axis=-1), -1, 0)
     expected = np.swapaxes(desired[1], 1, 2)
     scale = np.abs(speeds).max()
-    np.testing.assert_allclose(found, expected, atol=1e-7 * max(scale, 1.0) ** 2)  # damping, and eps / H of rounding
+    np.testing.assert_allclose(result, expected, atol=1e-7 * max(scale, 1.0) ** 2)  # damping, and eps / H of rounding
 
 
 def test_what_belongs_to_the_joints_is_sorted_there_and_back() -> None:
@@ -206,7 +206,7 @@ def test_errors_of_any_size_are_seen(name: str, angle: float) -> None:
     axis = np.array([0.6, -0.8, 0.0])  # across the tool's axis, so that free spin does not hide it
     X[:, :3, :3] = X[:, :3, :3] @ rotation_exp(angle * axis)
 
-    found = tasks.errors(q, np.moveaxis(X, 0, -1)[..., None], tasks.chains.placement(cell))
+    result = tasks.errors(q, np.moveaxis(X, 0, -1)[..., None], tasks.chains.placement(cell))
 
-    np.testing.assert_allclose(np.linalg.norm(found[3:, :, 0], axis=0), angle, atol=1e-9)
-    np.testing.assert_allclose(found[:3], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(result[3:, :, 0], axis=0), angle, atol=1e-9)
+    np.testing.assert_allclose(result[:3], 0.0, atol=1e-12)

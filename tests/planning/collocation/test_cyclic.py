@@ -114,9 +114,9 @@ def test_coming_and_leaving_are_no_part_of_the_cycle() -> None:
 def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
     case = cyclic(triangles(CELLS["sliding"]), 3)
     path = closed(replace(case, start=case.start + 1e-5))
-    found = drift(path, [0.0, 1.0, 2.0, 3.0])
-    assert 1e-6 < found[0] < 1e-3
-    assert found[1:].max() <= PERIODIC
+    result = drift(path, [0.0, 1.0, 2.0, 3.0])
+    assert 1e-6 < result[0] < 1e-3
+    assert result[1:].max() <= PERIODIC
 
 
 @pytest.mark.parametrize(
@@ -127,8 +127,8 @@ def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
     lock = LockedJoint(robot="op1", joint="j1", since=since)
     case = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, locked=(lock,))))
     path = closed(case)
-    found = drift(path, [0.0, 1.0, 2.0, 3.0])
-    assert found.max() <= 1e-8
+    result = drift(path, [0.0, 1.0, 2.0, 3.0])
+    assert result.max() <= 1e-8
     assert largest_error(case, path, between_samples(case, path, count=2)) <= 1e-7
 
 
@@ -171,6 +171,6 @@ def test_no_way_through_a_cycle_leaves_it_to_the_steps() -> None:
 def test_nicolato_s_ellipse_closes_in_each_of_25_cycles() -> None:
     cell = shipped("papers/nicolato_ellipse")
     case = case_of(replace(cell, motion=replace(cell.motion, step=0.0025, cyclic=True)))
-    found = np.abs(np.diff(case.resolved().q[::800], axis=0)).max(axis=1)
-    assert found[0] <= 1e-8  # the start posture is written with nine decimals
-    assert found[1:].max() <= 1e-11
+    result = np.abs(np.diff(case.resolved().q[::800], axis=0)).max(axis=1)
+    assert result[0] <= 1e-8  # the start posture is written with nine decimals
+    assert result[1:].max() <= 1e-11

@@ -25,8 +25,8 @@ def test_values_are_those_of_the_curve_and_exact_at_the_nodes(path: CollocatedPa
     t = np.linspace(1.0, 3.25, 301)
     np.testing.assert_allclose(path.at(t), curve(t).T, atol=1e-10)
     for panel, nodes in zip(path.panels, path.nodes, strict=True):
-        own = panel.begin + panel.length * chebyshev(panel.degree).nodes
-        np.testing.assert_allclose(path.at(own), nodes.T, atol=2e-15 * 30.0)
+        times = panel.begin + panel.length * chebyshev(panel.degree).nodes
+        np.testing.assert_allclose(path.at(times), nodes.T, atol=2e-15 * 30.0)
 
 
 def test_joints_that_stand_still_do_so_to_the_last_bit(path: CollocatedPath) -> None:
@@ -41,8 +41,8 @@ def test_no_jump_where_two_panels_meet(path: CollocatedPath) -> None:
 
 
 def test_instants_at_the_ends_may_be_off_by_rounding(path: CollocatedPath) -> None:
-    found = path.at(np.array([1.0 - 5e-10, 3.25 + 5e-10]))
-    assert np.abs(found - [path.start, path.last]).max() < 1e-15
+    result = path.at(np.array([1.0 - 5e-10, 3.25 + 5e-10]))
+    assert np.abs(result - [path.start, path.last]).max() < 1e-15
 
 
 def test_a_path_of_no_panels_is_its_start() -> None:

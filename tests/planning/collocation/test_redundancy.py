@@ -57,7 +57,7 @@ def dense_velocities(case: Case, k: int, q: Array) -> Array:
     problem._goal_step = 0.0  # the gain of an infinitely short step
     tasks = problem.first_order(k, q)
     inverse = WeightedInverse(tasks.J, tasks.weights)
-    speeds = inverse.speeds(tasks.twist, 0.0)
+    speeds = inverse.velocities(tasks.twist, 0.0)
     if tasks.secondary is not None:
         speeds += tasks.bounded(inverse.null_space_projection(tasks.secondary), velocities=speeds)
     return speeds
@@ -86,11 +86,11 @@ def test_velocities_are_those_of_euler_s_steps_at_every_configuration(name: str)
     middle = len(case.schedule.times) // 2
     samples = slice(middle, middle + 3)
     q = case.start + np.random.default_rng(5).normal(size=(3, len(case.start))) * 0.005
-    expected = np.array([dense_velocities(case, middle + i, each) for i, each in enumerate(q)])
+    expected = np.array([dense_velocities(case, middle + i, entry) for i, entry in enumerate(q)])
 
-    found = batched_velocities(case, samples, q)
+    velocities = batched_velocities(case, samples, q)
 
-    np.testing.assert_allclose(found, expected, atol=3e-6 * np.abs(expected).max())  # what keeps blocks regular
+    np.testing.assert_allclose(velocities, expected, atol=3e-6 * np.abs(expected).max())  # what keeps blocks regular
     plain = with_solver(triangles(CELLS[name]))
     assert np.abs(np.array([dense_velocities(plain, middle, q[0])]) - expected[:1]).max() > 1e-4
 
@@ -100,11 +100,11 @@ def test_bounds_of_joint_speeds_are_those_of_euler_s_steps() -> None:
     case = with_solver(triangles(CELLS["plain"]), {"posture": {"gain": 1e5}})
     middle = len(case.schedule.times) // 2
     q = case.start + np.random.default_rng(6).normal(size=(2, len(case.start))) * 0.005
-    found = batched_velocities(case, slice(middle, middle + 2), q)
-    expected = np.array([dense_velocities(case, middle + i, each) for i, each in enumerate(q)])
+    velocities = batched_velocities(case, slice(middle, middle + 2), q)
+    expected = np.array([dense_velocities(case, middle + i, entry) for i, entry in enumerate(q)])
     top = 0.9 * case.cell.joint_limits.velocity
-    assert np.all(np.abs(found) <= top + 1e-9)
-    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
+    assert np.all(np.abs(velocities) <= top + 1e-9)
+    np.testing.assert_allclose(velocities, expected, atol=1e-7 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(

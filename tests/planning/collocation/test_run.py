@@ -85,12 +85,12 @@ def test_tasks_may_start_late_end_early_and_come_and_leave() -> None:
 def test_a_start_beside_the_path_is_left_without_a_jump(settle: float) -> None:
     case = triangles(with_words(CELLS["mixed"], settle=settle))
     start = case.start + 1e-3
-    beside = replace(case, start=start)
-    path = beside.path()
+    moved = replace(case, start=start)
+    path = moved.path()
 
     times = between_samples(case, path, count=2)
     soon = settle or SETTLING_STEPS * case.cell.motion.step
-    assert largest_error(beside, path, times[times > soon]) <= ACCURACY + SAME
+    assert largest_error(moved, path, times[times > soon]) <= ACCURACY + SAME
     q = path.at(np.linspace(0.0, 5e-4, 3))
     assert np.array_equal(q[0], start)
     assert np.abs(np.diff(q, axis=0)).max() < 1e-3 * 0.05  # a twentieth of the way in a tenth of the time, at most

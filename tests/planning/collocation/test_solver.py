@@ -47,11 +47,13 @@ def moved_bases(cell: Cell, count: int) -> list[Cell]:
 
 def placement_of(cells: list[Cell]) -> Placement:
     chains = BatchTasks(cells[0], cells[0].tasks, everyone(cells[0])).chains
-    each = [chains.placement(cell) for cell in cells]
-    return Placement(*(np.concatenate([getattr(p, part) for p in each], axis=-1) for part in Placement.__slots__))
+    placements = [chains.placement(cell) for cell in cells]
+    return Placement(*(np.concatenate([getattr(p, part) for p in placements], axis=-1) for part in Placement.__slots__))
 
 
-def carried_through(found: Collocation, case: Case, q: Array, cells: NDArray[np.intp]) -> tuple[Array, list[int], dict]:
+def carried_through(
+    collocation: Collocation, case: Case, q: Array, cells: NDArray[np.intp]
+) -> tuple[Array, list[int], dict]:
     """The last configurations, who arrived, and the panels that each cell passed."""
     passed: dict[int, list[Panel]] = {int(cell): [] for cell in cells}
 
@@ -63,7 +65,7 @@ def carried_through(found: Collocation, case: Case, q: Array, cells: NDArray[np.
 
     last = q.copy()
     windows = windows_between(case.schedule.breaks, whole=float(case.schedule.times[-1]))
-    arrived = found.carry(windows, last, cells, record)
+    arrived = collocation.carry(windows, last, cells, record)
     return last, arrived.tolist(), passed
 
 
@@ -76,8 +78,8 @@ def test_cells_together_do_what_each_does_alone() -> None:
     assert arrived == [0, 1, 2]
     for index, cell in enumerate(cells):
         alone = replace(CELL, cell=cell)
-        own, _, panels = carried_through(collocation(alone), alone, q[:, :1], np.zeros(1, dtype=np.intp))
-        np.testing.assert_allclose(last[:, index], own[:, 0], atol=1e-6)  # passes may end earlier for one alone
+        alone_, _, panels = carried_through(collocation(alone), alone, q[:, :1], np.zeros(1, dtype=np.intp))
+        np.testing.assert_allclose(last[:, index], alone_[:, 0], atol=1e-6)  # passes may end earlier for one alone
         assert passed[index] == panels[0]
 
 
@@ -90,14 +92,14 @@ def test_one_that_is_lost_leaves_the_others_alone() -> None:
     ]
     cells.insert(1, replace(CELL.cell, robots=tuple(far)))
     q = np.repeat(CELL.start[:, None], 3, axis=1)
-    found = collocation(CELL, placement_of(cells), shortest=0.02)
+    solver = collocation(CELL, placement_of(cells), shortest=0.02)
 
-    last, arrived, passed = carried_through(found, CELL, q, np.arange(3))
+    last, arrived, passed = carried_through(solver, CELL, q, np.arange(3))
 
     assert arrived == [0, 2]
     assert passed[1] == []
-    own, _, panels = carried_through(collocation(CELL), CELL, q[:, :1], np.zeros(1, dtype=np.intp))
-    np.testing.assert_allclose(last[:, 0], own[:, 0], atol=1e-6)
+    alone, _, panels = carried_through(collocation(CELL), CELL, q[:, :1], np.zeros(1, dtype=np.intp))
+    np.testing.assert_allclose(last[:, 0], alone[:, 0], atol=1e-6)
     assert passed[0] == panels[0]
 
 
@@ -114,12 +116,12 @@ def test_panels_come_in_order_without_gaps() -> None:
 
 def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
     """Even where no robot may move and the tools are desired elsewhere; no warning is let out."""
-    found = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
+    solver = collocation(CELL, mobile=np.zeros(CELL.cell.joint_count))
     window = Window((Panel(0.0, 1.0 / 3.0, 12),))
     times, (begins, ends) = window.times, window.stretches
     desired = desired_motion(CELL.schedule.paths, ())(times, begins, ends)
 
-    attempt = found.attempt(
+    attempt = solver.attempt(
         window,
         desired,
         CELL.start[:, None],
@@ -130,10 +132,10 @@ def test_an_attempt_that_does_not_settle_says_so_in_silence() -> None:
 
 
 def test_work_is_counted() -> None:
-    found = collocation(CELL)
-    carried_through(found, CELL, CELL.start[:, None], np.zeros(1, dtype=np.intp))
-    assert found.sweeps > 6
-    assert found.solves == 25 * found.sweeps  # a panel of degree 24 in each window
+    solver = collocation(CELL)
+    carried_through(solver, CELL, CELL.start[:, None], np.zeros(1, dtype=np.intp))
+    assert solver.sweeps > 6
+    assert solver.solves == 25 * solver.sweeps  # a panel of degree 24 in each window
 
 
 @pytest.mark.parametrize("name", ["mixed", "closed", "world"])
@@ -142,9 +144,9 @@ def test_targets_of_windows_are_those_of_the_tasks(name: str) -> None:
     grasps = closures(case.cell, case.moving)
     windows = windows_between(case.schedule.breaks, whole=1.0)
 
-    found = in_windows(desired_motion(case.schedule.paths, grasps), windows)
+    targets = in_windows(desired_motion(case.schedule.paths, grasps), windows)
 
-    for window, (desired, twists) in zip(windows, found, strict=True):
+    for window, (desired, twists) in zip(windows, targets, strict=True):
         for index, path in enumerate(case.schedule.paths):
             X, V = path.at(window.times, window.stretches)
             np.testing.assert_array_equal(np.moveaxis(desired[:, :, index], -1, 0), X)

@@ -27,7 +27,9 @@ def desired_beside(name: str, distance: float) -> tuple[BatchTasks, Desired, np.
     return tasks, (np.moveaxis(X, 0, -1)[..., None], twists), q[:, 0]
 
 
-def found(name: str, distance: float, until: float = 0.5) -> tuple[BatchTasks, Desired, np.ndarray, StartOffset | None]:
+def offset_of(
+    name: str, distance: float, until: float = 0.5
+) -> tuple[BatchTasks, Desired, np.ndarray, StartOffset | None]:
     tasks, desired, start = desired_beside(name, distance)
     count = desired[0].shape[2]
     placement = tasks.chains.placement(CELLS[name])
@@ -46,7 +48,7 @@ def even(desired: Desired, t: np.ndarray) -> Desired:
 @pytest.mark.parametrize("name", CELLS)
 @pytest.mark.parametrize("distance", [1e-5, 1e-2, 0.3])
 def test_targets_begin_where_the_tools_are(name: str, distance: float) -> None:
-    tasks, desired, start, offset = found(name, distance)
+    tasks, desired, start, offset = offset_of(name, distance)
     assert offset is not None
 
     X, V = offset.applied(np.zeros(1), *desired)
@@ -58,13 +60,13 @@ def test_targets_begin_where_the_tools_are(name: str, distance: float) -> None:
 
 @pytest.mark.parametrize("name", ["plain", "spin", "partial", "world"])
 def test_twists_are_the_derivatives_of_the_poses(name: str) -> None:
-    _, desired, _, offset = found(name, 0.3)
+    _, desired, _, offset = offset_of(name, 0.3)
     assert offset is not None
     t = np.linspace(0.03, 0.47, 9)
 
     (X0, _), (X, twists), (X1, _) = (offset.applied(t + shift, *even(desired, t + shift)) for shift in (-H, 0.0, H))
 
-    R0, R, R1 = (each[:3, :3] for each in (X0, X, X1))
+    R0, R, R1 = (entry[:3, :3] for entry in (X0, X, X1))
     np.testing.assert_allclose((X1[:3, 3] - X0[:3, 3]) / (2 * H), twists[:3], atol=1e-6)  # H^2
     turn = np.einsum("ijtb,kjtb->tbik", R1, R0)
     np.testing.assert_allclose(np.moveaxis(rotation_vector(turn), -1, 0) / (2 * H), twists[3:], atol=1e-6)
@@ -72,7 +74,7 @@ def test_twists_are_the_derivatives_of_the_poses(name: str) -> None:
 
 
 def test_nothing_is_left_of_it_in_the_end() -> None:
-    _, desired, _, offset = found("mixed", 0.3)
+    _, desired, _, offset = offset_of("mixed", 0.3)
     assert offset is not None
     t = np.array([0.5, 0.7])
     for before, after in zip(even(desired, t), offset.applied(t, *even(desired, t)), strict=True):
@@ -80,11 +82,11 @@ def test_nothing_is_left_of_it_in_the_end() -> None:
 
 
 def test_tools_on_their_paths_need_none() -> None:
-    assert found("plain", 1e-9)[-1] is None
+    assert offset_of("plain", 1e-9)[-1] is None
 
 
 def test_components_that_a_task_leaves_open_are_left_alone() -> None:
-    _, _, _, offset = found("partial", 0.1)
+    _, _, _, offset = offset_of("partial", 0.1)
     assert offset is not None
     for task, linear, angular in zip(CELLS["partial"].tasks, offset.linear.T, offset.angular.T, strict=True):
         error = np.concatenate([linear, angular])
@@ -93,7 +95,7 @@ def test_components_that_a_task_leaves_open_are_left_alone() -> None:
 
 
 def test_each_task_has_its_own_time() -> None:
-    _, desired, _, offset = found("plain", 0.1)
+    _, desired, _, offset = offset_of("plain", 0.1)
     assert offset is not None
     offset = replace(offset, until=np.array([0.2, 0.8]))
     t = np.array([0.3])

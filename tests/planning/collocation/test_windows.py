@@ -53,14 +53,14 @@ def test_integrals_are_exact_for_polynomials_with_jumps_between_panels() -> None
     begins, ends = (part[: WINDOW.count] for part in WINDOW.stretches)
     t = WINDOW.times[: WINDOW.count]
 
-    found = WINDOW.integral @ cubics(t, begins)
+    result = WINDOW.integral @ cubics(t, begins)
 
     def primitive(x: np.ndarray, begin: np.ndarray | float) -> np.ndarray:
         return (1.0 + begin) * x**4 / 4.0 - 2.0 * begin * x + x**2 / 2.0
 
     whole = np.cumsum([0.0, *(primitive(p.end, p.begin) - primitive(p.begin, p.begin) for p in WINDOW.panels)])
     before = whole[WINDOW.panel_of[: WINDOW.count]]
-    np.testing.assert_allclose(found, before + primitive(t, begins) - primitive(begins, begins), atol=1e-14)
+    np.testing.assert_allclose(result, before + primitive(t, begins) - primitive(begins, begins), atol=1e-14)
     assert np.all(t <= ends)
 
 
@@ -89,8 +89,8 @@ def test_rough_panels_get_higher_degrees_and_are_halved_at_the_last() -> None:
 
 
 def test_only_rough_panels_are_refined() -> None:
-    found = panels_of(WINDOW.refined([False, True, False], shortest=0.0))
-    assert found == [WINDOW.panels[0], Panel(0.3, 1.1, 24), WINDOW.panels[2]]
+    result = panels_of(WINDOW.refined([False, True, False], shortest=0.0))
+    assert result == [WINDOW.panels[0], Panel(0.3, 1.1, 24), WINDOW.panels[2]]
 
 
 def test_no_panel_is_halved_below_the_shortest_length() -> None:

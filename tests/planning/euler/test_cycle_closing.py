@@ -88,8 +88,8 @@ def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:
     q = {robot.name: motion.q[:, cell.columns(robot.name)] for robot in cell.robots}
     X_WP = part_poses(cell, chains, q)
     return max(
-        float(np.linalg.norm(found.position_error, axis=1).max())
-        for found in (
+        float(np.linalg.norm(accuracy.position_error, axis=1).max())
+        for accuracy in (
             task_accuracy(task, chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
         )
     )
@@ -104,8 +104,8 @@ def test_nicolato_s_ellipse_closes_in_each_of_25_cycles() -> None:
     at_ends = {}
     for cyclic in (False, True):
         motion = replace(cell.motion, step=0.0025, cyclic=cyclic)
-        _, found = planned(replace(cell, motion=motion, solver=cell.solver.changed(gain_per_s=200.0)), arm.start)
-        at_ends[cyclic] = found.q[::800]
+        _, result = planned(replace(cell, motion=motion, solver=cell.solver.changed(gain_per_s=200.0)), arm.start)
+        at_ends[cyclic] = result.q[::800]
 
     assert len(at_ends[True]) == 26
     assert np.abs(np.diff(at_ends[False], axis=0)).max() > np.radians(10.0)

@@ -121,8 +121,8 @@ def test_shaped_gain_leaves_only_the_desired_twist_in_the_region():
 
 def test_manipulability_is_the_root_of_the_determinant():
     J = np.random.default_rng(3).normal(size=(6, 9))
-    found = nearness(WeightedInverse(J, np.full(9, 4.0)), BY_MANIPULABILITY)
-    assert found == pytest.approx(np.sqrt(np.linalg.det(J @ J.T / 4.0)), rel=1e-10)
+    measure = nearness(WeightedInverse(J, np.full(9, 4.0)), BY_MANIPULABILITY)
+    assert measure == pytest.approx(np.sqrt(np.linalg.det(J @ J.T / 4.0)), rel=1e-10)
 
 
 @given(

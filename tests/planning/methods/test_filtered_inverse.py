@@ -34,8 +34,8 @@ def settled(run, values):
 @pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_case_one_is_the_same_for_all_methods_and_never_damped(step):
-    found = runs("I", step)
-    for run in found.values():
+    result = runs("I", step)
+    for run in result.values():
         # Euler's error |x''| dt / (2 K) is 1e-5 m at 1 ms; the lag of the filter adds less than 5e-5 m
         assert settled(run, run.error).max() < 5e-5 + 0.01 * step  # so the tips are as near to each other
         assert run.manipulability.min() > 1.0  # w0
@@ -44,10 +44,10 @@ def test_case_one_is_the_same_for_all_methods_and_never_damped(step):
 @pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_case_two_lets_the_filtered_inverses_nearer_to_the_singular_point_with_less_error(step):
-    found = runs("II", step)
-    damped = found["damped_least_squares"]
+    result = runs("II", step)
+    damped = result["damped_least_squares"]
     for method in METHODS[1:]:
-        run = found[method]
+        run = result[method]
         assert settled(run, run.error).max() < 0.6 * settled(damped, damped.error).max()
         assert settled(run, run.manipulability).min() < settled(damped, damped.manipulability).min() < 1.0
 

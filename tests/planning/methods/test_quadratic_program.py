@@ -15,8 +15,8 @@ from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.cell import LockedJoint
 from cellplan.model.motion import Schedule, TaskSchedule
 from cellplan.planning.euler.integrate import integrate_schedule
-from cellplan.planning.methods.quadratic_program import bounded_speeds
-from cellplan.planning.methods.support.speed_bounds import SpeedBounds
+from cellplan.planning.methods.quadratic_program import bounded_velocities
+from cellplan.planning.methods.support.speed_bounds import VelocityBounds
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import FirstOrder
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
@@ -25,7 +25,7 @@ RNG = np.random.default_rng(5)
 RHO = 1e8
 
 
-def drawn(m, n, *, secondary=True, spread=1.0):
+def random_tasks(m, n, *, secondary=True, spread=1.0):
     tasks = FirstOrder(
         RNG.normal(size=(m, n)),
         np.zeros(m),
@@ -37,8 +37,8 @@ def drawn(m, n, *, secondary=True, spread=1.0):
 
 
 def solve(tasks, xdot, limit, rho=RHO):
-    bounds = SpeedBounds(np.full(len(tasks.weights), -limit), np.full(len(tasks.weights), limit))
-    return bounded_speeds(tasks, xdot, bounds, mobile=np.ones(len(tasks.weights), bool), slack_weight=rho)
+    bounds = VelocityBounds(np.full(len(tasks.weights), -limit), np.full(len(tasks.weights), limit))
+    return bounded_velocities(tasks, xdot, bounds, mobile=np.ones(len(tasks.weights), bool), slack_weight=rho)
 
 
 def with_some_held(tasks, xdot, held, rho):
@@ -58,7 +58,7 @@ def with_some_held(tasks, xdot, held, rho):
 @pytest.mark.parametrize("limit", [10.0, 1.0, 0.3, 0.05])
 def test_solution_meets_the_karush_kuhn_tucker_conditions(limit):
     for _ in range(10):
-        tasks, xdot = drawn(12, 18)
+        tasks, xdot = random_tasks(12, 18)
         qd = solve(tasks, xdot, limit)
         held = {i: qd[i] for i in range(18) if abs(qd[i]) > limit - 1e-10}  # the engine's tolerance is 1e-9 of a row
         expected, gradient, _ = with_some_held(tasks, xdot, held, RHO)
@@ -71,7 +71,7 @@ def test_solution_meets_the_karush_kuhn_tucker_conditions(limit):
 def test_no_choice_of_active_bounds_does_better():
     """Second opinion: all 3^4 ways to hold four joints at their bounds or leave them free."""
     for limit in (0.2, 0.5, 1.0):
-        tasks, xdot = drawn(2, 4)
+        tasks, xdot = random_tasks(2, 4)
         best = min(
             (cost, tuple(qd))
             for choice in product((-limit, None, limit), repeat=4)
@@ -82,20 +82,20 @@ def test_no_choice_of_active_bounds_does_better():
 
 
 def test_far_from_all_bounds_it_is_the_weighted_pseudo_inverse():
-    tasks, xdot = drawn(12, 18)
+    tasks, xdot = random_tasks(12, 18)
     inverse = WeightedInverse(tasks.J, tasks.weights)
 
     exact = solve(tasks, xdot, 1e3, rho=1e12)
     np.testing.assert_allclose(
-        exact, inverse.speeds(xdot, 0.0) + inverse.null_space_projection(tasks.secondary), atol=1e-8
+        exact, inverse.velocities(xdot, 0.0) + inverse.null_space_projection(tasks.secondary), atol=1e-8
     )
 
     by_default = solve(replace(tasks, secondary=None), xdot, 1e3)
-    np.testing.assert_allclose(by_default, inverse.speeds(xdot, 1.0 / RHO), atol=1e-11)
+    np.testing.assert_allclose(by_default, inverse.velocities(xdot, 1.0 / RHO), atol=1e-11)
 
 
 def test_a_weak_slack_weight_gives_the_task_up_for_smaller_speeds():
-    tasks, xdot = drawn(12, 18, secondary=False)
+    tasks, xdot = random_tasks(12, 18, secondary=False)
     weak, strong = solve(tasks, xdot, 1e3, rho=0.1), solve(tasks, xdot, 1e3)
     assert np.linalg.norm(weak) < 0.9 * np.linalg.norm(strong)
     assert np.linalg.norm(xdot - tasks.J @ weak) > 1e4 * np.linalg.norm(xdot - tasks.J @ strong)
@@ -105,7 +105,7 @@ def test_a_weak_slack_weight_gives_the_task_up_for_smaller_speeds():
 @pytest.mark.parametrize("limit", [0.01, 0.5])
 def test_extreme_weights_and_lost_rows_are_solved(rho, limit):
     for _ in range(25):
-        tasks, xdot = drawn(12, 18, spread=4.0)
+        tasks, xdot = random_tasks(12, 18, spread=4.0)
         tasks.J[:, :4] *= [0.0, 1e-3, 1e-6, 1e3]
         tasks.J[3] = tasks.J[4]  # a row twice: the tasks contradict each other
         tasks.J[5] = 0.0
@@ -176,7 +176,7 @@ def test_no_limit_is_ever_broken(seed):
     start = rng.uniform(-1, 1, cell.joint_count)
     robots = []
     for robot in cell.robots:
-        own = start[cell.columns(robot.name)]
+        q0 = start[cell.columns(robot.name)]
         joints = tuple(
             replace(
                 joint,
@@ -185,7 +185,7 @@ def test_no_limit_is_ever_broken(seed):
                 velocity=rng.uniform(0.1, 1.0),
                 acceleration=rng.choice([None, 5.0]),
             )
-            for joint, q in zip(robot.model.joints, own, strict=True)
+            for joint, q in zip(robot.model.joints, q0, strict=True)
         )
         robots.append(replace(robot, model=replace(robot.model, joints=joints)))
     cell = replace(

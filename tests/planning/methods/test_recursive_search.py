@@ -130,8 +130,8 @@ def test_joints_left_out_of_the_sequence_stand_still_and_the_first_one_does_most
     one, other = followed(cell, schedule, START), followed(turned, schedule, START)
     assert np.ptp(one.q[:, 0]) == np.ptp(other.q[:, 0]) == 0.0
     assert np.abs(np.diff(one.q[:, 3])).sum() > np.abs(np.diff(other.q[:, 3])).sum()
-    for each, motion in ((cell, one), (turned, other)):
-        assert position_errors(each, schedule, motion).max() <= TOLERANCE
+    for case, motion in ((cell, one), (turned, other)):
+        assert position_errors(case, schedule, motion).max() <= TOLERANCE
 
 
 def test_joints_left_out_stand_still_even_when_the_posture_is_disturbed():

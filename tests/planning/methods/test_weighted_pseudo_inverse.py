@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from cellplan.errors import NoSolutionError
-from cellplan.planning.methods.weighted_pseudo_inverse import LARGEST_DAMPING, SINGULAR_REGION, damped_speeds
+from cellplan.planning.methods.weighted_pseudo_inverse import LARGEST_DAMPING, SINGULAR_REGION, damped_velocities
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
 
 RNG = np.random.default_rng(11)
 
 
 def weighted_speeds(J, xdot, weights, damping):
-    return damped_speeds(WeightedInverse(J, weights), xdot, damping)
+    return damped_velocities(WeightedInverse(J, weights), xdot, damping)
 
 
 def test_speeds_solve_the_optimality_conditions():

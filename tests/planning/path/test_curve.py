@@ -31,15 +31,15 @@ def test_shapes_run_the_way_round_that_is_asked_for_seen_from_every_side(axis: i
     first, second = PLANES[plane]
     block = part_of(Box((0.6, 0.6, 0.6)))
     square = PolygonPath(plane=plane, corners=((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1)), is_closed=True)
-    for drawn, direction in product((circle(0.1, plane), square), RunDirection):
-        path = replace(drawn, direction=direction)
+    for curve, direction in product((circle(0.1, plane), square), RunDirection):
+        path = replace(curve, direction=direction)
         task = task_on(path, project=side, tool_x=first)
         toolpath = build_toolpath(task, block)
         p = toolpath.poses(np.linspace(0.0, toolpath.length, 401))[:, :3, 3]
         area = 0.5 * np.cross(p[:-1], p[1:]).sum(axis=0) @ side
         assert (area > 0.0) == (direction is RunDirection.COUNTERCLOCKWISE)
         assert run_direction(task) == (direction, pytest.approx(side))
-        start = 0.1 * first if drawn is not square else 0.1 * (first + second)
+        start = 0.1 * first if curve is not square else 0.1 * (first + second)
         assert np.allclose(p[0], start + 0.3 * side, atol=1e-15)
         assert np.allclose(p[-1], p[0], atol=1e-12)
 

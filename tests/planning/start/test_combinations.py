@@ -14,18 +14,18 @@ def worst(picks):
 
 
 def test_all_combinations_come_once_in_the_order_of_their_worst_score():
-    found = list(best_combinations(SCORES, lambda picks: False))
-    assert sorted(found) == sorted(product(range(3), range(1), range(2), range(3)))
-    assert np.all(np.diff([worst(picks) for picks in found]) <= 0)
+    combinations = list(best_combinations(SCORES, lambda picks: False))
+    assert sorted(combinations) == sorted(product(range(3), range(1), range(2), range(3)))
+    assert np.all(np.diff([worst(picks) for picks in combinations]) <= 0)
 
 
 def test_what_is_ruled_out_meanwhile_does_not_come():
     blocked = set()
-    found = []
+    results = []
     for picks in best_combinations(SCORES, lambda partial: any(partial[: len(b)] == b for b in blocked)):
-        found.append(picks)
+        results.append(picks)
         blocked.add(picks[:1])
-    assert [picks[0] for picks in found] == [0, 1, 2]
+    assert [picks[0] for picks in results] == [0, 1, 2]
 
 
 def test_fifteen_robots_with_four_branches_each_do_not_explode():

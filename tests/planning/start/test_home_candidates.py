@@ -42,9 +42,9 @@ def test_the_tool_is_drawn_back_against_its_axis() -> None:
     chain = ScrewChain(placed("arm", model, tool=stick()))
     tip, axis = chain.tool_poses(START[None])[0, :3, 3], chain.tool_poses(START[None])[0, :3, 2]
 
-    ways = chain.tool_poses(candidates(model, START))[:, :3, 3] - tip
+    shifts = chain.tool_poses(candidates(model, START))[:, :3, 3] - tip
 
-    assert min(np.linalg.norm(ways + 0.1 * axis, axis=1)) < 1e-3  # one of the retreats is by 100 mm
+    assert min(np.linalg.norm(shifts + 0.1 * axis, axis=1)) < 1e-3  # one of the retreats is by 100 mm
 
 
 def test_an_endless_joint_starts_on_whatever_turn_it_is() -> None:

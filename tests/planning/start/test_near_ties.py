@@ -27,8 +27,8 @@ def test_what_no_figure_states_apart_stays_in_its_order():
 
 
 @given(st.permutations(range(6)), st.lists(st.sampled_from([0.0, 0.25, 0.5]), min_size=12, max_size=12))
-def test_the_order_of_candidates_does_not_matter_where_the_last_figure_is_their_own(order, drawn):
-    figures = np.column_stack([np.array(drawn).reshape(6, 2), np.arange(6.0)])
+def test_the_order_of_candidates_does_not_matter_where_the_last_figure_is_their_own(order, samples):
+    figures = np.column_stack([np.array(samples).reshape(6, 2), np.arange(6.0)])
 
     shuffled = [order[index] for index in best_first(figures[order])]
 

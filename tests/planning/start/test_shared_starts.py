@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.timed_cells import found_start
+from builders.timed_cells import solved_start
 
 from cellplan import load_cell, solve
 from cellplan.errors import StartNotFoundError, StartOffGraspError, StartOffTaskError
@@ -14,7 +14,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")
@@ -49,44 +49,44 @@ def assert_loops_are_closed(cell, q):
 
 
 @pytest.fixture(scope="module")
-def found(shared):
+def starts_of_cell(shared):
     """The start of the program; other test modules may have solved the cell before."""
     return solve(shared).motion.q[0]
 
 
-def test_found_starts_close_the_loop_reach_the_task_and_touch_nothing(shared, found):
-    assert_loops_are_closed(shared, found)
-    tools = tools_in_world(shared, found)
+def test_found_starts_close_the_loop_reach_the_task_and_touch_nothing(shared, starts_of_cell):
+    assert_loops_are_closed(shared, starts_of_cell)
+    tools = tools_in_world(shared, starts_of_cell)
     X_WP = tools["left"] @ inverse(shared.part.held_by[0].X_PT)
     desired = X_WP @ toolpaths_of(shared)["rectangle"].X_PT_start
     np.testing.assert_allclose(tools["abb"], desired, atol=1e-9)
-    assert Scene.from_cell(shared).touching(found) is None
+    assert Scene.from_cell(shared).touching(starts_of_cell) is None
 
 
 @pytest.mark.parametrize(
     "given", [pytest.param("left", marks=pytest.mark.slow), "right", pytest.param("abb", marks=pytest.mark.slow)]
 )
-def test_the_others_are_found_round_a_robot_that_stands(shared, found, given):
-    cell = with_starts(shared, found, given)
+def test_the_others_are_found_round_a_robot_that_stands(shared, starts_of_cell, given):
+    cell = with_starts(shared, starts_of_cell, given)
 
-    q = found_start(Scene.from_cell(cell), toolpaths_of(cell))
+    q = solved_start(Scene.from_cell(cell), toolpaths_of(cell))
 
-    np.testing.assert_array_equal(q[cell.columns(given)], found[cell.columns(given)])
+    np.testing.assert_array_equal(q[cell.columns(given)], starts_of_cell[cell.columns(given)])
     assert_loops_are_closed(cell, q)
 
 
 def test_planar_holders_are_found_where_the_path_in_the_world_begins(planar):
-    q = found_start(Scene.from_cell(planar), toolpaths_of(planar))
+    q = solved_start(Scene.from_cell(planar), toolpaths_of(planar))
     assert_loops_are_closed(planar, q)
     np.testing.assert_allclose(tools_in_world(planar, q)["left"][:2, 3], [0.75, 0.0], atol=1e-9)
 
 
-def test_given_starts_that_close_the_loop_are_accepted(shared, found):
-    assert examine_given_starts(with_starts(shared, found, "left", "right"), toolpaths_of(shared)) is None
+def test_given_starts_that_close_the_loop_are_accepted(shared, starts_of_cell):
+    assert examine_given_starts(with_starts(shared, starts_of_cell, "left", "right"), toolpaths_of(shared)) is None
 
 
 def test_a_holder_off_its_grasp_is_named_with_line_distance_and_cure(planar):
-    q = found_start(Scene.from_cell(planar), toolpaths_of(planar))
+    q = solved_start(Scene.from_cell(planar), toolpaths_of(planar))
     cell = with_starts(planar, q, "left", "right")
     turned = replace(cell.robot("right"), start=q[cell.columns("right")] + np.array([0.0, 0.0, np.radians(1.0)]))
     cell = replace(cell, robots=(cell.robots[0], turned))
@@ -114,4 +114,4 @@ def test_a_grasp_out_of_reach_is_named(planar):
     with pytest.raises(
         StartNotFoundError, match=r"robots\.right\..* brings the tool of 'right' to its grasp on the part"
     ):
-        found_start(Scene.from_cell(far), toolpaths_of(far))
+        solved_start(Scene.from_cell(far), toolpaths_of(far))

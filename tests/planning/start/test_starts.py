@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from builders.timed_cells import found_start
+from builders.timed_cells import solved_start
 
 from cellplan import load_cell
 from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
@@ -89,7 +89,7 @@ def found_without(cell, missing):
     for name in missing:
         cell = with_start(cell, name, None)
     scene = Scene.from_cell(cell)
-    return scene, found_start(scene, toolpaths_of(cell))
+    return scene, solved_start(scene, toolpaths_of(cell))
 
 
 @pytest.mark.parametrize(
@@ -101,10 +101,10 @@ def test_found_starts_reach_their_tasks_within_limits_and_free(cell, missing):
     scene, q = found_without(cell, missing)
 
     for robot in cell.robots:
-        own = q[cell.columns(robot.name)]
-        assert np.all((own >= robot.model.lower) & (own <= robot.model.upper))
+        q_robot = q[cell.columns(robot.name)]
+        assert np.all((q_robot >= robot.model.lower) & (q_robot <= robot.model.upper))
         if robot.name not in missing:
-            np.testing.assert_array_equal(own, robot.start)
+            np.testing.assert_array_equal(q_robot, robot.start)
     for task in cell.tasks:
         assert distance_from_task(cell, task, q) < 1e-8  # given starts close to 1e-9 m, found ones to 1e-12
     assert scene.touching(q) is None
@@ -124,7 +124,7 @@ def test_all_postures_of_the_positioner_may_be_open_as_well(cells):
     cell = load_cell(cells / "mesh_part_csv.yaml")
     assert any(robot.start is None for robot in cell.robots)
     scene = Scene.from_cell(cell)
-    q = found_start(scene, toolpaths_of(cell))
+    q = solved_start(scene, toolpaths_of(cell))
     assert scene.touching(q) is None
 
 
@@ -146,7 +146,7 @@ def test_a_wrist_that_turns_round_begins_where_a_whole_turn_has_room(tmp_path):
     cell = load_cell(tmp_path / "cell.yaml")
     toolpaths = toolpaths_of(cell)
 
-    start = found_start(Scene.from_cell(cell), toolpaths)
+    start = solved_start(Scene.from_cell(cell), toolpaths)
 
     schedule = schedule_tasks(cell, list(toolpaths.values()))
     q = integrate_schedule(MotionTask(cell, schedule, ["kuka"], start)).q
@@ -178,7 +178,7 @@ def test_arms_that_cannot_help_do_not_multiply_a_search_without_hope(tmp_path, m
     looks, look = [], StartTrials.touching
     monkeypatch.setattr(StartTrials, "touching", lambda trials, q: looks.append(q) or look(trials, q))
     with pytest.raises(StartNotFoundError, match=r"robots\.r0.*: 'r0/.*' touches 'wall' in all .* of task 't0'"):
-        found_start(scene, toolpaths)
+        solved_start(scene, toolpaths)
 
     assert 0 < len(looks) <= 40  # 4 when this was written, of thousands of combinations
 
@@ -191,7 +191,7 @@ def test_what_given_postures_make_collide_is_left_to_the_report(cell):
     blocked = with_start(replace(cell, obstacles=(*cell.obstacles, post)), "kuka", None)
     scene = Scene.from_cell(blocked)
 
-    q = found_start(scene, toolpaths_of(cell))
+    q = solved_start(scene, toolpaths_of(cell))
 
     first, second = scene.touching(q)
     assert (first.split("/")[0], second) == ("reis", "post")
@@ -211,7 +211,7 @@ def test_base_out_of_reach_is_named(cell):
         StartNotFoundError,
         match=r"robots\.kuka\.start_deg: no configuration within the joint limits brings the tool of 'kuka' to",
     ) as e:
-        found_start(Scene.from_cell(far), toolpaths_of(cell))
+        solved_start(Scene.from_cell(far), toolpaths_of(cell))
     assert "(48 attempts of the inverse kinematics)" in str(e.value)  # the configuration of the positioner is given
 
 
@@ -247,8 +247,8 @@ def test_a_task_that_settles_may_start_beside_its_path(cell):
     start = cell.robot("abb").start.copy()
     start[0] += np.radians(20.0)
     tasks = tuple(replace(task, settle=1.0) if task.robot == "abb" else task for task in cell.tasks)
-    beside = with_start(cell, "abb", start)
+    displaced = with_start(cell, "abb", start)
 
-    assert examine_given_starts(replace(beside, tasks=tasks), toolpaths_of(cell)) is None
+    assert examine_given_starts(replace(displaced, tasks=tasks), toolpaths_of(cell)) is None
     with pytest.raises(StartOffTaskError):
-        examine_given_starts(beside, toolpaths_of(cell))
+        examine_given_starts(displaced, toolpaths_of(cell))

@@ -17,7 +17,7 @@ from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.scene import Scene
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 
 @pytest.fixture(scope="module")

@@ -20,15 +20,15 @@ STEP = 0.01
 def test_a_steady_law_keeps_its_rate_between_smooth_ramps() -> None:
     law, tau = TimeLaw(kind=TimeLawKind.STEADY), np.linspace(0.0, 1.0, 20001)
     ramp = 0.125
-    found = advance(law, tau, ramp)
+    shares = advance(law, tau, ramp)
 
-    assert found.share[-1] == 1.0
-    assert np.abs(np.gradient(found.share, tau) - found.rate).max() < 1e-6
-    assert np.abs(np.gradient(found.rate, tau) - found.acceleration)[1:-1].max() < 0.01
+    assert shares.share[-1] == 1.0
+    assert np.abs(np.gradient(shares.share, tau) - shares.rate).max() < 1e-6
+    assert np.abs(np.gradient(shares.rate, tau) - shares.acceleration)[1:-1].max() < 0.01
     steady = (tau >= ramp) & (tau <= 1.0 - ramp)
-    assert np.ptp(found.rate[steady]) == 0.0
-    assert found.rate[steady][0] == pytest.approx(1.0 / (1.0 - ramp))
-    assert np.abs(reached_at(law, found.share, np.full(len(tau), ramp)) - tau).max() < 1e-7
+    assert np.ptp(shares.rate[steady]) == 0.0
+    assert shares.rate[steady][0] == pytest.approx(1.0 / (1.0 - ramp))
+    assert np.abs(reached_at(law, shares.share, np.full(len(tau), ramp)) - tau).max() < 1e-7
 
 
 def moving(breaks: Array) -> JointPath:
@@ -38,35 +38,35 @@ def moving(breaks: Array) -> JointPath:
     return JointPath(np.zeros(1), breaks, nodes)
 
 
-def retimer(velocity: float, *kept: FixedRate) -> Retimer:
+def retimer(velocity: float, *rates: FixedRate) -> Retimer:
     bounds = JointLimitsInTime(velocity=np.array([velocity]), acceleration=np.full(1, 1e3), jerk=np.full(1, np.inf))
 
     def slower(sigma: Array, q: Array) -> float:
         return float(np.abs(np.diff(q[:, 0])).max() / STEP / velocity)
 
-    return Retimer(bounds=bounds, step=STEP, feed_share=lambda s: np.zeros(len(s)), slower=slower, fixed_rates=kept)
+    return Retimer(bounds=bounds, step=STEP, feed_share=lambda s: np.zeros(len(s)), slower=slower, fixed_rates=rates)
 
 
 def test_the_rate_is_one_where_it_is_demanded_and_faster_beside_it() -> None:
     path = moving(np.linspace(0.0, 4.0, 9))
-    found = retimer(2.0, FixedRate(begin=0.5, end=1.5, tolerance=0.05)).fastest(path)
-    rate, middle = np.diff(found.sigma) / STEP, 0.5 * (found.sigma[1:] + found.sigma[:-1])
+    retimed_motion = retimer(2.0, FixedRate(begin=0.5, end=1.5, tolerance=0.05)).fastest(path)
+    rate, middle = np.diff(retimed_motion.sigma) / STEP, 0.5 * (retimed_motion.sigma[1:] + retimed_motion.sigma[:-1])
 
-    inside = (found.sigma[:-1] >= 0.5) & (found.sigma[1:] <= 1.5)
+    inside = (retimed_motion.sigma[:-1] >= 0.5) & (retimed_motion.sigma[1:] <= 1.5)
     assert np.count_nonzero(inside) >= 98
     assert np.abs(rate[inside] - 1.0).max() < 1e-9
     assert rate[middle > 2.5].min() > 1.5
-    assert np.abs(np.diff(path.at(found.sigma)[:, 0])).max() / STEP <= 2.0
+    assert np.abs(np.diff(path.at(retimed_motion.sigma)[:, 0])).max() / STEP <= 2.0
 
 
 def test_a_limit_lowers_the_rate_within_its_tolerance_and_no_further() -> None:
     """The joint has 0.785 rad/s at 1 s: 0.76 rad/s ask for 3 % less, 0.5 rad/s for more than 5 %."""
     whole = FixedRate(begin=0.0, end=4.0, tolerance=0.05)
     path = moving(np.linspace(0.0, 4.0, 9))
-    found = retimer(0.76, whole).fastest(path)
+    retimed_motion = retimer(0.76, whole).fastest(path)
     slow = retimer(0.5, whole).fastest(path)
 
-    rate = np.diff(found.sigma) / STEP
+    rate = np.diff(retimed_motion.sigma) / STEP
     assert rate.min() >= 0.95
     assert rate.max() < 0.98
     assert np.ptp(rate) < 1e-9
@@ -79,14 +79,14 @@ def test_a_rest_of_all_joints_lasts_as_long_as_is_demanded_of_it() -> None:
     path = JointPath(
         np.zeros(1), np.array([0.0, 1.0, 3.0, 4.0]), [np.array([[0.0, 1.0]]), rest, np.array([[1.0, 0.0]])]
     )
-    found = retimer(10.0, FixedRate(begin=1.25, end=2.0), FixedRate(begin=1.75, end=2.5)).fastest(path)
+    retimed_motion = retimer(10.0, FixedRate(begin=1.25, end=2.0), FixedRate(begin=1.75, end=2.5)).fastest(path)
 
-    waits = (found.sigma >= 1.25) & (found.sigma <= 2.5)
+    waits = (retimed_motion.sigma >= 1.25) & (retimed_motion.sigma <= 2.5)
     assert np.count_nonzero(waits) == 124  # 1.25 s: the rows at its ends are those at 1 s and at 3 s
-    assert np.diff(found.sigma[waits]) == pytest.approx(np.full(123, STEP))
-    assert np.all(np.diff(found.sigma) > 0.0)
-    slower = found.lasting(found.steps + 50)
-    assert slower.steps == found.steps + 50
+    assert np.diff(retimed_motion.sigma[waits]) == pytest.approx(np.full(123, STEP))
+    assert np.all(np.diff(retimed_motion.sigma) > 0.0)
+    slower = retimed_motion.lasting(retimed_motion.steps + 50)
+    assert slower.steps == retimed_motion.steps + 50
     assert np.count_nonzero((slower.sigma >= 1.25) & (slower.sigma <= 2.5)) == 124
 
 

@@ -53,11 +53,11 @@ def retimed(path: JointPath, bounds: JointLimitsInTime, *, step: float, feed_sha
         feed = feed_share * float(np.diff(sigma).max()) / step
         return max(velocity, acceleration**0.5, jerk ** (1 / 3), feed)
 
-    found = Retimer(
+    retimed_motion = Retimer(
         bounds=bounds, step=step, feed_share=lambda sigma: np.full(len(sigma), feed_share), slower=slower
     ).fastest(path)
-    assert slower(found.sigma, path.at(found.sigma)) <= 1.0
-    return found
+    assert slower(retimed_motion.sigma, path.at(retimed_motion.sigma)) <= 1.0
+    return retimed_motion
 
 
 def bounds_of(velocity: float, acceleration: float, jerk: float = np.inf, joints: int = 1) -> JointLimitsInTime:
@@ -78,8 +78,8 @@ def line(u: Array) -> Array:
 def test_a_joint_on_a_straight_line_takes_the_time_of_the_closed_form(
     velocity: float, acceleration: float, seconds: float
 ) -> None:
-    found = retimed(path_of(line), bounds_of(velocity, acceleration), step=0.01)
-    assert 0.0 <= 0.01 * found.steps - seconds <= 0.011
+    motion = retimed(path_of(line), bounds_of(velocity, acceleration), step=0.01)
+    assert 0.0 <= 0.01 * motion.steps - seconds <= 0.011
 
 
 @pytest.mark.parametrize("law", [rest_to_rest, straight])
@@ -88,15 +88,15 @@ def test_the_nominal_law_of_the_path_does_not_matter(law: Callable[[Array], Arra
 
 
 def test_a_feed_bounds_the_speed_of_the_nominal_time() -> None:
-    found = retimed(path_of(line, law=straight), bounds_of(1e3, 1e4), step=0.01, feed_share=1.5)
-    assert 4.5 <= 0.01 * found.steps <= 4.53  # 3 s of nominal time at 2/3 of its speed, and the ramps
+    motion = retimed(path_of(line, law=straight), bounds_of(1e3, 1e4), step=0.01, feed_share=1.5)
+    assert 4.5 <= 0.01 * motion.steps <= 4.53  # 3 s of nominal time at 2/3 of its speed, and the ramps
 
 
 def test_a_limit_of_jerk_costs_the_time_of_one_window() -> None:
     """From rest to rest without a limit of speed: an acceleration that changes evenly, four times the same change."""
     least = (32.0 * 2.0 / 40.0) ** (1 / 3)
-    found = retimed(path_of(line), bounds_of(1e3, 100.0, jerk=40.0), step=0.01)
-    assert least <= 0.01 * found.steps
+    motion = retimed(path_of(line), bounds_of(1e3, 100.0, jerk=40.0), step=0.01)
+    assert least <= 0.01 * motion.steps
     limited = retimed(path_of(line), bounds_of(1.0, 2.0, jerk=40.0), step=0.01)
     assert 0.01 * limited.steps == pytest.approx(2.5 + 2.0 / 40.0, rel=0.03)
 
@@ -104,10 +104,10 @@ def test_a_limit_of_jerk_costs_the_time_of_one_window() -> None:
 def test_every_rest_of_all_joints_is_a_row_and_a_corner_becomes_one() -> None:
     corner = path_of(lambda u: np.stack([np.minimum(u, 0.5), np.maximum(u, 0.5)], axis=1), law=straight)
     both = bounds_of(1.0, 2.0, joints=2)
-    found = retimed(corner, both, step=0.01)
-    assert len(found.motions) == 2
-    assert np.abs(found.sigma - 1.5).min() < 1e-12
-    assert 200 <= found.steps <= 202  # 0.5 rad from rest to rest twice: one second each
+    motion = retimed(corner, both, step=0.01)
+    assert len(motion.motions) == 2
+    assert np.abs(motion.sigma - 1.5).min() < 1e-12
+    assert 200 <= motion.steps <= 202  # 0.5 rad from rest to rest twice: one second each
 
 
 def test_while_no_joint_moves_no_time_passes() -> None:
@@ -122,16 +122,16 @@ def test_a_stretch_shorter_than_a_row_is_gone_through_too() -> None:
     """A corner 4 ms before the end, and rows 10 ms apart."""
     breaks = np.array([0.0, 2.996, 3.0])
     nodes = [np.array([[0.0, 0.7], [0.0, 0.0]]), np.array([[0.7, 0.7], [0.0, 1e-3]])]
-    found = retimed(JointPath(np.zeros(2), breaks, nodes), bounds_of(1.0, 2.0, joints=2), step=0.01)
-    assert len(found.motions) == 2
-    assert found.counts[1] == pytest.approx(2.0 * (1e-3 / 2.0) ** 0.5 / 0.01, abs=1.0)
+    motion = retimed(JointPath(np.zeros(2), breaks, nodes), bounds_of(1.0, 2.0, joints=2), step=0.01)
+    assert len(motion.motions) == 2
+    assert motion.counts[1] == pytest.approx(2.0 * (1e-3 / 2.0) ** 0.5 / 0.01, abs=1.0)
 
 
 def test_a_slower_motion_takes_exactly_the_steps_that_it_is_given() -> None:
     corner = path_of(lambda u: np.stack([np.minimum(u, 0.5), np.maximum(u, 0.5)], axis=1), law=straight)
-    found = retimed(corner, bounds_of(1.0, 2.0, joints=2), step=0.01)
+    motion = retimed(corner, bounds_of(1.0, 2.0, joints=2), step=0.01)
     for steps in (202, 203, 333):
-        slower = found.lasting(steps)
+        slower = motion.lasting(steps)
         assert (slower.steps, len(slower.sigma)) == (steps, steps + 1)
         assert np.all(np.diff(slower.sigma) > 0.0)
 
@@ -157,7 +157,7 @@ def test_durations_agree_with_toppra_when_both_keep_the_limits(seed: int) -> Non
     q, bounds = wave(seed)
     step = 0.02
     ours = retimed(path_of(q), bounds, step=step)
-    limits = [np.stack([-each, each], axis=1) for each in (bounds.velocity, bounds.acceleration)]
+    limits = [np.stack([-entry, entry], axis=1) for entry in (bounds.velocity, bounds.acceleration)]
     u = np.linspace(0.0, 1.0, 201)
     theirs = algorithm.TOPPRA(
         [
@@ -178,9 +178,9 @@ def test_durations_agree_with_toppra_when_both_keep_the_limits(seed: int) -> Non
 
 
 def test_the_joints_of_different_kinds_are_added_in_shares_of_their_speeds() -> None:
-    found = stretches(path_of(lambda u: np.stack([0.3 * u, 4.0 * u], axis=1)), np.array([0.1, 2.0]))
-    assert len(found) == 1
-    assert found[0].length == pytest.approx(np.hypot(3.0, 2.0), rel=1e-12)
-    lengths = np.linspace(0.0, found[0].length, 7)
-    joints = found[0].path.at(found[0].at(lengths))
+    result = stretches(path_of(lambda u: np.stack([0.3 * u, 4.0 * u], axis=1)), np.array([0.1, 2.0]))
+    assert len(result) == 1
+    assert result[0].length == pytest.approx(np.hypot(3.0, 2.0), rel=1e-12)
+    lengths = np.linspace(0.0, result[0].length, 7)
+    joints = result[0].path.at(result[0].at(lengths))
     assert joints == pytest.approx(np.outer(np.linspace(0.0, 1.0, 7), [0.3, 4.0]), abs=1e-11)

@@ -86,9 +86,9 @@ def test_a_clock_without_a_length_ends_with_the_last_task() -> None:
     assert [one.end for one in schedule.tasks] == pytest.approx([1.5, 2.0005], abs=1e-15)
 
 
-@pytest.mark.parametrize("own", [{"duration": 1.0}, {"feed": 0.4}])
-def test_a_clock_with_a_length_is_neither_cut_short_nor_stretched(own: dict[str, float]) -> None:
-    (one,) = (schedule := scheduled(on_roller(**own), duration=3.0)).tasks
+@pytest.mark.parametrize("settings", [{"duration": 1.0}, {"feed": 0.4}])
+def test_a_clock_with_a_length_is_neither_cut_short_nor_stretched(settings: dict[str, float]) -> None:
+    (one,) = (schedule := scheduled(on_roller(**settings), duration=3.0)).tasks
 
     assert schedule.times[-1] == 3.0
     assert one.end < 3.0

@@ -98,11 +98,11 @@ def test_gradients_are_the_derivatives_of_the_distances() -> None:
 def test_only_joints_before_the_link_move_its_body() -> None:
     cell = round_cell()
     pairs = ClosestPairs(Scene.from_cell(cell))
-    found = {pairs.names(pair): pair for pair in pairs.at(np.zeros(12), within=0.8)}
-    of_forearm = found["left/forearm", "ball"].gradient
+    result = {pairs.names(pair): pair for pair in pairs.at(np.zeros(12), within=0.8)}
+    of_forearm = result["left/forearm", "ball"].gradient
     assert np.all(of_forearm[3:] == 0.0)
     assert np.any(of_forearm[:3] != 0.0)
-    of_lever = found["left/lever", "ball"].gradient
+    of_lever = result["left/lever", "ball"].gradient
     assert np.all(np.delete(of_lever, [0, 1]) == 0.0)
     assert of_lever[1] != 0.0  # the second joint drives it
 
@@ -142,12 +142,12 @@ def test_tool_at_work_and_the_robot_itself_are_left_out() -> None:
         things=(floor(),),
     )
     scene = Scene.from_cell(cell)
-    found = [scene.pairs[pair.row] for pair in ClosestPairs(scene).at(np.zeros(6), within=5.0)]
-    assert found
-    assert all(pair.rule is Rule.CLEARANCE for pair in found)
-    assert ClearanceClass.SELF not in {pair.clearance_class for pair in found}
-    own = ClosestPairs(scene, classes=frozenset({ClearanceClass.SELF})).at(np.zeros(6), within=5.0)
-    assert {scene.pairs[pair.row].clearance_class for pair in own} == {ClearanceClass.SELF}
+    result = [scene.pairs[pair.row] for pair in ClosestPairs(scene).at(np.zeros(6), within=5.0)]
+    assert result
+    assert all(pair.rule is Rule.CLEARANCE for pair in result)
+    assert ClearanceClass.SELF not in {pair.clearance_class for pair in result}
+    self_pairs = ClosestPairs(scene, classes=frozenset({ClearanceClass.SELF})).at(np.zeros(6), within=5.0)
+    assert {scene.pairs[pair.row].clearance_class for pair in self_pairs} == {ClearanceClass.SELF}
 
 
 @pytest.mark.parametrize("name", ["four_robots", "mesh_part_csv", "dual_arm"])
@@ -161,22 +161,22 @@ def test_no_near_pair_is_missed(name: str) -> None:
     for _ in range(2):
         q = start + rng.normal(size=len(start)) * 0.2
         poses = scene.body_poses(q[None])
-        found = {pair.row: pair.distance for pair in pairs.at(q, within=within)}
-        assert found
+        result = {pair.row: pair.distance for pair in pairs.at(q, within=within)}
+        assert result
         for row, (a, b) in zip(scene.solid_rows, scene.solid_pairs, strict=True):
             pair = scene.pairs[row]
             if pair.rule is not Rule.CLEARANCE or pair.clearance_class is ClearanceClass.SELF:
-                assert row not in found
+                assert row not in result
                 continue
             distance = measure(scene.engine, (int(a), int(b)), poses, sample=0).bound
-            assert max(found.get(row, within), 0.0) == pytest.approx(
+            assert max(result.get(row, within), 0.0) == pytest.approx(
                 min(distance, within), abs=1e-4
             )  # the engine's accuracy
         for row in scene.ground_rows:
             height = float(scene.ground_heights(scene.pairs[row], poses)[0])
             expected = min(max(height, 0.0), within)
             if scene.pairs[row].rule is Rule.CLEARANCE:
-                assert max(found.get(int(row), within), 0.0) == pytest.approx(expected, abs=1e-9)
+                assert max(result.get(int(row), within), 0.0) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_cell_without_pairs_has_no_near_ones() -> None:

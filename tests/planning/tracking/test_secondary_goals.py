@@ -132,10 +132,12 @@ def test_manipulability_pulls_along_its_gradient_in_the_metric_of_the_weights(se
     gain = 1e-6  # small: no speed limit is near
     problem, q = random_problem(seed, {"manipulability": {"gain": gain}})
 
-    asked = problem.first_order(10, q).secondary
+    secondary = problem.first_order(10, q).secondary
 
     expected = central_differences(lambda x: log_manipulability(problem, x), q) / problem.first_order(10, q).weights
-    np.testing.assert_allclose(asked / gain, expected, atol=1e-4 * np.abs(expected).max())  # 1 / (1 + k h c) is left
+    np.testing.assert_allclose(
+        secondary / gain, expected, atol=1e-4 * np.abs(expected).max()
+    )  # 1 / (1 + k h c) is left
 
 
 def test_joint_limits_pull_along_the_gradient_of_d46() -> None:
@@ -152,10 +154,10 @@ def test_joint_without_limits_has_no_middle() -> None:
     joints = list(robots[1].model.joints)
     joints[3] = replace(joints[3], lower=-np.inf, upper=np.inf)
     robots[1] = replace(robots[1], model=replace(robots[1].model, joints=tuple(joints)))
-    asked = problem_at_rest(replace(problem.cell, robots=tuple(robots)), q).first_order(10, q).secondary
+    secondary = problem_at_rest(replace(problem.cell, robots=tuple(robots)), q).first_order(10, q).secondary
     column = problem.cell.columns("op0").start + 3
-    assert asked[column] == 0.0
-    assert np.count_nonzero(asked) == len(q) - 1
+    assert secondary[column] == 0.0
+    assert np.count_nonzero(secondary) == len(q) - 1
 
 
 def test_obstacles_pull_along_the_gradient_of_their_distances() -> None:
@@ -163,10 +165,10 @@ def test_obstacles_pull_along_the_gradient_of_their_distances() -> None:
     gain, within = 1e-6, 0.25
     pairs = ClosestPairs(Scene.from_cell(cell))
     cell = with_goals(cell, {"obstacles": {"gain": gain, "within_mm": 1e3 * within}})
-    asked = problem_at_rest(cell, start).first_order(10, start).secondary
+    secondary = problem_at_rest(cell, start).first_order(10, start).secondary
     expected = central_differences(lambda x: nearness(pairs, x, within), start, 1e-4)
     assert np.abs(expected).max() > 0.1
-    np.testing.assert_allclose(asked / gain, expected, atol=1e-3 * np.abs(expected).max())  # kinks of flat faces
+    np.testing.assert_allclose(secondary / gain, expected, atol=1e-3 * np.abs(expected).max())  # kinks of flat faces
 
 
 def test_posture_pulls_to_the_desired_posture_and_else_to_the_start() -> None:
@@ -248,8 +250,8 @@ def test_goals_rest_at_both_ends_of_a_motion_that_is_to_close() -> None:
     cell = replace(cell, motion=replace(cell.motion, cyclic=True))
     q = np.random.default_rng(8).uniform(-1.0, 1.0, cell.joint_count)
     problem = problem_at_rest(cell, q)
-    asked = [problem.first_order(k, q).secondary for k in (0, 10, len(problem.times) - 1)]
-    assert [bool(np.any(speeds)) for speeds in asked if speeds is not None] == [False, True, False]
+    secondary = [problem.first_order(k, q).secondary for k in (0, 10, len(problem.times) - 1)]
+    assert [bool(np.any(speeds)) for speeds in secondary if speeds is not None] == [False, True, False]
 
 
 def test_share_takes_no_joint_beyond_its_bounds() -> None:

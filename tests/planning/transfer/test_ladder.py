@@ -19,7 +19,7 @@ from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.rung import Rung
-from cellplan.planning.transfer.best_try import Try, best_try, in_the_way
+from cellplan.planning.transfer.best_try import Try, best_try, blocked_try
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
 from cellplan.scene.scene import Scene
 
@@ -51,11 +51,11 @@ def distance_to_box(centres: Array, size: tuple[float, float]) -> Array:
     return np.linalg.norm(outside, axis=1) - RADIUS
 
 
-def assert_at_limits(scene: Scene, found: PlannedTransfer) -> None:
+def assert_at_limits(scene: Scene, transfer: PlannedTransfer) -> None:
     """Rates from row to row, with rest before and after, keep the limits."""
     bounds, step = retimer_of(scene).bounds, scene.cell.motion.step
-    still = np.zeros((1, found.q.shape[1]))
-    velocity = np.diff(found.q, axis=0) / step
+    still = np.zeros((1, transfer.q.shape[1]))
+    velocity = np.diff(transfer.q, axis=0) / step
     acceleration = np.diff(np.concatenate([still, velocity, still]), axis=0) / step
     jerk = np.diff(acceleration, axis=0) / step
     for rates, limit in ((velocity, bounds.velocity), (acceleration, bounds.acceleration), (jerk, bounds.jerk)):
@@ -81,53 +81,53 @@ def rounded() -> tuple[Scene, PlannedTransfer]:
 
 
 def test_a_disc_goes_round_a_wall(rounded: tuple[Scene, PlannedTransfer]) -> None:
-    scene, found = rounded
+    scene, transfer_ = rounded
 
-    assert found.rungs == {"a": Rung.IN_TURN}
-    assert distance_to_box(densely(found.q), WALL).min() >= CLEARANCE - ROUNDED_BACK
-    assert np.array_equal(found.q[[0, -1]], [[-0.5, 0.1], [0.5, 0.1]])
-    assert_at_limits(scene, found)
+    assert transfer_.rungs == {"a": Rung.IN_TURN}
+    assert distance_to_box(densely(transfer_.q), WALL).min() >= CLEARANCE - ROUNDED_BACK
+    assert np.array_equal(transfer_.q[[0, -1]], [[-0.5, 0.1], [0.5, 0.1]])
+    assert_at_limits(scene, transfer_)
 
 
 def test_discs_whose_ways_cross_go_one_after_the_other() -> None:
     scene = scene_of(gantry("a"), gantry("b"), step=STEP)
 
-    found = transfer(scene, [-0.5, 0.0, 0.0, -0.5], [0.5, 0.0, 0.0, 0.5])
+    move = transfer(scene, [-0.5, 0.0, 0.0, -0.5], [0.5, 0.0, 0.0, 0.5])
 
-    assert found.rungs == {"a": Rung.IN_TURN, "b": Rung.IN_TURN}
-    moves = np.diff(found.q, axis=0) != 0.0
+    assert move.rungs == {"a": Rung.IN_TURN, "b": Rung.IN_TURN}
+    moves = np.diff(move.q, axis=0) != 0.0
     assert not np.any(moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1))
-    q = densely(found.q)
+    q = densely(move.q)
     assert np.linalg.norm(q[:, :2] - q[:, 2:], axis=1).min() >= 2.0 * RADIUS + CLEARANCE - ROUNDED_BACK
-    assert_at_limits(scene, found)
+    assert_at_limits(scene, move)
 
 
 def test_a_disc_that_blocks_the_goal_of_another_goes_first() -> None:
     scene = scene_of(gantry("a"), gantry("b"), step=STEP)
 
-    found = transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, 0.4, 0.5])
+    move = transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, 0.4, 0.5])
 
-    first = int(np.flatnonzero(found.q[:, 0] != -0.5)[0])
-    assert found.rungs["a"] in {Rung.STRAIGHT, Rung.IN_TURN}
-    assert np.any(found.q[: first + 1, 2:] != [0.5, 0.0])
+    first = int(np.flatnonzero(move.q[:, 0] != -0.5)[0])
+    assert move.rungs["a"] in {Rung.STRAIGHT, Rung.IN_TURN}
+    assert np.any(move.q[: first + 1, 2:] != [0.5, 0.0])
 
 
 def test_discs_that_change_places_move_at_once(swapped: tuple[Scene, PlannedTransfer]) -> None:
-    scene, found = swapped
+    scene, move = swapped
 
-    assert found.rungs == {"a": Rung.IN_TIME, "b": Rung.IN_TIME}
-    q = densely(found.q)
+    assert move.rungs == {"a": Rung.IN_TIME, "b": Rung.IN_TIME}
+    q = densely(move.q)
     assert np.linalg.norm(q[:, :2] - q[:, 2:], axis=1).min() >= 2.0 * RADIUS + CLEARANCE - ROUNDED_BACK
-    assert np.array_equal(found.q[[0, -1]], [[-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0]])
-    moves = np.diff(found.q, axis=0) != 0.0
+    assert np.array_equal(move.q[[0, -1]], [[-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0]])
+    moves = np.diff(move.q, axis=0) != 0.0
     assert np.any(moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1))
-    assert_at_limits(scene, found)
+    assert_at_limits(scene, move)
 
 
 def test_what_is_found_is_certified_in_its_rows(swapped: tuple[Scene, PlannedTransfer]) -> None:
-    scene, found = swapped
+    scene, move = swapped
 
-    assert certify(scene, found.q).is_kept
+    assert certify(scene, move.q).is_met
 
 
 PROGRAM = """
@@ -141,8 +141,8 @@ print(hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest())
 
 @pytest.mark.slow
 def test_another_process_finds_the_same_bytes(rounded: tuple[Scene, PlannedTransfer]) -> None:
-    _, found = rounded
-    here = hashlib.sha256(found.q.tobytes() + found.times.tobytes()).hexdigest()
+    _, move = rounded
+    here = hashlib.sha256(move.q.tobytes() + move.times.tobytes()).hexdigest()
     paths = [str(Path(__file__).parent), str(Path(__file__).resolve().parents[2])]
 
     there = subprocess.run(
@@ -188,7 +188,7 @@ def test_a_search_is_left_by_ctrl_c() -> None:
 
 
 def test_a_wall_without_a_gap_is_refused_with_what_was_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cellplan.planning.transfer.in_turn.DRAWN", 200)
+    monkeypatch.setattr("cellplan.planning.transfer.in_turn.SAMPLES", 200)
     scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0))], step=STEP)
 
     with pytest.raises(TransferNotFoundError) as refused:
@@ -205,7 +205,7 @@ def test_a_wall_without_a_gap_is_refused_with_what_was_tried(monkeypatch: pytest
 
 
 def test_discs_that_cannot_pass_each_other_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cellplan.planning.transfer.in_time.DRAWN", 20)
+    monkeypatch.setattr("cellplan.planning.transfer.in_time.SAMPLES", 20)
     walls = [wall("left", (3.0, 0.02), (0.0, 0.2)), wall("right", (3.0, 0.02), (0.0, -0.2))]
     scene = scene_of(gantry("a"), gantry("b"), things=walls, step=STEP)
 
@@ -225,9 +225,9 @@ def test_discs_that_cannot_pass_each_other_are_refused(monkeypatch: pytest.Monke
 def test_a_pair_in_the_way_is_as_deep_as_the_closed_form_says(x: float) -> None:
     """A disc pushed straight through a wall is deepest where its way out is half the wall and its own radius."""
     scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 4.0), (x, 0.0))], step=STEP)
-    way = np.linspace([-0.9, 0.0], [0.9, 0.0], 40)
+    line = np.linspace([-0.9, 0.0], [0.9, 0.0], 40)
 
-    blocked = in_the_way(scene, Try(words="straight", q=way))
+    blocked = blocked_try(scene, Try(words="straight", q=line))
 
     assert blocked.missing == pytest.approx(RADIUS + 0.025 + CLEARANCE, abs=2e-3)  # 25 samples about the deepest row
     assert blocked.bodies == ("a/disc", "wall")
@@ -237,10 +237,10 @@ def test_the_try_that_misses_least_is_the_best() -> None:
     """A disc that passes 3 mm from the end of a wall is nearer to being free than one that goes through it."""
     scene = scene_of(gantry("a"), things=[wall("wall", (0.05, 0.4))], step=STEP)
     through = Try(words="through", q=np.linspace([-0.5, 0.0], [0.5, 0.0], 20))
-    beside = Try(words="beside", q=np.linspace([-0.5, 0.303], [0.5, 0.303], 20))
+    near_miss = Try(words="beside", q=np.linspace([-0.5, 0.303], [0.5, 0.303], 20))
 
-    blocked = best_try(scene, [through, beside])
+    blocked = best_try(scene, [through, near_miss])
 
-    assert blocked.tried is beside
+    assert blocked.tried is near_miss
     assert blocked.words == "'a/disc' is 3 mm from 'wall', 5 mm are demanded"
     assert blocked.missing == pytest.approx(0.002, abs=1e-4)

@@ -15,8 +15,8 @@ def test_transfers_of_real_arms_are_found_and_touch_nothing() -> None:
 
     outcomes = [outcome(case) for case in cases]
 
-    assert [each.contact for each in outcomes if each.contact is not None] == []
-    assert sum(each.found is not None for each in outcomes) >= FEWEST
+    assert [outcome.contact for outcome in outcomes if outcome.contact is not None] == []
+    assert sum(outcome.found is not None for outcome in outcomes) >= FEWEST
 
 
 @pytest.mark.slow
@@ -26,5 +26,5 @@ def test_arms_that_are_walled_in_are_refused_with_what_is_in_the_way() -> None:
 
     outcomes = [outcome(case) for case in cases]
 
-    assert [each.model for each in outcomes if each.found is not None] == []
-    assert all("'block'" in each.reason for each in outcomes)
+    assert [outcome.model for outcome in outcomes if outcome.found is not None] == []
+    assert all("'block'" in outcome.reason for outcome in outcomes)

@@ -45,22 +45,27 @@ def drawing(plan: FloorPlan) -> ezdxf.document.Drawing:
 
 
 def test_dimensions_are_the_differences_of_the_coordinates_of_the_bases(plan: FloorPlan) -> None:
-    found = {(each.axis, each.row): [] for each in plan.dimensions}
-    for each in plan.dimensions:
-        found[each.axis, each.row].append(each.length)
+    result = {(dimension.axis, dimension.row): [] for dimension in plan.dimensions}
+    for dimension in plan.dimensions:
+        result[dimension.axis, dimension.row].append(dimension.length)
 
-    assert found == {(0, 0): [1175.0, 200.0, 875.0], (0, 1): [2250.0], (1, 0): [1025.0, 225.0, 550.0], (1, 1): [1800.0]}
+    assert result == {
+        (0, 0): [1175.0, 200.0, 875.0],
+        (0, 1): [2250.0],
+        (1, 0): [1025.0, 225.0, 550.0],
+        (1, 1): [1800.0],
+    }
 
 
 def test_the_sheet_is_to_scale(plan: FloorPlan) -> None:
     sheet, root = laid_out(plan), ET.fromstring(floor_plan_svg(plan))  # noqa: S314 - our own text
 
     circles = root.findall(f"{NS}circle")
-    centres = np.array([[float(each.get("cx")), float(each.get("cy"))] for each in circles])
+    centres = np.array([[float(circle.get("cx")), float(circle.get("cy"))] for circle in circles])
     bases = np.array([robot.base[:2] for robot in plan.robots])
     apart = UNIT / sheet.scale * (bases - bases[0]) * (1.0, -1.0)
     np.testing.assert_allclose(centres - centres[0], apart, atol=0.11)  # first axes stand above the bases
-    radii = [float(each.get("r")) * sheet.scale / UNIT for each in circles]
+    radii = [float(circle.get("r")) * sheet.scale / UNIT for circle in circles]
     np.testing.assert_allclose(radii, [robot.reach for robot in plan.robots], atol=0.05 * sheet.scale / UNIT + 1e-9)
     assert (root.get("width"), root.get("viewBox").split()[2]) == (
         "297mm",
@@ -75,16 +80,16 @@ def test_everything_is_on_the_paper(plan: FloorPlan) -> None:
         for x, y in re.findall(r"[ML](-?[\d.]+) (-?[\d.]+)", path.get("d")):
             assert 0.0 <= float(x) <= 2970.0
             assert 0.0 <= float(y) <= 2100.0
-    assert {"kuka", "1175", "2250", "1800"} <= {"".join(each.itertext()) for each in root.iter(f"{NS}text")}
+    assert {"kuka", "1175", "2250", "1800"} <= {"".join(entry.itertext()) for entry in root.iter(f"{NS}text")}
 
 
 def test_a_swept_area_holds_the_outlines_at_both_ends(plan: FloorPlan) -> None:
     for robot in plan.robots:
         covered = np.concatenate(robot.swept)
-        for each in plan.outlines:
-            if each.robot == robot.name and not each.is_base:
-                assert (each.corners.min(axis=0) >= covered.min(axis=0) - 20.0).all()  # to a square
-                assert (each.corners.max(axis=0) <= covered.max(axis=0) + 20.0).all()
+        for outline in plan.outlines:
+            if outline.robot == robot.name and not outline.is_base:
+                assert (outline.corners.min(axis=0) >= covered.min(axis=0) - 20.0).all()  # to a square
+                assert (outline.corners.max(axis=0) <= covered.max(axis=0) + 20.0).all()
 
 
 def test_the_drawing_has_no_faults_and_is_in_millimetres(plan: FloorPlan) -> None:
@@ -102,18 +107,22 @@ def test_the_drawing_has_no_faults_and_is_in_millimetres(plan: FloorPlan) -> Non
 def test_the_drawing_read_back_has_the_bases_reaches_and_dimensions_of_the_cell(plan: FloorPlan, cell: Cell) -> None:
     space = drawing(plan).modelspace()
 
-    points = [tuple(each.dxf.location) for each in space.query("POINT[layer=='robots']")]
+    points = [tuple(entry.dxf.location) for entry in space.query("POINT[layer=='robots']")]
     np.testing.assert_allclose(points, [1e3 * robot.X_WB[:3, 3] for robot in cell.robots], atol=1e-3)
     circles = space.query("CIRCLE[layer=='reach']")
     reaches = [1e3 * arm_reach(robot.model) for robot in cell.robots]
-    np.testing.assert_allclose([each.dxf.radius for each in circles], reaches, rtol=2e-3)  # of a search with few rounds
+    np.testing.assert_allclose(
+        [circle.dxf.radius for circle in circles], reaches, rtol=2e-3
+    )  # of a search with few rounds
     dimensions = space.query("DIMENSION[layer=='dimensions']")
-    assert sorted(each.dxf.actual_measurement for each in dimensions) == sorted(each.length for each in plan.dimensions)
-    for each in dimensions:
-        along = np.array([np.cos(np.radians(each.dxf.angle)), np.sin(np.radians(each.dxf.angle)), 0.0])
-        apart = np.array(each.dxf.defpoint3) - np.array(each.dxf.defpoint2)
-        assert float(along @ apart) == pytest.approx(each.dxf.actual_measurement)
-        assert each.get_geometry_block().query("TEXT").first.dxf.text == f"{each.dxf.actual_measurement:g}"
+    assert sorted(dimension.dxf.actual_measurement for dimension in dimensions) == sorted(
+        dimension.length for dimension in plan.dimensions
+    )
+    for dimension in dimensions:
+        along = np.array([np.cos(np.radians(dimension.dxf.angle)), np.sin(np.radians(dimension.dxf.angle)), 0.0])
+        apart = np.array(dimension.dxf.defpoint3) - np.array(dimension.dxf.defpoint2)
+        assert float(along @ apart) == pytest.approx(dimension.dxf.actual_measurement)
+        assert dimension.get_geometry_block().query("TEXT").first.dxf.text == f"{dimension.dxf.actual_measurement:g}"
 
 
 def test_a_wall_is_a_line_where_it_stands(plan: FloorPlan) -> None:
@@ -134,14 +143,14 @@ def test_names_and_numbers_of_the_table_leave_each_other_room(plan: FloorPlan) -
     base = np.array([-2598.1, -12598.1, 1500.5])
     robots = tuple(replace(robot, base=base, yaw_deg=-150.5, reach=10303.0) for robot in plan.robots)
     named = replace(robots[0], name="N" * 40)
-    outlines = tuple(replace(each, robot=None) for each in plan.outlines)
+    outlines = tuple(replace(outline, robot=None) for outline in plan.outlines)
     whole = replace(plan, robots=(named, *robots[1:]), outlines=outlines, paths=())
 
     rows: dict[str, list[tuple[float, float]]] = {}
-    for each in ET.fromstring(floor_plan_svg(whole)).iter(f"{NS}text"):  # noqa: S314 - our own text
-        if each.get("class") in {"key", "key right"} and float(each.get("y")) > 400.0:
-            x, across = float(each.get("x")), 27.0 * sum(width.get(letter, 0.64) for letter in each.text)
-            box = (x - across, x) if "right" in each.get("class") else (x, x + across)
-            rows.setdefault(each.get("y"), []).append(box)
+    for entry in ET.fromstring(floor_plan_svg(whole)).iter(f"{NS}text"):  # noqa: S314 - our own text
+        if entry.get("class") in {"key", "key right"} and float(entry.get("y")) > 400.0:
+            x, across = float(entry.get("x")), 27.0 * sum(width.get(letter, 0.64) for letter in entry.text)
+            box = (x - across, x) if "right" in entry.get("class") else (x, x + across)
+            rows.setdefault(entry.get("y"), []).append(box)
     assert sorted(map(len, rows.values()))[-4:] == [5, 6, 6, 6]  # the long name has a line for itself
     assert all(left[1] <= right[0] for row in rows.values() for left, right in pairwise(sorted(row)))

@@ -25,7 +25,7 @@ def shown(text: str, trim: bool = False) -> str:
     return environment.get_template("page.html").render(name="<b>")
 
 
-def kept(folder: Path) -> list[Path]:
+def entries(folder: Path) -> list[Path]:
     """What is kept."""
     return sorted(folder.rglob("*.template"))
 
@@ -35,12 +35,12 @@ def test_a_template_is_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(Environment, "compile", lambda *_: pytest.fail("compiled again"))
 
     assert first == shown("Hello {{ name }}") == "Hello &lt;b&gt;"
-    assert len(kept(tmp_path)) == 1
+    assert len(entries(tmp_path)) == 1
 
 
 def test_a_changed_template_takes_the_place_of_the_old_one(tmp_path: Path) -> None:
     assert [shown("one"), shown("two"), shown("two")] == ["one", "two", "two"]
-    assert len(kept(tmp_path)) == 1
+    assert len(entries(tmp_path)) == 1
 
 
 def test_other_options_are_other_templates() -> None:
@@ -52,7 +52,7 @@ def test_other_options_are_other_templates() -> None:
 @pytest.mark.parametrize("length", [0, 10, 40, 200])
 def test_a_damaged_file_is_made_again(length: int, tmp_path: Path) -> None:
     shown("Hello {{ name }}")
-    (file,) = kept(tmp_path)
+    (file,) = entries(tmp_path)
     whole = file.read_bytes()
     file.write_bytes(whole[:length])
 
@@ -63,7 +63,7 @@ def test_a_damaged_file_is_made_again(length: int, tmp_path: Path) -> None:
 def test_nothing_is_written_where_python_may_not_or_cannot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     assert shown("text") == "text"
-    assert not kept(tmp_path)
+    assert not entries(tmp_path)
 
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     (tmp_path / "file").write_text("in the way")

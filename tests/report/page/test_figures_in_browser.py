@@ -63,7 +63,7 @@ def ask(browser: Browser, script: str) -> Any:
 
 def numbers(text: str) -> list[float]:
     """Numbers of a reading, without digits in names."""
-    return [float(each.replace("−", "-")) for each in re.findall(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?![\w.]*\d)", text)]
+    return [float(match.replace("−", "-")) for match in re.findall(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?![\w.]*\d)", text)]
 
 
 def test_a_chosen_time_shows_the_values_of_the_run_in_every_figure(
@@ -73,13 +73,13 @@ def test_a_chosen_time_shows_the_values_of_the_run_in_every_figure(
     browser.open(page)
     for row in (0, 1234, len(report.times) - 1):
         t = float(report.times[row])
-        found = ask(
+        result = ask(
             browser,
             f"tell({t}); return [reading('kuka: joint positions', 'B1, in deg'), reading('{MARGINS}', 'kuka'), "
             "document.querySelectorAll('.panel[data-time]').length, document.querySelectorAll('.read').length];",
         )
         uses = [use for use in report.joints if use.robot == "kuka"]
-        said, position = numbers(found[0].removesuffix(" deg"))
+        said, position = numbers(result[0].removesuffix(" deg"))
         assert said == pytest.approx(t, abs=5e-4)
         span = np.degrees(uses[0].upper - uses[0].lower)
         assert position == pytest.approx(np.degrees(report.q["kuka"][row, 0]), abs=SHARE * 1.12 * span + 0.05)
@@ -88,8 +88,8 @@ def test_a_chosen_time_shows_the_values_of_the_run_in_every_figure(
             100.0 * min(q[i] - use.lower, use.upper - q[i]) / (0.5 * (use.upper - use.lower))
             for i, use in enumerate(uses)
         ]
-        assert numbers(found[1].removesuffix(" %"))[1:] == pytest.approx(expected, abs=110 * SHARE + 0.05)
-        assert found[2] - found[3] <= 24 + 8, "speeds are between the samples, and have none at the two ends"
+        assert numbers(result[1].removesuffix(" %"))[1:] == pytest.approx(expected, abs=110 * SHARE + 0.05)
+        assert result[2] - result[3] <= 24 + 8, "speeds are between the samples, and have none at the two ends"
     assert ask(browser, "tell(null); return document.querySelectorAll('.read').length;") == 0
     assert browser.console == []
 
@@ -97,7 +97,7 @@ def test_a_chosen_time_shows_the_values_of_the_run_in_every_figure(
 def test_pointing_reads_and_clicking_chooses_the_time_below_the_pointer(page: Path, browser: Browser) -> None:
     browser.open(page)
 
-    said, kept, heard, gone = ask(
+    said, marked, heard, gone = ask(
         browser,
         f"""
         const at = spot("{MARGINS}", "abb", 0.25);
@@ -111,7 +111,7 @@ def test_pointing_reads_and_clicking_chooses_the_time_below_the_pointer(page: Pa
     )
 
     assert numbers(said)[0] == pytest.approx(1.0, abs=5e-3)
-    assert numbers(kept)[0] == pytest.approx(1.0, abs=5e-3)
+    assert numbers(marked)[0] == pytest.approx(1.0, abs=5e-3)
     assert heard[0] == pytest.approx(1.0, abs=5e-3)
     assert (heard[1:], gone) == ([None], "")
 
@@ -207,7 +207,7 @@ def test_two_fingers_zoom_about_their_middle_and_one_reads(page: Path, browser: 
 def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme: str) -> None:
     browser.open(page, size=(390, 844), theme=theme)
 
-    found = ask(
+    result = ask(
         browser,
         """
         const pictures = [...document.querySelectorAll("figure > svg")];
@@ -223,10 +223,10 @@ def test_figures_are_readable_on_a_telephone(page: Path, browser: Browser, theme
         return { count: shown.length, size: Math.min(...sizes), wide: Math.max(...wide), ink };""",
     )
 
-    assert found["count"] == 15
-    assert found["size"] >= 8.5
-    assert found["wide"] <= 390
-    channels = list(map(int, re.findall(r"\d+", found["ink"])))[:3]
+    assert result["count"] == 15
+    assert result["size"] >= 8.5
+    assert result["wide"] <= 390
+    channels = list(map(int, re.findall(r"\d+", result["ink"])))[:3]
     assert (min(channels) > 200) == (theme == "dark")
     assert browser.console == []
 

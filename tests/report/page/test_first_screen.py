@@ -96,10 +96,10 @@ def test_what_was_not_judged_leads_to_its_full_lines(passed_run: Any) -> None:
     record = record_of(passed_run)
     lines = record["rests_on"]["lines"]
 
-    found = not_judged(record)
+    result = not_judged(record)
 
     assert lines
-    assert {text for text, place in found if place == "#unstated"} == {line.partition(":")[0] for line in lines}
+    assert {text for text, place in result if place == "#unstated"} == {line.partition(":")[0] for line in lines}
 
 
 def test_pairs_that_someone_excluded_are_named_and_the_others_counted(passed_run: Any) -> None:
@@ -150,7 +150,7 @@ def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: An
 def test_a_picture_is_shown_even_if_nothing_has_a_time(passed_run: Any) -> None:
     record = record_of(passed_run)
     nowhere = {
-        kind: {**each, "minimum_mm": None, "pair": None, "at_s": None} for kind, each in record["clearance"].items()
+        kind: {**value, "minimum_mm": None, "pair": None, "at_s": None} for kind, value in record["clearance"].items()
     }
     record = {**record, "clearance": nowhere}
     still = '<?xml version="1.0"?><svg viewBox="0 0 4 3"><title>picture</title></svg>'
@@ -172,7 +172,7 @@ def test_a_skew_that_is_more_than_allowed_and_a_touch_at_a_stop_stand_on_the_fir
     demand = {"name": "stop_clearance"}
 
     more = {*not_judged({**record, "skew": {"pairs": [pair]}, "stops": {"distances": [stop]}})} - {*not_judged(record)}
-    kept = {**pair, "stated_ms": 0.5}
+    stated = {**pair, "stated_ms": 0.5}
     apart = {**stop, "distance_mm": 1.0}
     judged = {**record, "checks": [*record["checks"], demand]}
 
@@ -180,5 +180,5 @@ def test_a_skew_that_is_more_than_allowed_and_a_touch_at_a_stop_stand_on_the_fir
         ("stated skew of a and b, 4 ms, of which 0.5 ms are allowed", "#skew"),
         ("when one robot stops, a/tool and part touch; nothing is demanded of stops", "#stops"),
     }
-    assert not_judged({**record, "skew": {"pairs": [kept]}, "stops": {"distances": [apart]}}) == not_judged(record)
+    assert not_judged({**record, "skew": {"pairs": [stated]}, "stops": {"distances": [apart]}}) == not_judged(record)
     assert not_judged({**judged, "stops": {"distances": [stop]}}) == not_judged(record)

@@ -18,7 +18,7 @@ from cellplan.report.page.notebook import Card, Grid, card_html
 from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 LARGEST = 200_000  # [bytes]
 ALLOWED = {"div", "span", "table", "caption", "thead", "tbody", "tr", "th", "td", "ul", "li", "img", "code"}
@@ -130,10 +130,10 @@ def test_hostile_names_stay_text(passed_run: Any) -> None:
             )
         )
     )
-    for found in (piece, card):
-        assert found.tags <= ALLOWED
-        assert found.attributes.keys() <= {"style", "scope", "src", "alt"}
-        assert " ".join(HOSTILE.split()) in found.text
+    for text in (piece, card):
+        assert text.tags <= ALLOWED
+        assert text.attributes.keys() <= {"style", "scope", "src", "alt"}
+        assert " ".join(HOSTILE.split()) in text.text
     assert "49" not in card.text
     assert card.attributes["alt"] == [HOSTILE]
 

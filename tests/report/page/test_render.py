@@ -78,9 +78,9 @@ class Page(HTMLParser):
 
 
 def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
-    drawn = pictures(run_figures(run.report, cell=run.cell)) if plots is None else plots
+    shown = pictures(run_figures(run.report, cell=run.cell)) if plots is None else plots
     record = run_record(run.report, cell=run.cell, provenance=run.provenance)
-    return report_page(record, run.report.checks, cell=run.cell, plots=drawn)
+    return report_page(record, run.report.checks, cell=run.cell, plots=shown)
 
 
 def overview_of(runs: Any) -> str:
@@ -211,7 +211,9 @@ def hostile(run: Any) -> Any:
     )
     report = replace(
         report,
-        accuracy=tuple(replace(each, task=HOSTILE) if each.task == "circle" else each for each in report.accuracy),
+        accuracy=tuple(
+            replace(accuracy, task=HOSTILE) if accuracy.task == "circle" else accuracy for accuracy in report.accuracy
+        ),
         phases=(Phase(name=HOSTILE, roles={HOSTILE: Work(HOSTILE)}, end=4.0),),
     )
     tasks = tuple(replace(task, name=HOSTILE) if task.name == "circle" else task for task in run.cell.tasks)
@@ -253,8 +255,8 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
     drift = JointDrift(
         robot="kuka", joint="B2", is_revolute=True, drift=np.array([0.01, -0.02]), worst=0.02, at_cycle=2
     )
-    found = Repeatability(cycle_times=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
-    run = replace(passed_run, report=replace(passed_run.report, repeatability=found))
+    result = Repeatability(cycle_times=np.array([0.0, 1.0, 2.0]), drifts=(drift,), closes=False)
+    run = replace(passed_run, report=replace(passed_run.report, repeatability=result))
 
     text = page_of(run)
 

@@ -15,7 +15,7 @@ from cellplan.report.record.common import as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 
-OWN_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
+DECLARED_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
 
 
 def keys(tree: Any, names: set[str]) -> set[str]:
@@ -24,8 +24,8 @@ def keys(tree: Any, names: set[str]) -> set[str]:
         return {key for entry in tree for key in keys(entry, names)}
     if not isinstance(tree, dict):
         return set()
-    found = set(tree) - names
-    return found | {key for name, entry in tree.items() if name not in OWN_NAMES for key in keys(entry, names)}
+    result = set(tree) - names
+    return result | {key for name, entry in tree.items() if name not in DECLARED_NAMES for key in keys(entry, names)}
 
 
 @pytest.fixture

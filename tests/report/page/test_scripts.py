@@ -58,9 +58,9 @@ def test_links_lead_to_files_of_the_run_and_to_each_of_its_tables(sound: Path, t
 
     for page in pages:
         addresses = Parts(page.read_text(encoding="utf-8")).addresses
-        found = [link.split("#")[0] for link in addresses if not link.startswith("#")]
-        files = {(page.parent / unquote(link)).resolve() for link in found}
-        assert [link for link in found if not (page.parent / unquote(link)).is_file()] == []
+        result = [link.split("#")[0] for link in addresses if not link.startswith("#")]
+        files = {(page.parent / unquote(link)).resolve() for link in result}
+        assert [link for link in result if not (page.parent / unquote(link)).is_file()] == []
         assert {folder.resolve() / "view.html", *folder.resolve().glob("tables/*.csv")} <= files
         assert {folder.resolve() / name for name in ("report.json", "cell.yaml", "manifest.json")} - files <= (
             {folder.resolve() / "report.json"} if page.parent != folder else set()

@@ -84,7 +84,7 @@ def test_the_instant_of_the_address_is_shown(browser: Browser, folder: Path) -> 
 
 def test_bodies_are_drawn_where_the_kinematics_put_them(browser: Browser, folder: Path) -> None:
     browser.open(folder / "run.html")
-    drawn = browser.run("""
+    places = browser.run("""
       const state = app.stage.at(0.475);
       return app.stage.scene.bodies.map((body, i) => app.stage.bodyPose(i, state.links, 0.475));
     """)
@@ -92,7 +92,7 @@ def test_bodies_are_drawn_where_the_kinematics_put_them(browser: Browser, folder
     scene = data_of((folder / "run.html").read_text())["scenes"][0]
     times, q = rows_of(scene["motion"])
     row = int(np.argmin(np.abs(times - 0.475)))
-    for column_wise, pose in zip(drawn, body_poses(scene, q[row]), strict=True):
+    for column_wise, pose in zip(places, body_poses(scene, q[row]), strict=True):
         assert np.abs(np.reshape(column_wise, (4, 4)).T - pose).max() < 1e-4
 
 
@@ -217,7 +217,7 @@ def test_a_wedge_below_a_moved_base_is_cut_off_as_the_cell_has_it(
     path.unlink()
 
     browser.open(tmp_path / "tilted.html")
-    drawn = browser.run(f"""
+    places = browser.run(f"""
       const fields = byId("bases").querySelectorAll("fieldset")[2].querySelectorAll("input");
       const changes = {json.dumps(moved)};
       COMPONENTS.forEach((component, i) => {{
@@ -239,7 +239,7 @@ def test_a_wedge_below_a_moved_base_is_cut_off_as_the_cell_has_it(
     robot = cell.robot("idle")
     solid, X_BS = robot.pedestal.solid(robot.X_WB)
     X_WS = robot.X_WB @ X_BS
-    assert np.abs(np.array(drawn) - (solid.vertices @ X_WS[:3, :3].T + X_WS[:3, 3])).max() < 2e-5  # a grid of 16 bit
+    assert np.abs(np.array(places) - (solid.vertices @ X_WS[:3, :3].T + X_WS[:3, 3])).max() < 2e-5  # a grid of 16 bit
     assert browser.console == []
 
 

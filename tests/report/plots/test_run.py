@@ -9,7 +9,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from builders.drawn import panels, texts
+from builders.svg_figures import panels, texts
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -20,7 +20,7 @@ from cellplan.report.plots.figure import PlotAxis
 from cellplan.report.plots.placing import nice_ticks
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
-from cellplan.report.plots.thinning import peaks_kept, straightened
+from cellplan.report.plots.thinning import peak_samples, straightened
 
 
 def draw_plots(report: Any, *, cell: Any, formats: Any = ()) -> dict[str, bytes]:
@@ -28,29 +28,29 @@ def draw_plots(report: Any, *, cell: Any, formats: Any = ()) -> dict[str, bytes]
 
 
 @pytest.fixture(scope="module")
-def drawn(failed_run: Any) -> dict[str, bytes]:
+def files(failed_run: Any) -> dict[str, bytes]:
     return draw_plots(failed_run.report, cell=failed_run.cell)
 
 
-def test_every_plot_of_the_thesis_is_drawn(drawn: dict[str, bytes]) -> None:
+def test_every_plot_of_the_thesis_is_drawn(files: dict[str, bytes]) -> None:
     names = [f"task_{task}" for task in ("circle", "rhombus", "rectangle")]
     names += [f"{kind}_{robot}" for robot in ("reis", "kuka", "abb", "staubli") for kind in ("positions", "velocities")]
     names = ["margins", "speeds", "clearance", *names, "singularity"]
-    assert list(drawn) == [f"{name}.svg" for name in names]
+    assert list(files) == [f"{name}.svg" for name in names]
 
 
-def test_pictures_are_whole(drawn: dict[str, bytes]) -> None:
-    assert {ET.fromstring(data).tag for data in drawn.values()} == {"{http://www.w3.org/2000/svg}svg"}  # noqa: S314
+def test_pictures_are_whole(files: dict[str, bytes]) -> None:
+    assert {ET.fromstring(data).tag for data in files.values()} == {"{http://www.w3.org/2000/svg}svg"}  # noqa: S314
 
 
-def test_limits_are_written_beside_their_lines(drawn: dict[str, bytes]) -> None:
-    words = texts(drawn["positions_kuka.svg"])
+def test_limits_are_written_beside_their_lines(files: dict[str, bytes]) -> None:
+    words = texts(files["positions_kuka.svg"])
     for limit in ("185", "−185", "100", "−100", "118", "−118"):
         assert limit in words
     assert "B1, in deg" in words
     assert any(word.startswith("outside by 4.9") for word in words)
-    assert "156" in texts(drawn["velocities_kuka.svg"])
-    assert any("required 5" in word for word in texts(drawn["clearance.svg"]))
+    assert "156" in texts(files["velocities_kuka.svg"])
+    assert any("required 5" in word for word in texts(files["clearance.svg"]))
 
 
 def with_errors(run: Any, largest: float) -> Any:
@@ -91,9 +91,9 @@ def test_ripples_below_a_nanometre_look_small(passed_run: Any) -> None:
     assert {"−1", "1"} <= set(texts(with_errors(passed_run, 1e-13)))
 
 
-def test_margins_and_speeds_are_shares_of_the_limits_of_each_joint(failed_run: Any, drawn: dict[str, bytes]) -> None:
+def test_margins_and_speeds_are_shares_of_the_limits_of_each_joint(failed_run: Any, files: dict[str, bytes]) -> None:
     """Closed form: the worst margin of a joint in its report is the lowest point of its curve."""
-    margins, speeds = panels(drawn["margins.svg"]), panels(drawn["speeds.svg"])
+    margins, speeds = panels(files["margins.svg"]), panels(files["speeds.svg"])
     assert [panel.title for panel in margins] == [panel.title for panel in speeds] == list(failed_run.report.q)
     for near, quick, robot in zip(margins, speeds, failed_run.report.q, strict=True):
         uses = [use for use in failed_run.report.joints if use.robot == robot]
@@ -105,7 +105,7 @@ def test_margins_and_speeds_are_shares_of_the_limits_of_each_joint(failed_run: A
             assert quick.curves[use.joint][:, 1].max() == pytest.approx(peak, abs=0.3)
         assert near.marks[0][1] == pytest.approx(min(curve[:, 1].min() for curve in near.curves.values()), abs=0.3)
     assert min(panel.marks[0][1] for panel in margins) < 0.0
-    assert any(re.search(r": −\d+\.\d % at ", word) for word in texts(drawn["margins.svg"]))
+    assert any(re.search(r": −\d+\.\d % at ", word) for word in texts(files["margins.svg"]))
 
 
 def test_many_robots_share_a_panel_with_their_worst_joints(passed_run: Any) -> None:
@@ -127,15 +127,15 @@ def test_many_robots_share_a_panel_with_their_worst_joints(passed_run: Any) -> N
 
 def test_requested_formats_have_the_same_bytes_whatever_the_user_has_set(rail_run: Any) -> None:
     sheets = {"clearance": run_figures(rail_run.report, cell=rail_run.cell)["clearance"]}
-    drawn = pictures(sheets, ("png", "pdf"))
+    samples = pictures(sheets, ("png", "pdf"))
     with mpl.rc_context({"font.size": 20.0, "lines.linewidth": 7.0, "pdf.compression": 0, "savefig.dpi": 30}):
         before = dict(mpl.rcParams)
-        assert pictures(sheets, ["pdf", "png", "png"]) == drawn
+        assert pictures(sheets, ["pdf", "png", "png"]) == samples
         assert dict(mpl.rcParams) == before
-    assert list(drawn) == ["clearance.svg", "clearance.pdf", "clearance.png"]
-    assert not any(b"Date" in data or b"atplotlib" in data for data in drawn.values())
-    assert drawn["clearance.pdf"].startswith(b"%PDF")
-    assert struct.unpack(">I", drawn["clearance.png"][16:20]) == (1100,)
+    assert list(samples) == ["clearance.svg", "clearance.pdf", "clearance.png"]
+    assert not any(b"Date" in data or b"atplotlib" in data for data in samples.values())
+    assert samples["clearance.pdf"].startswith(b"%PDF")
+    assert struct.unpack(">I", samples["clearance.png"][16:20]) == (1100,)
 
 
 def test_formats_that_cannot_be_written_are_refused_before_anything_is_drawn() -> None:
@@ -179,20 +179,20 @@ def test_names_with_signs_of_markup_stay_text(passed_run: Any) -> None:
 
 @given(arrays(float, st.integers(1, 5000), elements=st.floats(-1e6, 1e6)))
 def test_thinning_keeps_ends_and_extremes(values: Any) -> None:
-    kept = peaks_kept(values, 600)
-    assert np.all(np.diff(kept) > 0)
-    assert (kept[0], kept[-1]) == (0, len(values) - 1)
-    assert values[kept].max() == values.max()
-    assert values[kept].min() == values.min()
-    assert len(kept) <= 600 + 4  # one stretch more than asked for, and the two ends
+    chosen = peak_samples(values, 600)
+    assert np.all(np.diff(chosen) > 0)
+    assert (chosen[0], chosen[-1]) == (0, len(values) - 1)
+    assert values[chosen].max() == values.max()
+    assert values[chosen].min() == values.min()
+    assert len(chosen) <= 600 + 4  # one stretch more than asked for, and the two ends
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e6), st.integers(2, 8))
 def test_ticks_are_even_and_inside(low: float, span: float, count: int) -> None:
     ticks = nice_ticks(PlotAxis(low=low, high=low + span), count)
     assert len(ticks) <= count + 1
-    room = 1e-6 * span + 1e-8 * abs(low)  # ticks are rounded to nine digits
-    assert all(low - room <= tick <= low + span + room for tick in ticks)
+    tolerance = 1e-6 * span + 1e-8 * abs(low)  # ticks are rounded to nine digits
+    assert all(low - tolerance <= tick <= low + span + tolerance for tick in ticks)
     if len(ticks) > 2:
         steps = np.diff(ticks)
         assert np.ptp(steps) <= 1e-6 * steps.mean() + 2e-8 * abs(low)
@@ -202,10 +202,10 @@ def test_ticks_are_even_and_inside(low: float, span: float, count: int) -> None:
 def test_a_straightened_curve_stays_within_its_tolerance(values: Any, tolerance: float) -> None:
     x = np.arange(float(len(values)))
 
-    kept = straightened(x, values, tolerance)
+    chosen = straightened(x, values, tolerance)
 
-    assert np.abs(np.interp(x, x[kept], values[kept]) - values).max() <= tolerance + 1e-9
-    assert (kept[0], kept[-1]) == (0, len(values) - 1)
+    assert np.abs(np.interp(x, x[chosen], values[chosen]) - values).max() <= tolerance + 1e-9
+    assert (chosen[0], chosen[-1]) == (0, len(values) - 1)
 
 
 def test_powers_of_ten_are_the_ticks_of_a_logarithmic_axis() -> None:
@@ -215,8 +215,8 @@ def test_powers_of_ten_are_the_ticks_of_a_logarithmic_axis() -> None:
     )
 
 
-def test_singular_values_are_drawn_along_the_motion_with_their_smallest(drawn: dict[str, bytes]) -> None:
-    words = texts(drawn["singularity.svg"])
+def test_singular_values_are_drawn_along_the_motion_with_their_smallest(files: dict[str, bytes]) -> None:
+    words = texts(files["singularity.svg"])
     assert "all robots together" in words
     assert {"their condition", "their manipulability, in 10⁻⁷", "staubli"} <= set(words)
     assert sum("smallest 0.1" in word for word in words) >= 1

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders.drawn import panels, texts
+from builders.svg_figures import panels, texts
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -28,14 +28,14 @@ X = PlotAxis(low=0.0, high=2.0, label="time in s", unit="s", is_time=True)
 HEADROOM = 1.0 + THINNING_TOL  # [-] coordinates: rounding of a point, and how far a thinned curve may lie beside it
 
 
-def drawn(*items: object, y: PlotAxis, x: PlotAxis = X):
+def svg_of(*items: object, y: PlotAxis, x: PlotAxis = X):
     return panels(svg_text(Figure(title="t", x=x, panels=[PlotPanel(title="p", y=y, items=items)])))[0]
 
 
 def test_curves_limits_and_marks_lie_where_their_values_are() -> None:
     values = 3.0 * np.sin(7.0 * TIMES)
     limits = Limit(2.5, "2.5"), Limit(-2.0, is_upper=False)
-    panel = drawn(*limits, PlotCurve("sine", TIMES, values), PlotMark(0.25, 1.5), y=value_axis(-3.0, 3.0, unit="mm"))
+    panel = svg_of(*limits, PlotCurve("sine", TIMES, values), PlotMark(0.25, 1.5), y=value_axis(-3.0, 3.0, unit="mm"))
 
     fine = panel.resolution[1]
     assert panel.limits == pytest.approx([2.5, -2.0], abs=fine)
@@ -51,14 +51,14 @@ def test_a_logarithmic_scale_shows_ratios_and_ends_at_its_lower_edge() -> None:
     axis = PlotAxis(low=1e-6, high=0.3, unit="mm", is_log=True)
     values = np.where(TIMES < 1.0, 2e-4 * np.exp(TIMES), 0.0)
 
-    panel = drawn(Limit(0.1, "tolerance"), PlotCurve("error", TIMES, values), y=axis)
+    panel = svg_of(Limit(0.1, "tolerance"), PlotCurve("error", TIMES, values), y=axis)
 
     decade = np.log(10.0) * panel.resolution[1]
     assert panel.limits == pytest.approx([0.1], rel=decade)
     at, shown = panel.curves["error"].T
     early = TIMES < 0.99
-    found = 10.0 ** np.interp(TIMES[early], at, np.log10(shown))
-    assert np.abs(np.log(found / values[early])).max() <= HEADROOM * decade + panel.resolution[0]
+    result = 10.0 ** np.interp(TIMES[early], at, np.log10(shown))
+    assert np.abs(np.log(result / values[early])).max() <= HEADROOM * decade + panel.resolution[0]
     assert shown[at > 1.01] == pytest.approx(1e-6, rel=decade)
     height = np.log10(axis.high / axis.low)
     assert float(axis.share(1e-3) - axis.share(1e-4)) == pytest.approx(1.0 / height)
@@ -69,7 +69,7 @@ def test_a_thinned_curve_lies_within_a_tenth_of_a_point_of_every_kept_peak(value
     x = PlotAxis(low=0.0, high=float(len(values) - 1), label="sample")
     y = value_axis(-50.0, 50.0)
 
-    panel = drawn(PlotCurve("c", np.arange(float(len(values))), values), y=y, x=x)
+    panel = svg_of(PlotCurve("c", np.arange(float(len(values))), values), y=y, x=x)
 
     shown = panel.curves["c"][:, 1]
     assert shown.max() == pytest.approx(values.max(), abs=HEADROOM * panel.resolution[1])
@@ -140,7 +140,7 @@ def test_a_picture_says_what_it_shows_and_reads_on_dark_pages() -> None:
 
 
 def test_coordinates_are_hundredths_of_points() -> None:
-    panel = drawn(y=value_axis(0.0, 1.0))
+    panel = svg_of(y=value_axis(0.0, 1.0))
     figure = svg_text(Figure(title="t", x=X, panels=[PlotPanel(title="p", y=X, items=[])]))
     width = float(figure.split('data-size="')[1].split(" ")[0])
 
@@ -153,6 +153,6 @@ def test_a_note_beside_a_long_title_is_written_smaller_than_one_beside_a_short_t
     for title in ("speed", "their manipulability, in 10⁻⁶"):
         panel = PlotPanel(title=title, y=axis, items=(), note="smallest 3.9 at 0.81 s")
         figure = Figure(title="t", x=X, panels=[panel] * 3, columns=3)
-        sizes.append(next(each.size for box in placed(figure).panels for each in box.words if each.kind == "note"))
+        sizes.append(next(word.size for box in placed(figure).panels for word in box.words if word.kind == "note"))
 
     assert sizes[1] < sizes[0] == 7.5

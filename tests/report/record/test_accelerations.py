@@ -38,7 +38,7 @@ SLIDING = replace(
 )
 POINT = PointAcceleration(peak=3.5, peak_at_s=0.1, peak_jerk=80.0, peak_jerk_at_s=0.2, window=0.004)
 SPEED = ProcessSpeed(mean=0.05, peak=0.1, peak_at_s=0.5, steady_share=0.2, slower=((0.0, 0.4), (0.6, 1.0)))
-FOUND = MotionAccelerations(
+MEASURED = MotionAccelerations(
     joints=(TURNING, SLIDING),
     tools={"kuka": POINT},
     part=PartAcceleration(centre=POINT, corner=replace(POINT, peak=5.0)),
@@ -65,7 +65,7 @@ def use_of(joint: JointAcceleration) -> JointUse:
 
 
 def test_joints_are_recorded_in_degrees_and_millimetres() -> None:
-    record = joints_record([use_of(TURNING), use_of(SLIDING)], FOUND.joints)
+    record = joints_record([use_of(TURNING), use_of(SLIDING)], MEASURED.joints)
 
     turning, sliding = record["kuka"]["A1"], record["kuka"]["rail"]
     assert (turning["min"], turning["unit"], sliding["unit"], sliding["max"]) == (0.0, "deg", "mm", 1000.0)
@@ -76,14 +76,14 @@ def test_joints_are_recorded_in_degrees_and_millimetres() -> None:
         4.0,
     )
     assert (sliding["peak_acceleration"], sliding["acceleration_limit_source"]) == (600.0, "stated")
-    part = accelerations_record(FOUND)["part"]
+    part = accelerations_record(MEASURED)["part"]
     assert part is not None
     assert part["corner"]["peak_acceleration_m_s2"] == 5.0
 
 
 def test_the_process_speed_of_a_task_is_recorded_in_millimetres_per_second(passed_run: Any) -> None:
-    found = replace(FOUND, process={"circle": SPEED})
-    tasks = tasks_record(replace(passed_run.report, accelerations=found), passed_run.cell)
+    result = replace(MEASURED, process={"circle": SPEED})
+    tasks = tasks_record(replace(passed_run.report, accelerations=result), passed_run.cell)
 
     assert tasks["rhombus"]["process_speed"] is None
     assert tasks["circle"]["process_speed"] == {
@@ -97,14 +97,14 @@ def test_the_process_speed_of_a_task_is_recorded_in_millimetres_per_second(passe
 
 
 def test_the_worst_of_several_runs_counts() -> None:
-    gentle = replace(FOUND, joints=(replace(TURNING, peak=0.1, peak_jerk=99.0), SLIDING), part=None)
+    gentle = replace(MEASURED, joints=(replace(TURNING, peak=0.1, peak_jerk=99.0), SLIDING), part=None)
 
-    joints = worst_of([joints_record([use_of(TURNING)], found.joints) for found in (FOUND, gentle)])["kuka"]["A1"]
-    merged = worst_of([accelerations_record(found) for found in (FOUND, gentle)])
+    joints = worst_of([joints_record([use_of(TURNING)], entry.joints) for entry in (MEASURED, gentle)])["kuka"]["A1"]
+    merged = worst_of([accelerations_record(entry) for entry in (MEASURED, gentle)])
 
     assert joints["peak_acceleration"] == pytest.approx(math.degrees(TURNING.peak))
     assert joints["peak_jerk"] == pytest.approx(math.degrees(99.0))
-    assert merged["part"] == accelerations_record(FOUND)["part"]
+    assert merged["part"] == accelerations_record(MEASURED)["part"]
 
 
 @pytest.mark.parametrize(
@@ -123,4 +123,4 @@ def test_the_worst_of_several_runs_counts() -> None:
 def test_the_header_of_a_table_states_the_largest_acceleration_and_jerk(
     joints: tuple[JointAcceleration, ...], line: str
 ) -> None:
-    assert table_line(replace(FOUND, joints=joints), "kuka") == line
+    assert table_line(replace(MEASURED, joints=joints), "kuka") == line

@@ -6,10 +6,10 @@ from cellplan.report.text.notes import grip_notes, left_out_notes
 
 
 def test_each_pair_stands_in_the_record_with_kind_bodies_and_reason() -> None:
-    found = left_out_record([LeftOut(LeftOutKind.GRIP, ("a/hand", "part"), "holds the part")])
+    result = left_out_record([LeftOut(LeftOutKind.GRIP, ("a/hand", "part"), "holds the part")])
 
-    assert found == [{"kind": "grip", "bodies": ["a/hand", "part"], "reason": "holds the part"}]
-    assert left_out_notes({"left_out": found}) == ["not checked in full, grip: a/hand - part (holds the part)"]
+    assert result == [{"kind": "grip", "bodies": ["a/hand", "part"], "reason": "holds the part"}]
+    assert left_out_notes({"left_out": result}) == ["not checked in full, grip: a/hand - part (holds the part)"]
 
 
 def test_a_record_without_any_says_so_and_one_that_is_silent_says_nothing() -> None:

@@ -27,8 +27,8 @@ PHASES = (
 def narrower(report: Report, by: float) -> Report:
     """The report with all of its distances and margins smaller, at the same times."""
     minima = {
-        kind: each if each.minimum is None else replace(each, minimum=each.minimum - by)
-        for kind, each in report.clearance.minima.items()
+        kind: value if value.minimum is None else replace(value, minimum=value.minimum - by)
+        for kind, value in report.clearance.minima.items()
     }
     return replace(report, clearance=replace(report.clearance, minima=minima))
 
@@ -74,7 +74,7 @@ def test_the_phase_is_that_of_the_worst_also_where_all_times_are_alike(
 ) -> None:
     record = summary(passed_run, alike)
 
-    assert {each["phase"] for each in record["clearance"].values() if each["at_s"] is not None} == {"work-2"}
+    assert {value["phase"] for value in record["clearance"].values() if value["at_s"] is not None} == {"work-2"}
     joint = record["joints"]["kuka"]["B2"]
     assert (joint["margin_phase"], joint["peak_velocity_phase"]) == ("work-1", "work-2")
     tool = record["accelerations"]["tools"]["kuka"]
@@ -87,7 +87,7 @@ def test_terminal_page_caption_and_link_name_the_same_phase(passed_run: Any, ali
     record = summary(passed_run, alike)
     at = record["clearance"]["whole"]["at_s"]
 
-    card = next(each for each in key_figures(record) if each["label"] == "Smallest clearance")
+    card = next(entry for entry in key_figures(record) if entry["label"] == "Smallest clearance")
     caption, page = worst_instant(record), overview_page(record, cell=passed_run.cell)
     (line,) = (line for line in figure_lines(record, "the report") if line.strip().startswith("smallest clearance"))
 

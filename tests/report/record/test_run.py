@@ -233,7 +233,7 @@ def test_conversion_leaves_no_noise() -> None:
 
 
 def test_failed_joints_are_reported_with_instant_and_place(passed_run: Any, failed_run: Any) -> None:
-    for run, is_kept in ((passed_run, True), (failed_run, None)):
+    for run, is_met in ((passed_run, True), (failed_run, None)):
         locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
         cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
 
@@ -242,7 +242,7 @@ def test_failed_joints_are_reported_with_instant_and_place(passed_run: Any, fail
         index = list(run.report.times).index(2.0)
         assert (record["robot"], record["joint"], record["from_s"], record["unit"]) == ("kuka", "B2", 2.0, "deg")
         assert record["position"] == pytest.approx(math.degrees(run.report.q["kuka"][index, 1]))
-        assert is_kept is None or record["tasks_kept"] is is_kept
+        assert is_met is None or record["tasks_kept"] is is_met
     assert record_of(passed_run)["locked_joints"] == []
 
 
@@ -307,22 +307,27 @@ def drifting(run: Any) -> Any:
         )
         for use in run.report.joints
     )
-    found = Repeatability(cycle_times=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
-    return replace(run, report=replace(run.report, repeatability=found))
+    result = Repeatability(cycle_times=np.array([0.0, 1.0, 2.0, 3.0]), drifts=drifts, closes=False)
+    return replace(run, report=replace(run.report, repeatability=result))
 
 
 def test_the_drift_of_every_joint_is_reported_by_task_or_for_all(passed_run: Any, pairwise_runs: Any) -> None:
     assert record_of(passed_run)["repeatability"] == {}
-    found = record_of(drifting(passed_run))["repeatability"]["all"]
+    result = record_of(drifting(passed_run))["repeatability"]["all"]
     runs = {name: drifting(run) for name, run in pairwise_runs.items()}
 
-    assert (found["cycles"], found["period_s"], found["ends_s"], found["closes"]) == (3, 1.0, [1.0, 2.0, 3.0], False)
-    assert (found["worst_drift_deg"], found["joint"], found["at_cycle"]) == (
+    assert (result["cycles"], result["period_s"], result["ends_s"], result["closes"]) == (
+        3,
+        1.0,
+        [1.0, 2.0, 3.0],
+        False,
+    )
+    assert (result["worst_drift_deg"], result["joint"], result["at_cycle"]) == (
         pytest.approx(math.degrees(0.02)),
         "kuka B2",
         3,
     )
-    assert found["per_joint"]["kuka"]["B2"]["drift"] == pytest.approx([0.0, math.degrees(0.01), -math.degrees(0.02)])
+    assert result["per_joint"]["kuka"]["B2"]["drift"] == pytest.approx([0.0, math.degrees(0.01), -math.degrees(0.02)])
     assert set(summary_of(runs)["repeatability"]) == set(runs)
 
 

@@ -18,7 +18,7 @@ from cellplan.report.record.schema import report_schema, series_schema
 from cellplan.report.record.series import series_json
 from cellplan.report.record.summary import summary_record
 
-pytestmark = pytest.mark.usefixtures("kept_solutions")
+pytestmark = pytest.mark.usefixtures("stored_solutions")
 
 ENDS = 25  # entries of a long list that are validated, from each end
 

@@ -100,30 +100,30 @@ def test_what_was_not_counted_is_null(passed_run: Any) -> None:
 
 def lengths(tree: Any) -> set[tuple[str, int]]:
     """Length of every array, by whether it belongs to instants or to steps; but for the clearance."""
-    found = set()
+    result = set()
     for name, value in tree.items():
         if isinstance(value, dict) and name != "clearance":
-            found |= lengths(value)
+            result |= lengths(value)
         elif isinstance(value, np.ndarray):
             is_of_steps = name.startswith("speed") or name in {"iterations", "slack"}
-            found.add(("steps" if is_of_steps else "instants", len(value)))
-    return found
+            result.add(("steps" if is_of_steps else "instants", len(value)))
+    return result
 
 
 @pytest.mark.parametrize(
-    ("most", "every", "kept"),
+    ("most", "every", "count"),
     [(4000, 1, 4001), (3999, 2, 2001), (1000, 4, 1001), (999, 5, 801), (600, 7, 573), (1, 4000, 2)],
 )
 def test_long_motions_are_thinned_and_keep_both_ends(
-    passed_run: Any, monkeypatch: pytest.MonkeyPatch, most: int, every: int, kept: int
+    passed_run: Any, monkeypatch: pytest.MonkeyPatch, most: int, every: int, count: int
 ) -> None:
     monkeypatch.setattr(module, "MAX_STEPS", most)
 
     tree = series(passed_run.report, motion_of(passed_run))
 
     assert tree["every"] == every
-    assert lengths(tree) == {("instants", kept), ("steps", kept - 1)}
-    assert kept <= most + 1
+    assert lengths(tree) == {("instants", count), ("steps", count - 1)}
+    assert count <= most + 1
     times = passed_run.report.times
     np.testing.assert_array_equal(tree["times_s"][:-1], times[:-1:every])
     assert tree["times_s"][-1] == times[-1]
@@ -179,14 +179,14 @@ def test_names_cannot_break_out_of_their_place(passed_run: Any) -> None:
 def test_the_clearance_of_each_class_is_found_again_at_its_minimum(passed_run: Any) -> None:
     record = written(passed_run)
     curves = record["series"]["clearance"]
-    minima = {key: each for key, each in record["clearance"].items() if key != "whole"}
+    minima = {key: value for key, value in record["clearance"].items() if key != "whole"}
 
-    assert set(curves) == {"times_s", *(f"{key}_mm" for key, each in minima.items() if each["pair"])}
-    for key, each in minima.items():
-        if each["pair"]:
-            kept = curves[f"{key}_mm"]
-            assert kept[curves["times_s"].index(each["at_s"])] == pytest.approx(each["minimum_mm"], rel=RELATIVE)
-            assert min(kept) == pytest.approx(each["minimum_mm"], rel=RELATIVE)
+    assert set(curves) == {"times_s", *(f"{key}_mm" for key, value in minima.items() if value["pair"])}
+    for key, value in minima.items():
+        if value["pair"]:
+            curve = curves[f"{key}_mm"]
+            assert curve[curves["times_s"].index(value["at_s"])] == pytest.approx(value["minimum_mm"], rel=RELATIVE)
+            assert min(curve) == pytest.approx(value["minimum_mm"], rel=RELATIVE)
 
 
 def test_without_curves_the_clearance_is_empty(passed_run: Any) -> None:

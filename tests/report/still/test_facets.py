@@ -16,7 +16,7 @@ VOLUMES = [
 ]
 
 
-@pytest.mark.parametrize(("solid", "volume"), VOLUMES, ids=lambda each: type(each).__name__)
+@pytest.mark.parametrize(("solid", "volume"), VOLUMES, ids=lambda entry: type(entry).__name__)
 def test_facets_enclose_the_volume_of_their_solid(solid: Solid, volume: float) -> None:
     corners = facets(solid, 48)
 

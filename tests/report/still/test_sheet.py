@@ -47,10 +47,12 @@ def from_the_front() -> Painter:
 def test_of_a_box_seen_from_the_front_one_face_is_drawn_where_it_is() -> None:
     text = from_the_front().paths([box("one", (0.1, 0.0, 0.0))], [])
 
-    (x, y), steps = ([int(each) for each in part.split()] for part in re.search(r"M([\d ]+)l([-\d ]+)z", text).groups())
+    (x, y), steps = (
+        [int(entry) for entry in part.split()] for part in re.search(r"M([\d ]+)l([-\d ]+)z", text).groups()
+    )
     corners = np.cumsum([(x, y), *zip(steps[::2], steps[1::2], strict=True)], axis=0)
     assert len(re.findall("z", text)) == 1
-    assert {tuple(each) for each in corners.tolist()} == {(500, 600), (700, 600), (700, 400), (500, 400)}
+    assert {tuple(entry) for entry in corners.tolist()} == {(500, 600), (700, 600), (700, 400), (500, 400)}
 
 
 def test_of_a_box_seen_from_a_corner_three_faces_are_drawn() -> None:
@@ -85,7 +87,7 @@ def test_a_picture_is_one_element_with_title_and_escaped_names() -> None:
     svg = still_svg(picture(box("a", (0.0, 0.0, 0.0)), mark=np.array([[0.1, 0.0, 0.0], [0.1125, 0.0, 0.0]])))
 
     root = ET.fromstring(svg)  # noqa: S314 - our own text
-    words = ["".join(each.itertext()) for each in root.iter(f"{NS}text")]
+    words = ["".join(entry.itertext()) for entry in root.iter(f"{NS}text")]
     assert root.find(f"{NS}title").text == "Clearance too small at 1.250 s"
     assert root.find(f"{NS}desc").text == "left & right. Robots: <arm>."
     assert {"<arm>", "12.5 mm", "left & right"} <= set(words)

@@ -23,12 +23,12 @@ def point(peak: float) -> dict[str, Any]:
 
 
 def record(**changes: Any) -> dict[str, Any]:
-    found = {"tools": {"holder": point(1.0), "pen": point(2.345)}, "part": {"corner": point(57.0)}, "not_judged": []}
+    results = {"tools": {"holder": point(1.0), "pen": point(2.345)}, "part": {"corner": point(57.0)}, "not_judged": []}
     joints = {
         "holder": {"A1": use(0.2), "A2": use(0.471, "stated")},
         "pen": {"B1": use(None, "unlimited", jerk=1234.0)},
     }
-    return {"joints": joints, "accelerations": found | changes}
+    return {"joints": joints, "accelerations": results | changes}
 
 
 def test_the_worst_joint_the_largest_jerk_tool_and_part_have_a_line_each() -> None:

@@ -29,10 +29,10 @@ class SomeVariables:
         return np.array([0.0] * len(BASES) + [0.15, 0.2, 0.3, 0.0])
 
     def base_twists(self, x: Array) -> Array:
-        found = np.zeros((len(self.cell.robots), 6, len(x)))
+        twists = np.zeros((len(self.cell.robots), 6, len(x)))
         for variable, (robot, component) in enumerate(BASES):
-            found[self.cell.index(robot), component, variable] = 1.0
-        return found
+            twists[self.cell.index(robot), component, variable] = 1.0
+        return twists
 
     def tools(self, x: Array) -> Mapping[str, Tool]:
         length, tilt, roll = x[len(BASES) : len(BASES) + 3]

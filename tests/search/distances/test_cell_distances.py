@@ -35,11 +35,11 @@ def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
 ) -> None:
     near = distances.near(x, q, WITHIN)
     built = Scene.from_cell(variables.placed(x))
-    found = built.near(q, WITHIN)
+    result = built.near(q, WITHIN)
     rules = {built.names(pair): pair.rule for pair in built.pairs}
     expected = {
         (built.names(built.pairs[row]), k): d
-        for row, k, d in zip(found.rows.tolist(), found.samples.tolist(), found.distances, strict=True)
+        for row, k, d in zip(result.rows.tolist(), result.samples.tolist(), result.distances, strict=True)
     }
     known = {
         (distances.pairs[row].names, k): d
@@ -51,8 +51,8 @@ def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
         if distance > -DEEP:  # a deeper overlap has no one way out
             assert expected[key] == pytest.approx(distance, abs=2.5e-3 if rules[key[0]] is Rule.PROCESS else 1e-6)
     once = {pair.names for pair in distances.pairs if pair.is_fixed}
-    own = {pair.names for pair in distances.pairs if pair.is_own and pair.is_fixed}
-    missed = {key for key in expected if key not in known and key[0] not in own and not (key[1] and key[0] in once)}
+    fixed = {pair.names for pair in distances.pairs if pair.within_robot and pair.is_fixed}
+    missed = {key for key in expected if key not in known and key[0] not in fixed and not (key[1] and key[0] in once)}
     assert {rules[names] for names, _ in missed} <= {Rule.PROCESS}
 
 
@@ -63,7 +63,7 @@ def test_derivatives_are_those_of_differences(
     dq = np.random.default_rng(5).normal(size=(len(q), nq, n))
     near = distances.near(x, q, WITHIN)
     exact = distances.derivatives(near, x, dq)
-    found = np.full_like(exact, np.nan)
+    result = np.full_like(exact, np.nan)
     keys = list(zip(near.pairs.tolist(), near.keys.tolist(), strict=True))
     for j, unit in enumerate(np.eye(n)):
         sides = []
@@ -72,8 +72,8 @@ def test_derivatives_are_those_of_differences(
             sides.append(
                 dict(zip(zip(side.pairs.tolist(), side.keys.tolist(), strict=True), side.distances, strict=True))
             )
-        found[:, j] = [(sides[0][key] - sides[1][key]) / (2.0 * STEP) for key in keys]
-    is_close = np.abs(found - exact) < 1e-3 * (1.0 + np.abs(found))
+        result[:, j] = [(sides[0][key] - sides[1][key]) / (2.0 * STEP) for key in keys]
+    is_close = np.abs(result - exact) < 1e-3 * (1.0 + np.abs(result))
     assert is_close.mean() > 0.95  # where faces or edges are parallel any of their nearest points may count
     shapes = is_close[:, -4:]
     assert shapes.mean() > 0.95

@@ -65,7 +65,7 @@ def facing(base: Array, x: float) -> Array:
 
 
 def cell_of(a: Robot, b: Robot, *things: tuple[str, Shape, Array], part: Part | None = None) -> Cell:
-    return make_cell(a, b, part=part, things=(floor(), *(thing(*each) for each in things)))
+    return make_cell(a, b, part=part, things=(floor(), *(thing(*entry) for entry in things)))
 
 
 KINDS = {
@@ -128,7 +128,7 @@ KINDS = {
 def verdict(cell: Cell) -> bool:
     """What the checks say of a cell at rest."""
     scene = Scene.from_cell(cell)
-    return certify(scene, AT_REST).is_kept and all(check.passed for check in check_mounting(scene, AT_REST))
+    return certify(scene, AT_REST).is_met and all(check.passed for check in check_mounting(scene, AT_REST))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -154,7 +154,7 @@ def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, 
     distances = CellDistances.of(Scene.from_cell(cell), variables)
     for apart in (0.05, -0.04):
         near = distances.near(np.array([apart + reach - 0.8, 0.0, 0.0]), AT_REST[:1], 0.1)
-        found = {
+        distances_by_name = {
             distances.pairs[pair].names[1]: (float(d), slope)
             for pair, d, slope in zip(
                 near.pairs.tolist(),
@@ -164,7 +164,7 @@ def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, 
             )
             if distances.pairs[pair].names[0] == "keep_out.aisle"
         }
-        distance, slope = found["b/pedestal" if reach else "b/base"]
+        distance, slope = distances_by_name["b/pedestal" if reach else "b/base"]
         assert distance == pytest.approx(apart, abs=1e-5)
         np.testing.assert_allclose(slope, (1.0, 0.0, 0.0), atol=1e-4)
 
@@ -180,8 +180,8 @@ def test_the_distances_of_what_stands_change_with_the_base_as_differences_say(ki
     row = next(row for row, pair in enumerate(near.pairs.tolist()) if set(distances.pairs[pair].names) == names)
     step = 1e-5
     for variable in range(3):
-        found = []
+        results = []
         for sign in (step, -step):
             other = distances.near(x + sign * np.eye(3)[variable], AT_REST[:1], 0.2)
-            found.append(float(other.distances[other.pairs == near.pairs[row]][0]))
-        assert exact[row, variable] == pytest.approx((found[0] - found[1]) / (2.0 * step), abs=1e-4)
+            results.append(float(other.distances[other.pairs == near.pairs[row]][0]))
+        assert exact[row, variable] == pytest.approx((results[0] - results[1]) / (2.0 * step), abs=1e-4)

@@ -33,9 +33,9 @@ def displaced(layout: Layouts, directions: Directions, step: float) -> Layouts:
     return Layouts(X_WB=X_WB, X_FT=X_FT, start=start, weights=weights)
 
 
-def off_by(found: Array, expected: Array) -> float:
+def off_by(result: Array, expected: Array) -> float:
     """Norm of the difference as a share of the norm of what is expected."""
-    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+    return float(np.linalg.norm(result - expected) / np.linalg.norm(expected))
 
 
 def test_derivatives_of_the_reference_cell_are_those_of_its_run(reference: SimpleNamespace) -> None:
@@ -53,31 +53,31 @@ def test_derivatives_of_the_reference_cell_are_those_of_its_run(reference: Simpl
     layout = reference.layouts.of_places(slice(6, 7))
     motion = run(job, layout)
     assert motion.is_followed.all()
-    found = differentiate(job, layout, motion.q[0], motion.qd[0], directions)
+    derivatives = differentiate(job, layout, motion.q[0], motion.qd[0], directions)
     ahead, behind = (run(job, displaced(layout, directions, sign * STEP)) for sign in (1.0, -1.0))
 
     q, qd = (np.moveaxis((getattr(ahead, name) - getattr(behind, name)) / (2 * STEP), 0, -1) for name in ("q", "qd"))
-    assert off_by(found.q, q) < 0.005
-    assert off_by(found.qd, qd) < 0.005
+    assert off_by(derivatives.q, q) < 0.005
+    assert off_by(derivatives.qd, qd) < 0.005
     for place in range(directions.count):
-        assert off_by(found.q[..., place], q[..., place]) < 0.005
-    for name, values in (("speeds", found.qd / job.limits.velocity[:, None]), ("beyond_upper", found.q)):
+        assert off_by(derivatives.q[..., place], q[..., place]) < 0.005
+    for name, values in (("speeds", derivatives.qd / job.limits.velocity[:, None]), ("beyond_upper", derivatives.q)):
         peaks = getattr(MotionFigures.of(job, motion), name)
-        sides = [getattr(MotionFigures.of(job, each), name).value for each in (ahead, behind)]
+        sides = [getattr(MotionFigures.of(job, entry), name).value for entry in (ahead, behind)]
         assert off_by(peaks.derivatives(0, values), ((sides[0] - sides[1]) / (2 * STEP)).T) < 0.005
 
 
 def one_node(cell: Cell, q: Array, *, seed: int) -> Job:
     """A job of one node, at which the tools are where a configuration has them and move at random."""
     X = np.moveaxis(seen_poses(cell, q.T), (0, 1), (3, 2))
-    moving, found = everyone(cell), relations(cell)
-    V = np.random.default_rng(seed).normal(size=(6, len(found), 1))
-    constraints = TaskConstraints.of(cell, found, moving)
+    moving, relations_ = everyone(cell), relations(cell)
+    V = np.random.default_rng(seed).normal(size=(6, len(relations_), 1))
+    constraints = TaskConstraints.of(cell, relations_, moving)
     return Job(
         cell=cell,
-        relations=tuple(found),
+        relations=tuple(relations_),
         moving=tuple(moving),
-        tasks=BatchTasks(cell, found, moving),
+        tasks=BatchTasks(cell, relations_, moving),
         constraints=constraints,
         settling=np.ones(cell.joint_count),
         limits=cell.joint_limits,
@@ -100,8 +100,8 @@ def smallest(linear: Linearisation, twists: Array, mobility: Array) -> Array:
     unit = np.diag((mobility > 0.0).astype(float))
     J = linear._arrow.twists(*linear._tasks.unstacked(unit)).reshape(-1, len(unit))
     root = np.sqrt(mobility)
-    found: Array = root * (np.linalg.pinv(J * root, rcond=RANK) @ twists.ravel())
-    return found
+    result: Array = root * (np.linalg.pinv(J * root, rcond=RANK) @ twists.ravel())
+    return result
 
 
 def settled_speeds(job: Job, layouts: Layouts, q: Array) -> tuple[Array, Array]:
@@ -136,6 +136,6 @@ def test_speeds_of_every_kind_of_cell_change_as_the_equations_say(name: str) -> 
 
     sides = [settled_speeds(job, displaced(layout, directions, s * FINE), q + s * (moved * FINE)) for s in (1.0, -1.0)]
 
-    found = np.concatenate([0.5 * (ahead - behind) for ahead, behind in zip(*sides, strict=True)])
+    result = np.concatenate([0.5 * (ahead - behind) for ahead, behind in zip(*sides, strict=True)])
     scale = np.abs(expected).max(axis=1, keepdims=True) + np.abs(expected[: len(expected) // 2]).max()
-    np.testing.assert_allclose(found / scale, expected / scale, atol=1e-5)
+    np.testing.assert_allclose(result / scale, expected / scale, atol=1e-5)

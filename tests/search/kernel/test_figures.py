@@ -27,8 +27,8 @@ def test_its_derivative_is_that_of_the_difference() -> None:
     peaks = Peaks.of(T, values(1.7), in_magnitude=True)
     rates = (values(1.7 + step) - values(1.7 - step))[0, :, :, None] / (2 * step)
     sides = [Peaks.of(T, values(1.7 + s * step), in_magnitude=True).value[0] for s in (1.0, -1.0)]
-    found = peaks.derivatives(0, rates)[:, 0]
-    np.testing.assert_allclose(found, (sides[0] - sides[1]) / (2 * step), rtol=1e-4, atol=1e-6)
+    slopes = peaks.derivatives(0, rates)[:, 0]
+    np.testing.assert_allclose(slopes, (sides[0] - sides[1]) / (2 * step), rtol=1e-4, atol=1e-6)
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])

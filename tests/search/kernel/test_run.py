@@ -32,20 +32,20 @@ def test_speeds_and_margins_are_those_of_the_accurate_mode(reference: SimpleName
 
     assert exact.is_followed.sum() > 6
     np.testing.assert_array_equal(motions.is_followed, exact.is_followed)
-    kept, figures = exact.is_followed, MotionFigures.of(reference.job, motions)
-    fastest, expected = figures.speeds.value[kept].max(axis=1), exact.speed_ratios[kept].max(axis=1)
+    followed, figures = exact.is_followed, MotionFigures.of(reference.job, motions)
+    fastest, expected = figures.speeds.value[followed].max(axis=1), exact.speed_ratios[followed].max(axis=1)
     np.testing.assert_allclose(fastest, expected, rtol=0.005)
-    np.testing.assert_allclose(figures.margins[kept], exact.margins[kept], atol=np.radians(0.1))
-    fastest = (np.abs(motions.qd[kept]) / reference.job.limits.velocity).max(axis=(1, 2))
+    np.testing.assert_allclose(figures.margins[followed], exact.margins[followed], atol=np.radians(0.1))
+    fastest = (np.abs(motions.qd[followed]) / reference.job.limits.velocity).max(axis=(1, 2))
     np.testing.assert_allclose(fastest, expected, rtol=0.005)  # at the nodes themselves as well
 
 
 def test_tools_are_on_their_paths_and_move_as_desired(reference: SimpleNamespace, motions: Motions) -> None:
     job, number = reference.job, int(np.flatnonzero(motions.is_followed)[0])
-    own = reference.layouts.of_places(slice(number, number + 1)).placement(job)
+    placement = reference.layouts.of_places(slice(number, number + 1)).placement(job)
     q, qd, step = motions.q[number].T, motions.qd[number].T, 1e-6
-    assert np.abs(job.tasks.errors(q, job.X, own)).max() < 2e-5
-    ahead, behind = (job.tasks.errors(q + sign * step * qd, job.X, own) for sign in (1.0, -1.0))
+    assert np.abs(job.tasks.errors(q, job.X, placement)).max() < 2e-5
+    ahead, behind = (job.tasks.errors(q + sign * step * qd, job.X, placement) for sign in (1.0, -1.0))
     np.testing.assert_allclose((behind - ahead) / (2.0 * step), job.V, atol=2e-3)
 
 
@@ -61,11 +61,11 @@ def test_a_candidate_out_of_reach_is_lost_and_leaves_the_others_alone(
     few = reference.layouts.of_places(slice(0, 3))
     X_WB = few.X_WB.copy()
     X_WB[1, 2, 0, 3] += 20.0
-    found = run(reference.job, Layouts(X_WB=X_WB, X_FT=few.X_FT, start=few.start, weights=few.weights))
-    assert found.lost_at[1] == -np.inf
-    kept = motions.is_followed[[0, 2]]
-    np.testing.assert_array_equal(found.is_followed[[0, 2]], kept)
-    np.testing.assert_allclose(found.q[[0, 2]][kept], motions.q[[0, 2]][kept], atol=1e-9)
+    result = run(reference.job, Layouts(X_WB=X_WB, X_FT=few.X_FT, start=few.start, weights=few.weights))
+    assert result.lost_at[1] == -np.inf
+    followed = motions.is_followed[[0, 2]]
+    np.testing.assert_array_equal(result.is_followed[[0, 2]], followed)
+    np.testing.assert_allclose(result.q[[0, 2]][followed], motions.q[[0, 2]][followed], atol=1e-9)
 
 
 def test_larger_weights_of_the_positioner_make_it_move_less(reference: SimpleNamespace, motions: Motions) -> None:
@@ -73,9 +73,9 @@ def test_larger_weights_of_the_positioner_make_it_move_less(reference: SimpleNam
     few = reference.layouts.of_places(slice(number, number + 1))
     weights = few.weights.copy()
     weights[:, :6] = 10.0
-    found = run(reference.job, Layouts(X_WB=few.X_WB, X_FT=few.X_FT, start=few.start, weights=weights))
-    assert found.is_followed.all()
-    norms = [np.linalg.norm(qd[:, :6]) for qd in (found.qd[0], motions.qd[number])]
+    result = run(reference.job, Layouts(X_WB=few.X_WB, X_FT=few.X_FT, start=few.start, weights=weights))
+    assert result.is_followed.all()
+    norms = [np.linalg.norm(qd[:, :6]) for qd in (result.qd[0], motions.qd[number])]
     assert norms[0] < 0.7 * norms[1]
 
 
@@ -86,12 +86,12 @@ def test_all_nodes_at_once_settle_near_the_motion_and_the_lost_are_run_again(
     layouts = reference.layouts.of_places(np.array([number, number]))
     given = motions.q[[number, number]] + 1e-3
     given[1] += 2.0
-    found = run_near(reference.job, layouts, given)
-    assert found.is_followed.all()
-    np.testing.assert_allclose(found.q[0], motions.q[number], atol=3e-3)
-    np.testing.assert_allclose(found.q[1], motions.q[number], atol=3e-3)
+    result = run_near(reference.job, layouts, given)
+    assert result.is_followed.all()
+    np.testing.assert_allclose(result.q[0], motions.q[number], atol=3e-3)
+    np.testing.assert_allclose(result.q[1], motions.q[number], atol=3e-3)
     speed = np.abs(motions.qd[number]).max()
-    np.testing.assert_allclose(found.qd[0], motions.qd[number], atol=0.005 * speed)
+    np.testing.assert_allclose(result.qd[0], motions.qd[number], atol=0.005 * speed)
 
 
 def test_rates_change_the_way_to_a_motion_but_not_the_motion(reference: SimpleNamespace, motions: Motions) -> None:
@@ -139,11 +139,11 @@ def test_a_desired_twist_that_jumps_within_the_motion_is_followed_from_either_si
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
     job, layouts = Job.of(cell, schedule, moving=moving, nodes=NODES), Layouts.of([cell], start[None])
 
-    found = run(job, layouts)
+    result = run(job, layouts)
 
     exact = screen_layouts(cell, schedule, Candidates.of([cell], start[None]), moving=moving, accuracy=1e-7)
     (jump,) = job.times[np.append(np.diff(job.times) == 0.0, False)]
     assert jump == pytest.approx(2.0, abs=1e-9)
-    assert found.is_followed.all()
-    fastest = (np.abs(found.qd[0]) / job.limits.velocity).max()
+    assert result.is_followed.all()
+    fastest = (np.abs(result.qd[0]) / job.limits.velocity).max()
     assert fastest == pytest.approx(exact.speed_ratios.max(), rel=0.005)

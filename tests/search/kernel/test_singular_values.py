@@ -24,23 +24,23 @@ def test_derivatives_are_those_of_the_values(name: str) -> None:
     layout, directions = Layouts.of([cell], q.T), Directions.none(job, 3)
     directions.base[:], directions.tool[:] = rng.normal(size=(2, robots, 6, 3))
     moved = rng.normal(size=(1, nq, 5))
-    found = SingularValues.of(job, layout, q.T, lambda: directions)
+    result = SingularValues.of(job, layout, q.T, lambda: directions)
     count = len(arms(job))
-    assert_as_the_checks_have_them(job, q, found)
+    assert_as_the_checks_have_them(job, q, result)
 
-    by = found.derivatives(np.zeros(count, dtype=np.intp), np.arange(count), moved)
+    by = result.derivatives(np.zeros(count, dtype=np.intp), np.arange(count), moved)
 
     sides = []
     for step in (STEP, -STEP):
         layouts = [layout, layout, *(displaced(layout, directions, step).of_places([at]) for at in range(3))]
         there = np.moveaxis(q.T[..., None] + step * moved, 2, 0)
-        each = [SingularValues.of(job, *both, lambda: directions) for both in zip(layouts, there, strict=True)]
-        sides.append(np.array([one.values[0] for one in each]).T)
+        values_ = [SingularValues.of(job, *both, lambda: directions) for both in zip(layouts, there, strict=True)]
+        sides.append(np.array([one.values[0] for one in values_]).T)
     expected = (sides[0] - sides[1]) / (2.0 * STEP)
     np.testing.assert_allclose(by, expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
 
 
-def assert_as_the_checks_have_them(job: Job, q: Array, found: SingularValues) -> None:
+def assert_as_the_checks_have_them(job: Job, q: Array, values: SingularValues) -> None:
     """The checks state 0 for a robot with fewer joints than its task has components."""
     cell = job.cell
     chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
@@ -54,6 +54,6 @@ def assert_as_the_checks_have_them(job: Job, q: Array, found: SingularValues) ->
     tasks = tuple(TaskSchedule(task=task, X_PT=at, **still) for task, at in zip(cell.tasks, X, strict=False))
     schedule = Schedule(times=np.zeros(1), tasks=tasks)
     by_robot = conditioning(cell, schedule, chains, q=positions, X_WP=X_WP, moving=job.moving).robots
-    for name, value, place in zip(found.names, found.values[0], arms(job), strict=True):
+    for name, value, place in zip(values.names, values.values[0], arms(job), strict=True):
         if len(cell.robot(name).model.joints) >= job.constraints.constrained[place].sum():
             assert value == pytest.approx(by_robot[name][0], abs=1e-7)

@@ -64,23 +64,23 @@ def test_a_base_on_the_floor_is_not_lowered() -> None:
     cell = load_cell(CELLS / "planar_pair.yaml").with_values({"environment.floor": {"plane": {"z_mm": 500}}})
     variables = SimpleNamespace(base=cell, placed=lambda _: cell)
 
-    found = BaseDisplacements.of(variables, np.zeros(0), AMOUNTS)  # type: ignore[arg-type] # all that it asks for
+    result = BaseDisplacements.of(variables, np.zeros(0), AMOUNTS)  # type: ignore[arg-type] # all that it asks for
 
-    assert [name for name in found.names if name.endswith("z_mm")] == []
-    assert len(found.names) == 6
+    assert [name for name in result.names if name.endswith("z_mm")] == []
+    assert len(result.names) == 6
 
 
 def test_displacements_take_the_sum_of_absolute_differences(pair: SimpleNamespace) -> None:
     problem, point, step = pair.problem, pair.point, 1e-3
-    found = worst(problem, point, pair.demands, Effort(keys=5))
+    result = worst(problem, point, pair.demands, Effort(keys=5))
 
     q, qd = np.zeros_like(point.q), np.zeros_like(point.q)
     for unit in np.diag(problem.upper):
         forward, back = (problem.evaluate(side * step * unit, point.start) for side in (1.0, -1.0))
         q += np.abs(forward.q - back.q) / (2.0 * step)
         qd += np.abs(forward.qd - back.qd) / (2.0 * step)
-    np.testing.assert_allclose(found.margins, q, atol=2e-3 * q.max())
-    np.testing.assert_allclose(found.speeds, qd / problem.limits.velocity, atol=5e-3 * found.speeds.max())
+    np.testing.assert_allclose(result.margins, q, atol=2e-3 * q.max())
+    np.testing.assert_allclose(result.speeds, qd / problem.limits.velocity, atol=5e-3 * result.speeds.max())
 
 
 def scenarios_of(pair: SimpleNamespace) -> ScenarioProblem:
@@ -94,10 +94,10 @@ def test_scenarios_are_the_motions_of_displaced_layouts(pair: SimpleNamespace) -
     point = problem.evaluate(pair.of.x, pair.point.start)
     corners = judged(pair.problem, problem.d, pair.point.start, pair.demands, Effort(keys=5))
 
-    found = Measures.of(problem, point, pair.demands, Effort(keys=5))
+    result = Measures.of(problem, point, pair.demands, Effort(keys=5))
 
-    assert found.cycle == pytest.approx(max(corner.cycle for corner in corners), rel=1e-9)
-    beyond = np.maximum(found.lower.value.max(axis=0), found.upper.value.max(axis=0))
+    assert result.cycle == pytest.approx(max(corner.cycle for corner in corners), rel=1e-9)
+    beyond = np.maximum(result.lower.value.max(axis=0), result.upper.value.max(axis=0))
     np.testing.assert_allclose(-beyond, np.min([corner.margins for corner in corners], axis=0), atol=1e-9)
     again = problem.evaluate(pair.of.x, pair.point.start, point)
     for d, near, q in zip(problem.d, np.split(point.q, 3), np.split(again.q, 3), strict=True):
@@ -114,9 +114,9 @@ def test_scenarios_have_the_derivatives_of_their_differences(pair: SimpleNamespa
     unit = problem.scale * np.where(np.arange(len(x)) % 2, 1.0, -0.5)
     forward, back = (problem.evaluate(x + side * step * unit, pair.point.start) for side in (1.0, -1.0))
 
-    for found, sides in ((by.q, (forward.q, back.q)), (by.qd, (forward.qd, back.qd))):
+    for derivatives, sides in ((by.q, (forward.q, back.q)), (by.qd, (forward.qd, back.qd))):
         differences = (sides[0] - sides[1]) / (2.0 * step)
-        np.testing.assert_allclose(found @ unit, differences, atol=5e-3 * np.abs(differences).max())
+        np.testing.assert_allclose(derivatives @ unit, differences, atol=5e-3 * np.abs(differences).max())
 
 
 def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace) -> None:
@@ -130,14 +130,14 @@ def test_a_robust_layout_keeps_its_demands_in_all_corners(pair: SimpleNamespace)
     signs = seeded_signs(np.random.default_rng(1), 8)[:6]
     before = Measures.of(scenarios_of(pair), scenarios_of(pair).evaluate(*begin), pair.demands, Effort(keys=5))
 
-    found = robust_layout(search, begin, signs=signs, rounds=2)
+    robust = robust_layout(search, begin, signs=signs, rounds=2)
 
-    assert found is not None
-    assert found.is_kept
-    assert len(found.corners) == found.worst_ones + found.ends + len(signs)
-    assert found.nominal <= found.cycle < before.cycle
-    finer = search.finer(GuardedProblem.like(pair.ready.problem(49)), found, Effort(iterations=1, keys=5))
-    assert finer.once(found.improved.x, found.improved.start) is not None
+    assert robust is not None
+    assert robust.is_met
+    assert len(robust.corners) == robust.worst_ones + robust.ends + len(signs)
+    assert robust.nominal <= robust.cycle < before.cycle
+    finer = search.finer(GuardedProblem.like(pair.ready.problem(49)), robust, Effort(iterations=1, keys=5))
+    assert finer.once(robust.improved.x, robust.improved.start) is not None
 
 
 def test_a_corner_moves_as_the_product_solves_it(pair: SimpleNamespace) -> None:
@@ -159,15 +159,15 @@ def test_tolerances_are_where_a_demand_is_missed(pair: SimpleNamespace) -> None:
     nominal = Measures.of(pair.problem, pair.point, pair.demands, effort)
     cycle = 1.002 * nominal.cycle
 
-    found = tolerances(pair.problem, pair.point.start, pair.demands, effort, cycle)
+    limits = tolerances(pair.problem, pair.point.start, pair.demands, effort, cycle)
 
-    limited = [each for each in found if each.first]
+    limited = [entry for entry in limits if entry.first]
     assert limited
-    for each in limited[:3]:
-        unit = np.array([each.sign if name == each.name else 0.0 for name in pair.problem.names])
+    for entry in limited[:3]:
+        unit = np.array([entry.sign if name == entry.name else 0.0 for name in pair.problem.names])
         inside, outside = judged(
             pair.problem,
-            np.array([each.extent * unit, each.missed * unit]),
+            np.array([entry.extent * unit, entry.missed * unit]),
             pair.point.start,
             pair.demands,
             effort,
@@ -180,11 +180,11 @@ def test_singular_values_of_arms_and_their_derivatives() -> None:
     six = displaced_cell(CELLS / "find_a_layout.yaml", ("robots.abb.base.x_mm=2400",))
     problem, point = six.problem, six.point
     nodes = np.array([0, 11], dtype=np.intp)
-    found = problem.distances(point, nodes, 0.01)
-    is_arm = found.pairs >= len(problem.bodies.pairs)
-    by = problem.distance_derivatives(point, found, problem.derivatives(point))[is_arm]
+    result = problem.distances(point, nodes, 0.01)
+    is_arm = result.pairs >= len(problem.bodies.pairs)
+    by = problem.distance_derivatives(point, result, problem.derivatives(point))[is_arm]
 
-    assert [problem.pair_names(int(pair))[0] for pair in found.pairs[is_arm][:3]] == ["kuka", "abb", "staubli"]
+    assert [problem.pair_names(int(pair))[0] for pair in result.pairs[is_arm][:3]] == ["kuka", "abb", "staubli"]
     model = six.ready.variables.base.robot("kuka").model
     assert len(model.joints) == 6
     unit = problem.upper * np.where(np.arange(len(problem.upper)) % 2, 1.0, -1.0)

@@ -47,7 +47,7 @@ def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) 
     here = Measures.of(problem, point, demands, effort)
     count = len(problem.names)
     rows = Linear.of(problem, here).rows(demands, effort.reserve, np.full(count, 0.5))
-    assert {each.kind for each in rows} == set(MeasureKind) - {MeasureKind.DURATION}
+    assert {row.kind for row in rows} == set(MeasureKind) - {MeasureKind.DURATION}
     z = np.random.default_rng(1).uniform(-1.0, 1.0, count)
     sides = []
     for sign in (1.0, -1.0):
@@ -55,13 +55,13 @@ def test_rows_are_the_derivatives_of_what_is_measured(initial: SimpleNamespace) 
         there = problem.evaluate(x, point.start, point)
         sides.append(Measures.of(problem, there, demands, effort))
     z = (sides[0].point.x - sides[1].point.x) / (2.0 * STEP * problem.scale)
-    for each in rows:
-        before, after = (side.values(each.kind, each.subjects, each.nodes) for side in reversed(sides))
-        seen = (after - before) / (2.0 * STEP * each.units)
+    for row in rows:
+        before, after = (side.values(row.kind, row.subjects, row.nodes) for side in reversed(sides))
+        seen = (after - before) / (2.0 * STEP * row.units)
         is_smooth = ~np.isnan(seen) & (
-            (each.lacks < 10.0) | (each.kind is not MeasureKind.DISTANCE)
+            (row.violations < 10.0) | (row.kind is not MeasureKind.DISTANCE)
         )  # none deep inside
-        errors = np.abs(seen - each.gradients @ z)[is_smooth]
+        errors = np.abs(seen - row.gradients @ z)[is_smooth]
         assert len(errors) >= 4
         assert np.quantile(errors, 0.9) <= 0.02 * np.abs(seen[is_smooth]).max()
 
@@ -70,20 +70,23 @@ def test_the_failing_layout_conforms_after_few_programs(initial: SimpleNamespace
     problem = initial.problem
     demands = Demands(objective=Objective.CONFORMING, margin=np.zeros(24), duration=4.0)
     assert not _keeps(initial, initial.point, demands)
-    found = improve(problem, problem.given, initial.start, demands)
-    assert found is not None
-    assert found.is_conforming
-    assert len(found.history) <= 6
-    again = problem.evaluate(found.x, found.start)  # node after node, not from the last nominal motion
+    improvement = improve(problem, problem.given, initial.start, demands)
+    assert improvement is not None
+    assert improvement.is_conforming
+    assert len(improvement.history) <= 6
+    again = problem.evaluate(improvement.x, improvement.start)  # node after node, not from the last nominal motion
     assert _keeps(initial, again, demands)
-    np.testing.assert_allclose(again.q, found.point.q, atol=np.radians(0.1))
+    np.testing.assert_allclose(again.q, improvement.point.q, atol=np.radians(0.1))
 
 
 def _keeps(initial: SimpleNamespace, point: object, demands: Demands) -> bool:
     measures = Measures.of(initial.problem, point, demands, Effort())
     limits, q = initial.problem.limits, measures.point.q
     return bool(
-        (q > limits.lower).all() and (q < limits.upper).all() and measures.lacks.max() < 0.0 and measures.cycle < 4.0
+        (q > limits.lower).all()
+        and (q < limits.upper).all()
+        and measures.violations.max() < 0.0
+        and measures.cycle < 4.0
     )
 
 

@@ -64,7 +64,7 @@ def test_curved_paths_agree_with_toppra() -> None:
 
     toy = replace(Toy(), acceleration=np.array([1.0, 0.5]))
     u = np.linspace(0.0, 2.0, 201)
-    limits = [np.stack([-each, each], axis=1) for each in (toy.limits.velocity, toy.acceleration)]
+    limits = [np.stack([-entry, entry], axis=1) for entry in (toy.limits.velocity, toy.acceleration)]
     theirs = algorithm.TOPPRA(
         [
             constraint.JointVelocityConstraint(limits[0]),
@@ -95,15 +95,15 @@ def test_derivatives_of_loads_are_those_of_differences() -> None:
     pace = Pace.of(toy, point)
     by = rng.normal(size=(2, *point.qd.shape, 3))
     rows, joints = (part.astype(np.intp) for part in np.indices((len(pace.places(pace.squares).at), 2)).reshape(2, -1))
-    found = pace.derivatives(pace.shapes(point.qd, point.qdd), pace.shapes(*by), rows, joints)
-    z = rng.normal(size=found.shape[1])
+    slopes = pace.derivatives(pace.shapes(point.qd, point.qdd), pace.shapes(*by), rows, joints)
+    z = rng.normal(size=slopes.shape[1])
     sides = []
     for sign in (STEP, -STEP):
         squares = pace.squares.copy()
         squares[pace.inner] *= 1.0 + sign * z[3:]
         moved = [part + sign * change @ z[:3] for part, change in zip((point.qd, point.qdd), by, strict=True)]
         sides.append(pace.loads(moved[0], moved[1], squares)[rows, joints])
-    np.testing.assert_allclose(found @ z, (sides[0] - sides[1]) / (2.0 * STEP), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(slopes @ z, (sides[0] - sides[1]) / (2.0 * STEP), rtol=1e-6, atol=1e-6)
 
 
 def cycle_of(x0: float, limit: float) -> float:
@@ -115,30 +115,30 @@ def cycle_of(x0: float, limit: float) -> float:
 @pytest.mark.parametrize(("limit", "best"), [(4.0, 2.0), (1.0, 3.0 - np.sqrt(1.5))])
 def test_shortest_retimed_cycle(limit: float, best: float) -> None:
     toy = replace(Toy(), acceleration=np.array([limit, np.inf]))
-    found = improve(toy, toy.given, NONE, DEMANDS, EXACT)
-    assert found is not None
-    assert found.is_conforming
-    assert found.x[0] == pytest.approx(best, abs=0.02)
-    assert found.cycle == pytest.approx(cycle_of(best, limit), rel=3e-3)
+    improvement = improve(toy, toy.given, NONE, DEMANDS, EXACT)
+    assert improvement is not None
+    assert improvement.is_conforming
+    assert improvement.x[0] == pytest.approx(best, abs=0.02)
+    assert improvement.cycle == pytest.approx(cycle_of(best, limit), rel=3e-3)
 
 
 def test_multipliers_are_the_derivative_of_the_retimed_cycle() -> None:
     toy = replace(Toy(), acceleration=np.array([1.0, np.inf]))
-    found = explain(toy, at(toy, 1.0), DEMANDS, EXACT)
-    assert found is not None
-    assert found.by_variable[0] == pytest.approx(-1.25, abs=0.02)
-    assert sum(each.share for each in found.binding) == pytest.approx(1.0, abs=0.01)
-    assert {each.kind for each in found.binding} == {MeasureKind.SPEED, MeasureKind.ACCELERATION}
+    explanation = explain(toy, at(toy, 1.0), DEMANDS, EXACT)
+    assert explanation is not None
+    assert explanation.by_variable[0] == pytest.approx(-1.25, abs=0.02)
+    assert sum(entry.share for entry in explanation.binding) == pytest.approx(1.0, abs=0.01)
+    assert {entry.kind for entry in explanation.binding} == {MeasureKind.SPEED, MeasureKind.ACCELERATION}
 
 
 def test_a_duration_is_kept_by_a_retimed_motion() -> None:
     toy = replace(Toy(), acceleration=np.array([1.0, np.inf]))
     demands = Demands(objective=Objective.CHANGE, margin=NONE, duration=4.5, timing=CycleTiming.RETIMED)
-    found = improve(toy, toy.given, NONE, demands, EXACT)
-    assert found is not None
-    assert found.is_conforming
-    assert found.cycle == pytest.approx(4.5, rel=1e-3)
-    assert cycle_of(float(found.x[0]), 1.0) == pytest.approx(4.5, rel=5e-3)
+    improvement = improve(toy, toy.given, NONE, demands, EXACT)
+    assert improvement is not None
+    assert improvement.is_conforming
+    assert improvement.cycle == pytest.approx(4.5, rel=1e-3)
+    assert cycle_of(float(improvement.x[0]), 1.0) == pytest.approx(4.5, rel=5e-3)
 
 
 def test_steps_of_rows_show_how_they_bend() -> None:

@@ -13,14 +13,14 @@ def test_answers_meet_the_conditions_of_an_optimum(seed: int) -> None:
     A, top = rng.normal(size=(rows, n)), rng.uniform(0.1, 1.0, rows)
     cost, weights = rng.normal(size=n), np.full(n, 1e-3)
     bounds = -np.full(n, 0.3), np.full(n, 0.3)
-    found = least(cost, weights, A, top, bounds)
-    assert found is not None
-    assert (A @ found.at - top).max() <= 1e-9
-    assert np.abs(found.at).max() <= 0.3 + 1e-9
-    assert found.multipliers.min() >= -1e-9
-    balance = cost + weights * found.at + A.T @ found.multipliers + found.of_bounds
+    result = least(cost, weights, A, top, bounds)
+    assert result is not None
+    assert (A @ result.at - top).max() <= 1e-9
+    assert np.abs(result.at).max() <= 0.3 + 1e-9
+    assert result.multipliers.min() >= -1e-9
+    balance = cost + weights * result.at + A.T @ result.multipliers + result.of_bounds
     np.testing.assert_allclose(balance, 0.0, atol=1e-7)
-    np.testing.assert_allclose(found.multipliers * (A @ found.at - top), 0.0, atol=1e-8)
+    np.testing.assert_allclose(result.multipliers * (A @ result.at - top), 0.0, atol=1e-8)
 
 
 def test_contradictory_rows_have_no_answer() -> None:

@@ -47,11 +47,11 @@ def problem(cell: Cell) -> PathProblem:
     start = np.concatenate([robot.start for robot in base.robots if robot.start is not None])
     scene, schedule = Scene.from_cell(base), scheduled(base)
     layout = variables.layouts(variables.given[None], start[None])
-    found = first_path(base, schedule, layout, count=COUNT, degree=5)
-    assert found is not None
+    path = first_path(base, schedule, layout, count=COUNT, degree=5)
+    assert path is not None
     return PathProblem(
         nodes=PathNodes.of(base, schedule, count=COUNT, degree=5, nodes=NODES),
-        path=PathVariables.of(base, "reis", found[0]),
+        path=PathVariables.of(base, "reis", path[0]),
         layout=variables,
         bodies=CellDistances.of(scene, variables),
         acceleration=acceleration_limits(scene),
@@ -61,9 +61,9 @@ def problem(cell: Cell) -> PathProblem:
 @pytest.fixture(scope="module")
 def point(cell: Cell, problem: PathProblem) -> Point:
     start = np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
-    found = problem.evaluate(problem.given, start)
-    assert found is not None
-    return found
+    point = problem.evaluate(problem.given, start)
+    assert point is not None
+    return point
 
 
 def test_nodes_stand_on_knots_and_either_side(problem: PathProblem) -> None:
@@ -90,16 +90,20 @@ def test_the_motion_is_the_one_that_the_written_cell_is_solved_to(
     inside &= np.insert(np.diff(problem.times) > 0.0, 0, True)
     times = problem.times[inside]
     np.testing.assert_allclose(motion.path.at(times), point.q[inside], rtol=0.0, atol=1e-5)
-    for order, found in ((1, point.qd), (2, point.qdd)):
+    for order, entry in ((1, point.qd), (2, point.qdd)):
         expected = motion.path.at(times, order)
-        assert np.linalg.norm(found[inside] - expected) < 2e-3 * np.linalg.norm(expected)
+        assert np.linalg.norm(entry[inside] - expected) < 2e-3 * np.linalg.norm(expected)
 
 
 def test_derivatives_are_those_of_central_differences(problem: PathProblem, point: Point) -> None:
-    found = problem.derivatives(point)
-    own, rng, step = len(problem.path.names), np.random.default_rng(3), 1e-5
+    slopes = problem.derivatives(point)
+    count, rng, step = len(problem.path.names), np.random.default_rng(3), 1e-5
     whole = rng.normal(size=len(problem.names)) * problem.scale
-    for left_out in (slice(0, 0), slice(own), slice(own, None)):  # all of them; of the layout only; of the path only
+    for left_out in (
+        slice(0, 0),
+        slice(count),
+        slice(count, None),
+    ):  # all of them; of the layout only; of the path only
         along = whole.copy()
         along[left_out] = 0.0
         ends = [problem.evaluate(point.x + side * step * along, point.start, point) for side in (1.0, -1.0)]
@@ -107,18 +111,18 @@ def test_derivatives_are_those_of_central_differences(problem: PathProblem, poin
         assert ends[1] is not None
         for name in ("q", "qd", "qdd"):
             expected = (getattr(ends[0], name) - getattr(ends[1], name)) / (2.0 * step)
-            error = np.linalg.norm(getattr(found, name) @ along - expected)
+            error = np.linalg.norm(getattr(slopes, name) @ along - expected)
             assert error < 1e-6 * np.linalg.norm(expected), name
 
 
 def test_singular_values_change_as_their_derivatives_say(problem: PathProblem, point: Point) -> None:
-    found, step = problem.arms(point), 1e-5
+    result, step = problem.arms(point), 1e-5
     nodes, arms = (part.ravel().astype(np.intp) for part in np.mgrid[0 : len(problem.times) : 20, 0:2])
-    gradients = found.derivatives(nodes, arms, problem.derivatives(point).q)
+    gradients = result.derivatives(nodes, arms, problem.derivatives(point).q)
     along = np.random.default_rng(5).normal(size=len(problem.names)) * problem.scale
 
     ends = [problem.evaluate(point.x + side * step * along, point.start, point) for side in (1.0, -1.0)]
-    values = [problem.arms(each).values[nodes, arms] for each in ends if each is not None]
+    values = [problem.arms(end).values[nodes, arms] for end in ends if end is not None]
     np.testing.assert_allclose(gradients @ along, (values[0] - values[1]) / (2.0 * step), rtol=1e-4, atol=1e-6)
 
 
@@ -128,15 +132,15 @@ def test_distances_change_as_their_derivatives_say(problem: PathProblem, point: 
     gradients = problem.distance_derivatives(point, near, problem.derivatives(point))
     along = np.random.default_rng(4).normal(size=len(problem.names)) * problem.scale
 
-    found = []
+    results = []
     for side in (1.0, -1.0):
         moved = problem.evaluate(point.x + side * step * along, point.start, point)
         assert moved is not None
         other = problem.distances(moved, keys, 0.04)
         places = zip(other.pairs.tolist(), other.nodes.tolist(), strict=True)
-        found.append(dict(zip(places, other.values.tolist(), strict=True)))
+        results.append(dict(zip(places, other.values.tolist(), strict=True)))
     rows = list(zip(near.pairs.tolist(), near.nodes.tolist(), strict=True))
-    expected = np.array([(found[0][row] - found[1][row]) / (2.0 * step) for row in rows])
+    expected = np.array([(results[0][row] - results[1][row]) / (2.0 * step) for row in rows])
     assert len(rows) > 10
     np.testing.assert_allclose(gradients @ along, expected, rtol=1e-3, atol=1e-4)
 

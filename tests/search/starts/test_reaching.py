@@ -39,13 +39,13 @@ def bounds(*free):
 
 def residuals(problem, index, goal, placed, q, node):
     """Largest difference of any entry of the tool poses from those of the path, by a chain of the placed robot."""
-    found = []
+    results = []
     for X_WB, X_FT, row in zip(placed.X_WB, placed.X_FT, q, strict=True):
         robot = problem.cell.robots[index]
         robot = replace(robot, X_WB=X_WB, tool=replace(robot.tool, X_FT=X_FT))
         X_RT = inverse(goal.X_WR) @ ScrewChain(robot).tool_poses(row[None])[0]
-        found.append(np.abs(X_RT - goal.X_RT[node]).max())
-    return np.array(found)
+        results.append(np.abs(X_RT - goal.X_RT[node]).max())
+    return np.array(results)
 
 
 def test_joints_and_base_bring_the_tool_to_the_start(abb):
@@ -97,7 +97,7 @@ def test_the_tool_follows_the_whole_path_round_its_corners(abb):
 def test_branches_are_those_of_the_inverse_kinematics_that_stay_within_limits_on_the_path(abb):
     problem, index, goal, arm, draws = abb
     robot = problem.cell.robots[index]
-    found = branches(problem, index, problem.variables.given, problem.start, generator("branches"))
+    result = branches(problem, index, problem.variables.given, problem.start, generator("branches"))
     seeds = generator("others").uniform(arm.lower, arm.upper, (200, 6))
     q = reaching_configurations(ScrewChain(robot), goal.relation, goal.X_RT[0], X_WP=goal.X_WR, seeds=seeds)
     q = within_limits(robot.model, q)
@@ -105,22 +105,22 @@ def test_branches_are_those_of_the_inverse_kinematics_that_stay_within_limits_on
     path, has_followed = followed(arm, goal, PlacedDraws(q=q, X_WB=bases, X_FT=tools))
     stays = has_followed & np.all((path >= arm.lower) & (path <= arm.upper), axis=(1, 2))
 
-    assert len(found) == stays.sum() >= 1
-    for each in q[stays]:
-        assert np.abs(found - each).max(axis=1).min() < 1e-4
+    assert len(result) == stays.sum() >= 1
+    for entry in q[stays]:
+        assert np.abs(result - entry).max(axis=1).min() < 1e-4
 
 
 def test_a_pool_has_bases_that_reach_and_says_what_became_of_the_others(turntable):
     problem, rng = turntable, generator("pool")
     (setting, *_), _ = settings(problem, rng, 1)
     (robot, *_) = problem.operators
-    found = pool(problem, robot, setting, rng)
-    layouts = problem.variables.layouts(found.x, np.tile(problem.start, (len(found.x), 1)))
+    result = pool(problem, robot, setting, rng)
+    layouts = problem.variables.layouts(result.x, np.tile(problem.start, (len(result.x), 1)))
     goal = problem.goal(robot, setting.X_WP)
-    placed = PlacedDraws(q=found.q, X_WB=layouts.X_WB[:, robot], X_FT=layouts.X_FT[:, robot])
+    placed = PlacedDraws(q=result.q, X_WB=layouts.X_WB[:, robot], X_FT=layouts.X_FT[:, robot])
     X_WT = placed.X_WB @ problem.arms[robot].flanges(placed.q) @ placed.X_FT
 
-    assert 0 < len(found.q) <= 40
+    assert 0 < len(result.q) <= 40
     np.testing.assert_allclose(X_WT[:, :3, 3], np.tile((goal.X_WR @ goal.X_RT[0])[:3, 3], (len(X_WT), 1)), atol=1e-6)
-    assert np.all((found.x >= problem.variables.lower) & (found.x <= problem.variables.upper))
-    assert found.drops.total() < DRAWS
+    assert np.all((result.x >= problem.variables.lower) & (result.x <= problem.variables.upper))
+    assert result.drops.total() < DRAWS

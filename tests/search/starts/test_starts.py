@@ -94,11 +94,11 @@ def test_what_reaches_nothing_is_named_with_the_reason():
     (operator, *_) = [robot.name for robot in cell.robots if robot.name not in cell.positioners]
     away = {f"robots.{operator}.base.x_mm": 9000.0, "layout": {"vary": {f"{operator}.base": {"x_mm": [8900, 9100]}}}}
     problem = prepared(cell.with_values(away))
-    found = StartGenerator(problem, seed=0).at(1)
+    result = StartGenerator(problem, seed=0).at(1)
 
-    assert found.starts == ()
+    assert result.starts == ()
     reason, far = f"'{operator}' follows its path from none of {DRAWS} bases: ", "does not reach the start of its path"
-    assert re.fullmatch(re.escape(reason + far) + rf", stays more than [6-8]\d00 mm away \({DRAWS}\)", found.reason)
+    assert re.fullmatch(re.escape(reason + far) + rf", stays more than [6-8]\d00 mm away \({DRAWS}\)", result.reason)
 
 
 def test_mirrored_operators_are_sampled_together(monkeypatch):
@@ -106,20 +106,20 @@ def test_mirrored_operators_are_sampled_together(monkeypatch):
     cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | MIRRORED)
     problem = prepared(cell)
     assert problem.freedom.groups(problem.operators) == [(1, 2)]
-    found = StartGenerator(problem, seed=0).at(1).starts[0]
+    result = StartGenerator(problem, seed=0).at(1).starts[0]
 
-    assert found.violation == 0.0
-    first, second = (problem.variables.placed(found.x).robot(name).X_WB for name in ("right", "other"))
+    assert result.violation == 0.0
+    first, second = (problem.variables.placed(result.x).robot(name).X_WB for name in ("right", "other"))
     np.testing.assert_allclose(second[:3, 3] * [1.0, -1.0, 1.0], first[:3, 3], atol=1e-12)
 
 
 def test_a_part_at_rest_is_sampled_where_it_can_be_reached():
     cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | AT_REST)
     problem = prepared(cell)
-    found = StartGenerator(problem, seed=0).at(1).starts[0]
+    result = StartGenerator(problem, seed=0).at(1).starts[0]
 
-    assert found.violation == 0.0
-    assert solve(problem.variables.cell(found.x, found.start)).passed
+    assert result.violation == 0.0
+    assert solve(problem.variables.cell(result.x, result.start)).passed
 
 
 def test_first_distances_are_those_of_the_moved_scene(four_robots):
@@ -129,24 +129,24 @@ def test_first_distances_are_those_of_the_moved_scene(four_robots):
     for _ in range(3):
         X_WB = np.array([robot.X_WB for robot in problem.cell.robots])
         X_WB[1:, :2, 3] += rng.uniform(-0.2, 0.2, (len(names) - 1, 2))
-        found = contacts.shortfalls(X_WB[None], problem.start[None])
+        result = contacts.shortfalls(X_WB[None], problem.start[None])
         near = scene.moved(dict(zip(names, X_WB, strict=True))).near(problem.start[None], 0.01)
         short = [
             scene.pairs[row].demand - distance
             for row, distance in zip(near.rows, near.distances, strict=True)
             if scene.pairs[row].rule == "clearance"
         ]
-        assert max(0.0, found.worst[0]) == pytest.approx(max([0.0, *short]), abs=1e-6)
+        assert max(0.0, result.worst[0]) == pytest.approx(max([0.0, *short]), abs=1e-6)
 
 
 def test_candidates_that_lose_their_path_are_dropped(four_robots):
     start = np.tile(four_robots.start, (2, 1))
     x = np.tile(four_robots.variables.given, (2, 1))
     x[1, four_robots.variables.names.index("robots.kuka.base.x_mm")] += 10.0
-    found = judged(four_robots, x, start)
+    judgement = judged(four_robots, x, start)
 
-    assert len(found.x) == 1
-    assert found.drops["loses a path"] == 1
+    assert len(judgement.x) == 1
+    assert judgement.drops["loses a path"] == 1
 
 
 @pytest.mark.slow
@@ -165,6 +165,6 @@ def test_real_arms_find_a_layout_from_the_corners_of_the_floor(name, shared_robo
         job=problem.job, variables=variables, bodies=problem.distances, acceleration=problem.acceleration
     )
     demands = Demands(objective=Objective.CONFORMING, margin=variables.margin, duration=float(problem.job.times[-1]))
-    found = (start for index in range(1, 5) for start in starts.at(index).starts[:2])
-    improved = (improve(layout, start.x, start.start, demands, Effort(iterations=25)) for start in found)
-    assert any(each is not None and each.is_conforming for each in improved)
+    result = (start for index in range(1, 5) for start in starts.at(index).starts[:2])
+    improved = (improve(layout, start.x, start.start, demands, Effort(iterations=25)) for start in result)
+    assert any(entry is not None and entry.is_conforming for entry in improved)

@@ -70,14 +70,14 @@ def twist(plus: Array, minus: Array, at: Array) -> Array:
 def test_directions_are_those_of_central_differences(cell: Cell, tied: dict[str, object]) -> None:
     variables = Variables.of(cell.with_values({"layout": {"vary": RANGES, **tied}}))
     x, start = some_values(variables), start_of(variables.base)
-    found, at = variables.directions(x), variables.layouts(x[None], start[None])
+    result, at = variables.directions(x), variables.layouts(x[None], start[None])
     for column, unit in enumerate(STEP * np.eye(len(x))):
         plus, minus = (variables.layouts((x + sign * unit)[None], start[None]) for sign in (1.0, -1.0))
         for robot in range(len(cell.robots)):
-            for poses, exact in (("X_WB", found.base), ("X_FT", found.tool)):
-                X = [getattr(each, poses)[0, robot] for each in (plus, minus, at)]
+            for poses, exact in (("X_WB", result.base), ("X_FT", result.tool)):
+                X = [getattr(entry, poses)[0, robot] for entry in (plus, minus, at)]
                 assert np.abs(twist(*X) - exact[robot, :, column]).max() <= 1e-8
-        for numbers, exact in (("start", found.start), ("weights", found.weights)):
+        for numbers, exact in (("start", result.start), ("weights", result.weights)):
             rate = (getattr(plus, numbers)[0] - getattr(minus, numbers)[0]) / (2.0 * STEP)
             assert np.abs(rate - exact[:, column]).max() <= 1e-8
 
@@ -129,10 +129,10 @@ def test_mirrored_bases_are_mirror_images(cell: Cell, plane: str) -> None:
     assert variables.names == tuple(f"robots.kuka.base.{key}" for key in sides)
     placed = variables.placed(some_values(variables, share=3.0))
     axis = 1 if plane == "xz" else 0
-    M, own = np.eye(4), np.diag([1.0, -1.0, 1.0, 1.0])
+    M, mirror_ = np.eye(4), np.diag([1.0, -1.0, 1.0, 1.0])
     M[axis, axis], M[axis, 3] = -1.0, 0.2
     yaw_only = placed.robot("kuka").X_WB
-    assert np.abs(M @ yaw_only @ own - placed.robot("abb").X_WB).max() <= 1e-12
+    assert np.abs(M @ yaw_only @ mirror_ - placed.robot("abb").X_WB).max() <= 1e-12
 
 
 def test_a_cost_is_that_of_all_that_moves(cell: Cell) -> None:
@@ -164,17 +164,17 @@ def test_choices_keep_one_task_a_robot(cell: Cell) -> None:
         "abb.branch": True,
     }
     choices = Choices.of(cell.with_values({"layout.vary": ranges}))
-    found = list(choices.values())
+    result = list(choices.values())
     assert choices.branches == ("abb",)
     swapped = {"tasks.circle.robot": "abb", "tasks.rhombus.robot": "kuka"}
     autos = {"robots.kuka.start_deg": "auto", "robots.abb.start_deg": "auto"}
-    assert found == [
+    assert result == [
         {},
         {"motion.mode": "pairwise"},
         {**swapped, **autos},
         {**swapped, "motion.mode": "pairwise", **autos},
     ]
-    assert [task.robot for task in cell.with_values(found[2]).tasks] == ["abb", "kuka", "staubli"]
+    assert [task.robot for task in cell.with_values(result[2]).tasks] == ["abb", "kuka", "staubli"]
 
 
 def test_a_part_at_rest_elsewhere_is_the_robots_the_other_way() -> None:
@@ -188,10 +188,10 @@ def test_a_part_at_rest_elsewhere_is_the_robots_the_other_way() -> None:
     q = motion_of(variables.base, variables.layouts(x[None], start[None]))
     written = variables.cell(x, q[0])
     assert np.abs(motion_of(written, Layouts.of([written], q[:1])) - q).max() <= 5e-6
-    found = variables.directions(x)
+    result = variables.directions(x)
     for column, unit in enumerate(STEP * np.eye(2)):
         X = [variables.layouts((x + sign * unit)[None], start[None]).X_WB[0, 0] for sign in (1.0, -1.0, 0.0)]
-        assert np.abs(twist(*X) - found.base[0, :, column]).max() <= 1e-8
+        assert np.abs(twist(*X) - result.base[0, :, column]).max() <= 1e-8
 
 
 def test_sliding_joints_start_by_their_keys() -> None:

@@ -13,7 +13,7 @@ from cellplan.io.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.io.robots.urdf.document import read_document
 from cellplan.io.robots.urdf.drawings import edges_of_box, small_bodies
 from cellplan.io.robots.urdf.flange import axis_along, choose_flange, flange_remarks, is_along, last_joint
-from cellplan.io.robots.urdf.limits import Lacking, lacking_limits, limits_to_state, with_blanks
+from cellplan.io.robots.urdf.limits import MissingLimits, limits_to_state, missing_limits, with_blanks
 from cellplan.io.robots.urdf.load import UrdfOptions, UrdfStructure, urdf_model, urdf_structure
 from cellplan.io.robots.urdf.locks import lock_positions
 from cellplan.io.robots.urdf.tree import UrdfTree, build_tree, joints_to, links_in_order, moving_leaves
@@ -49,8 +49,8 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
     structure = urdf_structure(tree, flange, options)
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs)
     bodies = link_bodies(tree, structure.configuration, shelf)
-    lacking = lacking_limits(structure.roles.driven, {})
-    model = None if lacking else urdf_model(structure, bodies, limits={}, source=path.name)
+    missing = missing_limits(structure.roles.driven, {})
+    model = None if missing else urdf_model(structure, bodies, limits={}, source=path.name)
     return RobotDescription(
         name=tree.document.name,
         source=path.name,
@@ -59,11 +59,11 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
         is_usual=is_usual,
         flanges=choices,
         X_BF=structure.configuration.X_BL[flange],
-        joints=tuple(_joints(structure, lacking, model)),
+        joints=tuple(_joints(structure, missing, model)),
         mimics=tuple(_mimics(tree)),
         locked=lock_positions(structure.unlocked, {}),
         links=tuple(_links(structure, bodies)),
-        cell_lines=_cell_lines(structure, lacking, written=written, options=options),
+        cell_lines=_cell_lines(structure, missing, written=written, options=options),
         model=model,
         remarks=(
             *flange_remarks(tree, flange, is_named=not is_usual or options.flange is not None),
@@ -142,10 +142,10 @@ def _flange(tree: UrdfTree, choices: tuple[FlangeChoice, ...], desired: str | No
 
 
 def _joints(
-    structure: UrdfStructure, lacking: tuple[Lacking, ...], model: RobotModel | None
+    structure: UrdfStructure, missing: tuple[MissingLimits, ...], model: RobotModel | None
 ) -> Iterator[DescribedJoint]:
     """The driven joints, with the limits of those that follow them where none is missing."""
-    without = {entry.joint.name: entry for entry in lacking}
+    without = {entry.joint.name: entry for entry in missing}
     complete = {} if model is None else {joint.name: joint for joint in model.joints}
     for joint in structure.roles.driven:
         limits, gap = complete.get(joint.name, joint.limit), without.get(joint.name)
@@ -186,7 +186,9 @@ def _links(structure: UrdfStructure, bodies: tuple[Body, ...]) -> Iterator[LinkS
             yield LinkSize(link=link.name, shapes=shapes, size=size_along(solids, X_BL))
 
 
-def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, written: str, options: UrdfOptions) -> str:
+def _cell_lines(
+    structure: UrdfStructure, missing: tuple[MissingLimits, ...], *, written: str, options: UrdfOptions
+) -> str:
     """The robot as a cell states it, with … for every value that the file lacks."""
     entry: dict[str, object] = {"model": written}
     if options.package_dirs:
@@ -197,7 +199,7 @@ def _cell_lines(structure: UrdfStructure, lacking: tuple[Lacking, ...], *, writt
     if structure.unlocked:
         are_few = len(structure.unlocked) <= NAMED_LOCKS
         entry["locked"] = lock_positions(structure.unlocked, {}) if are_few else {OTHERS: "zero"}
-    if lacking:
-        entry["limits"] = limits_to_state(lacking)
+    if missing:
+        entry["limits"] = limits_to_state(missing)
     name = BEYOND_NAME.sub("_", structure.tree.document.name)[:LONGEST_NAME]
     return with_blanks(cell_lines(name, entry))

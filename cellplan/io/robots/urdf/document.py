@@ -184,8 +184,8 @@ def _link(element: Element) -> UrdfLink:
     """One link; a link that is drawn but has no collision body gets the drawn one."""
     name = _name(element)
     owner = f"link '{name}'"
-    drawn = element.all("collision") or element.all("visual")
-    return UrdfLink(name=name, element=element, solids=tuple(read_solid(solid, owner) for solid in drawn))
+    shapes = element.all("collision") or element.all("visual")
+    return UrdfLink(name=name, element=element, solids=tuple(read_solid(solid, owner) for solid in shapes))
 
 
 def read_solid(element: Element, owner: str) -> UrdfSolid:

@@ -18,26 +18,26 @@ VISIBLE: Final = 0.01  # [m] by which an edge is shorter at least
 LARGEST_DRAWING: Final = 20_000_000  # [bytes] of a mesh file that is read for nothing but its size
 
 
-def drawn_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -> list[tuple[Solid, Array]]:
+def shape_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -> list[tuple[Solid, Array]]:
     """Shapes that a link draws, with their poses in its frame, shape (4, 4); none where one cannot be read.
 
     Args:
         largest: Bytes of the largest mesh file that is read.
     """
-    drawn: list[tuple[Solid, Array]] = []
+    solids: list[tuple[Solid, Array]] = []
     try:
         for element in link.element.all("visual"):
             solid = read_solid(element, f"link '{link.name}'")
             if not isinstance(solid.shape, UrdfMesh):
-                drawn.append((solid.shape, solid.X_LS))
+                solids.append((solid.shape, solid.X_LS))
                 continue
             path, _ = find_mesh(solid.shape.uri, shelf.folder, package_dirs=shelf.package_dirs, within=shelf.within)
             if path.stat().st_size > largest:
                 return []
-            drawn.append((shelf.mesh(solid.shape, element), solid.X_LS))
+            solids.append((shelf.mesh(solid.shape, element), solid.X_LS))
     except InputError:
         return []
-    return drawn
+    return solids
 
 
 def edges_of_box(solids: Sequence[tuple[Solid, Array]]) -> Array:
@@ -65,10 +65,10 @@ def small_bodies(
     for link in links_in_order(tree):
         X_LB = inverse(configuration.X_BL[link.name])
         solids = [(body.shape, X_LB @ body.X_BS) for body in bodies if body.link_name == link.name]
-        drawn = drawn_solids(link, apart, largest=LARGEST_DRAWING) if link.element.all("collision") and solids else []
-        if not drawn:
+        parts = shape_solids(link, apart, largest=LARGEST_DRAWING) if link.element.all("collision") and solids else []
+        if not parts:
             continue
-        edges, size = edges_of_box(solids), edges_of_box(drawn)
+        edges, size = edges_of_box(solids), edges_of_box(parts)
         if np.any((edges < FAR_SMALLER * size) & (size - edges > VISIBLE)):
             ours, theirs = (" x ".join(f"{1e3 * edge:.3g}" for edge in box) for box in (edges, size))
             carries = configuration.carrier[link.name] == configuration.carrier[flange]

@@ -32,7 +32,7 @@ class Range:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Lacking:
+class MissingLimits:
     """What a driven joint lacks."""
 
     joint: UrdfJoint
@@ -40,30 +40,30 @@ class Lacking:
     reason: str  # what the URDF states instead
 
 
-def lacking_limits(joints: Iterable[UrdfJoint], cell: Mapping[str, StatedLimits]) -> tuple[Lacking, ...]:
+def missing_limits(joints: Iterable[UrdfJoint], cell: Mapping[str, StatedLimits]) -> tuple[MissingLimits, ...]:
     """The joints that have no complete limits, neither by the URDF nor by the cell."""
-    entries = (_lacking(joint, cell.get(joint.name, StatedLimits())) for joint in joints)
-    return tuple(lacking for lacking in entries if lacking.keys)
+    entries = (_missing_of(joint, cell.get(joint.name, StatedLimits())) for joint in joints)
+    return tuple(entry for entry in entries if entry.keys)
 
 
-def lacking_error(lacking: Sequence[Lacking]) -> InputError:
+def missing_error(missing: Sequence[MissingLimits]) -> InputError:
     """What to write in the cell when limits are missing, in one line for all joints, at least one."""
     reasons: dict[str, list[str]] = {}
-    for entry in lacking:
+    for entry in missing:
         reasons.setdefault(entry.reason, []).append(entry.joint.name)
-    limits = with_blanks(flow_text(limits_to_state(lacking)))
+    limits = with_blanks(flow_text(limits_to_state(missing)))
     cure = f"state limits in the cell, with a number for each {BLANK}: `limits: {limits}`"
-    if any(entry.joint.kind == "continuous" and len(entry.keys) > 1 for entry in lacking):
+    if any(entry.joint.kind == "continuous" and len(entry.keys) > 1 for entry in missing):
         cure += "; a continuous joint turns without end with `wrap: true` in place of its lower and upper limit"
-    if len(lacking) == 1:
-        return lacking[0].joint.error(f"{lacking[0].reason}: {cure}")
+    if len(missing) == 1:
+        return missing[0].joint.error(f"{missing[0].reason}: {cure}")
     why = "; ".join(f"{', '.join(names)}: {reason}" for reason, names in reasons.items())
-    return lacking[0].joint.element.error(f"{len(lacking)} joints lack limits ({why}): {cure}")
+    return missing[0].joint.element.error(f"{len(missing)} joints lack limits ({why}): {cure}")
 
 
-def limits_to_state(lacking: Iterable[Lacking]) -> dict[str, dict[str, str]]:
+def limits_to_state(missing: Iterable[MissingLimits]) -> dict[str, dict[str, str]]:
     """The limits that a cell has to state, with … for every number."""
-    return {entry.joint.name: dict.fromkeys(entry.keys, BLANK) for entry in lacking}
+    return {entry.joint.name: dict.fromkeys(entry.keys, BLANK) for entry in missing}
 
 
 def with_blanks(text: str) -> str:
@@ -88,7 +88,7 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
         limits = tightest(limits, _through(follower))
     lower, upper, velocity = limits.lower, limits.upper, limits.velocity
     if lower is None or upper is None or velocity is None:
-        raise lacking_error([_lacking(joint, cell)])
+        raise missing_error([_missing_of(joint, cell)])
     if not velocity > 0.0:
         raise joint.error(f"expected a positive velocity limit, got {in_user_unit(joint, velocity, '/s')}")
     if not lower < upper:
@@ -104,14 +104,14 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     )
 
 
-def _lacking(joint: UrdfJoint, cell: StatedLimits) -> Lacking:
+def _missing_of(joint: UrdfJoint, cell: StatedLimits) -> MissingLimits:
     """What one joint lacks; no keys where it is complete."""
     limits, unit = tightest(joint.limit.stated, cell), unit_of(joint).name
     ends = [] if cell.wraps else [name for name in ("lower", "upper") if getattr(limits, name) is None]
     keys = [f"{name}_{unit}" for name in ends] + ([f"velocity_{unit}_s"] if limits.velocity is None else [])
     reasons = [joint.limit.position_fault or _range_reason(joint)] if ends else []
     reasons += [joint.limit.velocity_fault or _stated(joint, "velocity")] if limits.velocity is None else []
-    return Lacking(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
+    return MissingLimits(joint=joint, keys=tuple(keys), reason=" and ".join(dict.fromkeys(reasons)))
 
 
 def _range_reason(joint: UrdfJoint) -> str:

@@ -15,7 +15,7 @@ from cellplan.io.robots.urdf.document import UrdfDocument, UrdfJoint, read_docum
 from cellplan.io.robots.urdf.drawings import small_bodies
 from cellplan.io.robots.urdf.flange import choose_flange, flange_remarks
 from cellplan.io.robots.urdf.gripper import GripperState, gripper_locks, require_opposed
-from cellplan.io.robots.urdf.limits import joint_range, lacking_error, lacking_limits
+from cellplan.io.robots.urdf.limits import joint_range, missing_error, missing_limits
 from cellplan.io.robots.urdf.locks import require_sound_locks, rest_position, unlocked_error, unlocked_joints
 from cellplan.io.robots.urdf.moveit_limits import MoveitLimits, with_moveit_limits
 from cellplan.io.robots.urdf.tree import (
@@ -117,8 +117,8 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     roles, document = structure.roles, tree.document
     _require_plain_names(roles)
     _require_known_limits(document, roles, options.limits)
-    lacking = lacking_limits(roles.driven, options.limits)
-    errors = [lacking_error(lacking)] if lacking else []
+    missing = missing_limits(roles.driven, options.limits)
+    errors = [missing_error(missing)] if missing else []
     if structure.unlocked and not options.locks_others:
         errors.insert(0, unlocked_error(tree, structure.flange, structure.unlocked, options.locked))
     if errors:

@@ -62,10 +62,10 @@ def check_spelling(links: Iterable[Element], joints: Iterable[Element], remarks:
     """
     for link in links:
         owner = f"link '{link.attributes.get('name', '')}'"
-        drawn = link.all("collision") or link.all("visual")
-        needed = () if link.all("collision") else ("collision",) if drawn else ("collision", "visual")
+        shapes = link.all("collision") or link.all("visual")
+        needed = () if link.all("collision") else ("collision",) if shapes else ("collision", "visual")
         _check_children(link, needed, owner, remarks=remarks)
-        for solid in drawn:
+        for solid in shapes:
             _check_children(solid, NEEDED_CHILDREN[solid.tag], owner, remarks=remarks)
             for child in solid.children:
                 _check_attributes(child, owner, remarks=remarks)

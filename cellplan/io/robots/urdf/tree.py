@@ -88,11 +88,11 @@ def build_tree(document: UrdfDocument) -> UrdfTree:
 
 def joints_to(tree: UrdfTree, link: str) -> list[UrdfJoint]:
     """Joints that move a link, in the order of the tree: those on its way, and for a mimic joint the one it follows."""
-    way = [joint for joint in tree.path_to(link) if not joint.is_fixed]
+    passed = [joint for joint in tree.path_to(link) if not joint.is_fixed]
     leaders = [
-        tree.document.joints[it.mimic.leader] for it in way if it.mimic and it.mimic.leader in tree.document.joints
+        tree.document.joints[it.mimic.leader] for it in passed if it.mimic and it.mimic.leader in tree.document.joints
     ]
-    moving = [joint for joint in (*way, *leaders) if joint.mimic is None]
+    moving = [joint for joint in (*passed, *leaders) if joint.mimic is None]
     return [joint for joint in tree.joints if joint in moving]
 
 

@@ -7,7 +7,7 @@ from cellplan.geometry.shapes import Solid
 from cellplan.geometry.transforms import Array
 from cellplan.io.robots.urdf.bodies import MeshShelf
 from cellplan.io.robots.urdf.document import read_document
-from cellplan.io.robots.urdf.drawings import drawn_solids
+from cellplan.io.robots.urdf.drawings import shape_solids
 from cellplan.io.robots.urdf.load import UrdfOptions
 
 
@@ -32,6 +32,6 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
     visuals: list[Visual] = []
     for link in read_document(path, options.xacro).links.values():
         if link.element.all("collision"):
-            drawn = drawn_solids(link, shelf)
-            visuals += [Visual(link=link.name, shape=shape, X_LS=X_LS) for shape, X_LS in drawn]
+            solids = shape_solids(link, shelf)
+            visuals += [Visual(link=link.name, shape=shape, X_LS=X_LS) for shape, X_LS in solids]
     return tuple(visuals)

@@ -90,8 +90,8 @@ class FilteredMotion:
         while passed < 1.0:
             tasks = self._problem.first_order(k, q)
             xdot = tasks.twist + self._problem.gain * (tasks.error + passed * step * tasks.twist)
-            share, speeds = self._sub_step(tasks, xdot, moves, longest=1.0 - passed, step=step)
-            q = q + speeds * (share * step)
+            share, velocities = self._sub_step(tasks, xdot, moves, longest=1.0 - passed, step=step)
+            q = q + velocities * (share * step)
             passed, evaluations = passed + share, evaluations + 1
         return StepResult(q=q, iterations=evaluations)
 
@@ -112,12 +112,12 @@ class FilteredMotion:
             settled = relaxation.after(self._settings.gain_per_s * share * step, theta) * moves[:, None]
             B = self._law(settled, J)
             at_work = B @ xdot / root
-            speeds = at_work + tasks.bounded(lateral, velocities=at_work)
-            fastest = float(np.max(np.abs(speeds), initial=0.0))
+            velocities = at_work + tasks.bounded(lateral, velocities=at_work)
+            fastest = float(np.max(np.abs(velocities), initial=0.0))
             swing = self._problem.gain * float(np.linalg.norm(J @ B, 2))
             if fastest * share * step <= LONGEST_MOVE and swing * share * step <= FARTHEST:
                 self.theta = settled
-                return share, speeds
+                return share, velocities
             share /= 2.0
         raise DivergedError(
             f"the filtered inverse asks for a joint speed of {fastest:.3g} rad/s or m/s: shorten motion.step_s, lower "

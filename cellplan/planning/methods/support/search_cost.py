@@ -46,8 +46,8 @@ class Expansion:
     @property
     def n(self) -> Array:
         """Second derivative of the actual by each joint, shape (m, nq); zero for those that turn on no circle."""
-        axes, ways, weights = self.bends
-        return weights * (_cross(axes, ways) * self.turns).reshape(self.a.shape)
+        axes, derivatives, weights = self.bends
+        return weights * (_cross(axes, derivatives) * self.turns).reshape(self.a.shape)
 
     @property
     def cost(self) -> float:
@@ -141,10 +141,10 @@ class SearchCost:
         poses[:, :, 3] -= (R @ p[:, :, None])[:, :, 0]
         x = poses[self._owners, :, self._columns]
         turns = self._signs[self._owners][:, None, :] * w[self._owners]
-        ways = self._signs[self._owners][:, None, :] * (self._is_tip * v[self._owners]) - skew(x) @ turns
+        derivatives = self._signs[self._owners][:, None, :] * (self._is_tip * v[self._owners]) - skew(x) @ turns
         scale = self._weights.reshape(-1, 1)
-        a = scale * ways.reshape(x.size, -1)
-        return _Geometry(q=q, signs=self._signs, x=x, a=a, bends=(turns, ways, scale))
+        a = scale * derivatives.reshape(x.size, -1)
+        return _Geometry(q=q, signs=self._signs, x=x, a=a, bends=(turns, derivatives, scale))
 
     def _require_parallel_axes(self, q: Array) -> None:
         """Refuse once and for all what a search cannot take apart."""

@@ -11,11 +11,13 @@ from cellplan.model.cell import Cell
 
 READ_BACK: Final = 2e-14  # [rad] or [m] by which a position may change when it is written and read back
 ROUNDING_MARGIN: Final = 1e-12  # [rad] or [m] kept from position limits: what many steps add up to in rounding
-BRAKING_ROOM: Final = 1e-6  # [-] of the acceleration that planned braking leaves unused: the clock's steps are rounded
+BRAKING_MARGIN: Final = (
+    1e-6  # [-] of the acceleration that planned braking leaves unused: the clock's steps are rounded
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpeedBounds:
+class VelocityBounds:
     """Lowest and highest joint speeds in [rad/s] or [m/s], shape (nq,) each; the lower never above the upper."""
 
     lower: Array
@@ -56,7 +58,7 @@ class JointBounds:
                     f"{scale * lower:g} .. {scale * upper:g} {unit}: quadratic_program needs a start within them"
                 )
 
-    def at(self, q: Array, speeds: Array, dt: float) -> SpeedBounds:
+    def at(self, q: Array, velocities: Array, dt: float) -> VelocityBounds:
         """Bounds for the step that follows.
 
         Position limits and the room to brake before them come first, then the speed limit, then the acceleration
@@ -65,19 +67,19 @@ class JointBounds:
 
         Args:
             q: Positions, shape (nq,).
-            speeds: Speeds of the step before; 0 at the start, where all joints are at rest, shape (nq,).
+            velocities: Speeds of the step before; 0 at the start, where all joints are at rest, shape (nq,).
             dt: Length of the step in [s].
         """
         top = _less(self._velocity, 2.0 * READ_BACK / dt)
         acceleration = _less(self._acceleration, 4.0 * READ_BACK / dt**2)
-        planned = (1.0 - BRAKING_ROOM) * acceleration
+        planned = (1.0 - BRAKING_MARGIN) * acceleration
         above = np.maximum(self._upper - ROUNDING_MARGIN - q, 0.0)
         below = np.maximum(q - self._lower - ROUNDING_MARGIN, 0.0)
         highest = np.minimum(top, braking_speed(above, planned, dt))
         lowest = -np.minimum(top, braking_speed(below, planned, dt))
-        return SpeedBounds(
-            lower=np.clip(speeds - acceleration * dt, lowest, highest),
-            upper=np.clip(speeds + acceleration * dt, lowest, highest),
+        return VelocityBounds(
+            lower=np.clip(velocities - acceleration * dt, lowest, highest),
+            upper=np.clip(velocities + acceleration * dt, lowest, highest),
         )
 
 

@@ -28,7 +28,7 @@ def arm(*frames: tuple[str, str], kind: str = "revolute") -> list[str]:
     """An arm whose last axis is x of its hand, and frames on that."""
     lines = ['<link name="base"/>', '<link name="arm"/>', '<link name="hand"/>', joint("a1", "base", "arm")]
     lines += [joint("a2", "arm", "hand", f'<axis xyz="-1 0 0"/>{LIMIT}', kind=kind)]
-    return [*lines, *(line for each in frames for line in each)]
+    return [*lines, *(line for frame in frames for line in frame)]
 
 
 def loaded(folder: Path, *frames: tuple[str, str], flange: str | None = None, kind: str = "revolute") -> UrdfRobot:

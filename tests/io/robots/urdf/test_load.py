@@ -249,9 +249,9 @@ def test_a_mesh_used_twice_is_read_once_and_mirrored_faces_still_look_outward(tm
 
 
 def test_a_link_without_collision_is_represented_by_what_is_drawn(tmp_path: Path) -> None:
-    drawn = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
-    hidden = drawn + collision('<sphere radius=".5"/>')
-    model = read_urdf(write(tmp_path, link("base", drawn), link("tip", hidden), joint("a1", "base", "tip")))
+    visual = '<visual><geometry><box size="1 2 3"/></geometry></visual>'
+    hidden = visual + collision('<sphere radius=".5"/>')
+    model = read_urdf(write(tmp_path, link("base", visual), link("tip", hidden), joint("a1", "base", "tip")))
 
     assert [body.shape for body in model.bodies] == [Box((1.0, 2.0, 3.0)), Sphere(0.5)]
 

@@ -43,10 +43,10 @@ def test_a_pair_of_links_stands_for_all_their_bodies(tmp_path: Path) -> None:
     two = boxed("base", "0.2 0.2 0.2").replace("</link>", "") + boxed("x", "1 1 1").split(">", 1)[1]
     robot = read_urdf(write_urdf(tmp_path, two, boxed("tip", "0.1 0.1 0.1"), joint("a1", "base", "tip", LIMIT)))
 
-    found = disabled_bodies(srdf(tmp_path, off("tip", "base"), off("base", "base"), off("tip", "ghost")), robot)
+    disabled = disabled_bodies(srdf(tmp_path, off("tip", "base"), off("base", "base"), off("tip", "ghost")), robot)
 
     reason = "disabled in arm.srdf as 'Never'"
-    assert found == (("tip", "base", reason), ("tip", "base_2", reason))
+    assert disabled == (("tip", "base", reason), ("tip", "base_2", reason))
 
 
 def test_a_pair_without_a_reason_says_so(tmp_path: Path, model: RobotModel) -> None:

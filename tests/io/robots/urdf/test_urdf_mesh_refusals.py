@@ -95,9 +95,9 @@ def test_unsound_meshes_are_refused_with_the_line_of_their_link(tmp_path: Path, 
 
 
 def test_a_drawn_link_whose_drawing_cannot_be_read_is_not_dropped(tmp_path: Path) -> None:
-    drawn = '<link name="base"><visual><geometry><mesh filename="a.dae"/></geometry></visual></link>'
+    link = '<link name="base"><visual><geometry><mesh filename="a.dae"/></geometry></visual></link>'
     (tmp_path / "a.dae").write_text("<COLLADA/>")
-    assert refused(tmp_path, drawn, *ARM[1:]) == (
+    assert refused(tmp_path, link, *ARM[1:]) == (
         "r.urdf:2: link 'base' (visual, used as it has no collision element): mesh 'a.dae': a.dae: expected a <scene> "
         "that shows a <visual_scene>, got none"
     )

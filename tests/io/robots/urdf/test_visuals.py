@@ -44,17 +44,17 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_visual_elements_are_read_where_a_link_has_bodies_of_its_own(folder: Path) -> None:
-    found = read_visuals(folder / "arm.urdf", UrdfOptions())
+    visuals = read_visuals(folder / "arm.urdf", UrdfOptions())
 
-    assert [(each.link, type(each.shape)) for each in found] == [("base", Box), ("arm", Mesh)]
-    assert np.array_equal(found[0].X_LS[:3, 3], [0.0, 0.0, 0.2])
+    assert [(entry.link, type(entry.shape)) for entry in visuals] == [("base", Box), ("arm", Mesh)]
+    assert np.array_equal(visuals[0].X_LS[:3, 3], [0.0, 0.0, 0.2])
 
 
 def test_a_page_draws_them_on_their_links_and_the_bodies_of_all_others(folder: Path) -> None:
     (folder / "cell.yaml").write_text(CELL)
     scene = view(ViewRequest(path=folder / "cell.yaml"))[0]["scenes"][0]
 
-    assert [(each["link"], each["pose"][3::4]) for each in scene["visuals"]] == [
+    assert [(visual["link"], visual["pose"][3::4]) for visual in scene["visuals"]] == [
         (-1, [0.0, 0.0, 0.2]),
         (0, [0.6, 0.0, 0.3]),
     ]

@@ -80,7 +80,7 @@ def test_a_package_is_found_by_its_folder_or_its_manifest_or_above_the_file(
         (tmp_path / "elsewhere").mkdir()
         package.rename(tmp_path / "elsewhere" / "renamed")
 
-    document = read_document(path, XacroSettings(package_dirs=tuple(tmp_path / each for each in dirs)))
+    document = read_document(path, XacroSettings(package_dirs=tuple(tmp_path / entry for entry in dirs)))
 
     assert list(document.links) == ["base", "left_upper", "left_lower"]
     assert not any("package" in remark for remark in document.remarks)

@@ -24,7 +24,7 @@ def integrated(J, theta, *, until, steps):
     return theta
 
 
-def drawn(seed, shape, *, lost=0):
+def random_jacobian(seed, shape, *, lost=0):
     """A Jacobian with some singular values exactly zero, and a filter that has nothing to do with it."""
     rng = np.random.default_rng(seed)
     U, s, Vt = np.linalg.svd(rng.normal(size=shape), full_matrices=False)
@@ -35,14 +35,14 @@ def drawn(seed, shape, *, lost=0):
 @pytest.mark.parametrize("shape", [(2, 3), (6, 6), (6, 9), (5, 3), (1, 4)])
 @pytest.mark.parametrize("lost", [0, 1])
 def test_the_exact_step_is_what_fine_integration_gives(shape, lost):
-    J, theta = drawn(1, shape, lost=lost)
+    J, theta = random_jacobian(1, shape, lost=lost)
     expected = integrated(J, theta, until=0.3, steps=3000)  # error of order 4: (50 * 1e-4)^4 at most
     np.testing.assert_allclose(Relaxation(J).after(0.3, theta), expected, atol=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1), lost=st.integers(0, 2), time=st.floats(0.0, 10.0), share=st.floats(0.0, 1.0))
 def test_two_steps_are_one(seed, lost, time, share):
-    J, theta = drawn(seed, (3, 5), lost=lost)
+    J, theta = random_jacobian(seed, (3, 5), lost=lost)
     relaxation = Relaxation(J)
     twice = relaxation.after((1 - share) * time, relaxation.after(share * time, theta))
     np.testing.assert_allclose(twice, relaxation.after(time, theta), atol=1e-11 * (1 + 1 / _smallest(J)))
@@ -55,12 +55,12 @@ def _smallest(J):
 
 @pytest.mark.parametrize("shape", [(2, 3), (6, 6), (18, 24)])
 def test_it_settles_at_the_moore_penrose_inverse(shape):
-    J, theta = drawn(2, shape)
+    J, theta = random_jacobian(2, shape)
     np.testing.assert_allclose(Relaxation(J).after(1e9, theta), np.linalg.pinv(J), rtol=1e-9, atol=1e-9)
 
 
 def test_with_fewer_joints_than_rows_it_settles_at_the_inverse_too():
-    J, theta = drawn(3, (6, 4))
+    J, theta = random_jacobian(3, (6, 4))
     np.testing.assert_allclose(Relaxation(J).after(1e9, theta), np.linalg.pinv(J), atol=1e-10)
 
 
@@ -80,7 +80,7 @@ def test_one_number_follows_the_closed_form_and_grows_with_the_root_of_time_at_m
 
 
 def test_it_begins_at_the_pseudo_inverse_which_is_bounded_in_a_singularity():
-    J, _ = drawn(6, (3, 5))
+    J, _ = random_jacobian(6, (3, 5))
     np.testing.assert_allclose(Relaxation(J).inverse(), np.linalg.pinv(J), atol=1e-12)
     for s in (0.0, 1e-9, 0.5 * LEAST_AT_START):
         start = Relaxation(np.diag([1.0, 1.0, s])).inverse()

@@ -22,10 +22,10 @@ def stopping_distance(v, a, dt):
     return distance
 
 
-@given(room=st.floats(1e-6, 3.0), a=st.floats(0.1, 100.0), dt=st.sampled_from([1e-3, 2e-3, 0.01, 0.05]))
-def test_braking_speed_stops_exactly_at_the_limit(room, a, dt):
-    v = float(braking_speed(np.array([room]), np.array([a]), dt)[0])
-    assert stopping_distance(v, a, dt) == pytest.approx(room, rel=1e-9)  # some thousand additions
+@given(margin=st.floats(1e-6, 3.0), a=st.floats(0.1, 100.0), dt=st.sampled_from([1e-3, 2e-3, 0.01, 0.05]))
+def test_braking_speed_stops_exactly_at_the_limit(margin, a, dt):
+    v = float(braking_speed(np.array([margin]), np.array([a]), dt)[0])
+    assert stopping_distance(v, a, dt) == pytest.approx(margin, rel=1e-9)  # some thousand additions
 
 
 def test_braking_speed_becomes_the_root_law_for_short_steps():

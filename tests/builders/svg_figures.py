@@ -47,7 +47,7 @@ def _panel(node: ET.Element) -> DrawnPanel:
         values = high - (high - low) * y / height
         return np.stack([left + (right - left) * x / width, 10.0**values if is_log else values], axis=-1)
 
-    words = [each.text or "" for each in node.findall(f"{SVG}text")]
+    words = [text.text or "" for text in node.findall(f"{SVG}text")]
     panel = DrawnPanel(words[0] if words else "", ((right - left) / width, (high - low) / height))
     for path in box.findall(f"{SVG}path"):
         kind, points = path.get("class"), back(corners(path.get("d", "")))
@@ -66,15 +66,15 @@ def _panel(node: ET.Element) -> DrawnPanel:
 
 def corners(path: str) -> list[tuple[float, float]]:
     """Corners of a path."""
-    found, x, y = [], 0, 0
+    points, x, y = [], 0, 0
     for letter, text in STEP.findall(path):
-        numbers = [int(each) for each in NUMBER.findall(text)]
+        numbers = [int(number) for number in NUMBER.findall(text)]
         for one, other in zip(numbers[::2], numbers[1::2], strict=True) if letter in "Ml" else ():
             x, y = (one, other) if letter == "M" else (x + one, y + other)
-            found.append((x, y))
+            points.append((x, y))
         if letter in "HhVv":
             (length,) = numbers
             x = {"H": length, "h": x + length}.get(letter, x)
             y = {"V": length, "v": y + length}.get(letter, y)
-            found.append((x, y))
-    return found
+            points.append((x, y))
+    return points
