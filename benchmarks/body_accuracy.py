@@ -20,12 +20,12 @@ import pinocchio as pin
 import trimesh
 from sections import table
 
+from cellplan.files.robots.bundled import bundled_names, load_bundled
+from cellplan.files.robots.joint_table import read_robot_table
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_about, transform_points
-from cellplan.io.robots.bundled import bundled_names, load_bundled
-from cellplan.io.robots.joint_table import read_robot_table
-from cellplan.model.robot import BASE, Body, RobotModel
+from cellplan.model.robot.robot import BASE, Body, RobotModel
 
 SPREAD: Final = 20_000  # [-] points on the surface of one mesh
 DIRECTIONS: Final = 500  # [-] in which the hull of a mesh is taken

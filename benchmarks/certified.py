@@ -20,13 +20,13 @@ from coal_shapes import coal_shape
 
 from cellplan import load_cell
 from cellplan.checks.clearance.check import check_clearance
-from cellplan.collision.bodies import BodyPoses
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Obstacle
-from cellplan.model.motion import Schedule
-from cellplan.model.report import ClearanceClass
+from cellplan.model.cell.cell import Cell, Obstacle
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -22,12 +22,12 @@ from sections import Goal, Section, table
 
 from cellplan import load_cell
 from cellplan.checks.clearance.check import check_clearance
-from cellplan.collision.distance import measure
-from cellplan.collision.engine import Engine
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
-from cellplan.model.report import ClearanceReport
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import ClearanceReport
+from cellplan.scene.collision.distance import measure
+from cellplan.scene.collision.engine import Engine
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -20,10 +20,10 @@ from cellplan import load_cell
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Cylinder, Mesh
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Obstacle
-from cellplan.model.motion import Schedule
-from cellplan.model.robot import Body
+from cellplan.model.cell.cell import Cell, Obstacle
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.robot.robot import Body
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 SAMPLES: Final = 400  # [-] of 10 ms

@@ -17,11 +17,11 @@ import numpy as np
 
 from cellplan import export_programs, load_cell, open_gate, solve, write_run
 from cellplan.errors import CellplanError
-from cellplan.export.dialect import Dialect
-from cellplan.export.timed_rows import cycle_of
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
-from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, RobotRows
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.timed_rows import cycle_of
 
 ROOT = Path(__file__).resolve().parent.parent
 CELL = ROOT / "cells" / "four_robots.yaml"

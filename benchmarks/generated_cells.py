@@ -16,11 +16,11 @@ from typing import Final
 import numpy as np
 
 from cellplan import Cell, Robot, load_cell
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.task import Task
+from cellplan.model.task.task import Task
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import part_pose
 from cellplan.planning.start.inverse_kinematics import reaching_configurations, within_limits
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 FEWEST, MOST = 2, 60  # [-] robots, the positioner among them; the plate of more would be larger than a part may be
 PITCH: Final = 1.1  # [m] between neighbouring bases along the ring

@@ -20,9 +20,9 @@ from screening import candidates_near, job
 from sections import Goal, Section, digits, table
 
 from cellplan.certify.certify import certify
-from cellplan.collision.distance import measure
 from cellplan.geometry.transforms import Array, pose, rotation_exp
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
+from cellplan.scene.collision.distance import measure
 from cellplan.scene.scene import Scene
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.figures import MotionFigures

@@ -25,9 +25,8 @@ from cellplan import CellplanError, load_cell
 from cellplan.checks.joints.limits import check_joints, joint_uses
 from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion, Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, MethodName
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.modes import plan_phases
@@ -35,6 +34,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 mpl.use("agg")

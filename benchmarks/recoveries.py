@@ -19,19 +19,19 @@ import numpy as np
 from coal_shapes import coal_shape
 
 from cellplan.errors import CellplanError
+from cellplan.files.cell.load import load_cell
+from cellplan.files.run.joint_tables import parse_table
 from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Mesh, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.io.cell.load import load_cell
-from cellplan.io.run.joint_tables import parse_table
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.robot import BASE
+from cellplan.jobs.recover.recover import Recovery, recover
+from cellplan.jobs.recover.state import RunPlaces
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.model.robot.robot import BASE
 from cellplan.model.units import MM
-from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.gate.open_gate import open_gate
-from cellplan.pipeline.recover.recover import Recovery, recover
-from cellplan.pipeline.recover.state import RunPlaces
-from cellplan.pipeline.solve import solve
-from cellplan.pipeline.write_run import write_run
+from cellplan.runs.gate.open_gate import open_gate
+from cellplan.runs.solve import solve
+from cellplan.runs.write_run import write_run
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -14,12 +14,12 @@ from job import Arm, Array, Job
 from cellplan import Cell, load_cell
 from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.transforms import inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.motion import Schedule
+from cellplan.model.motion.motion import Schedule
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells/four_robots.yaml"
 BETWEEN: Final = 4  # [-] points between two samples that are evaluated

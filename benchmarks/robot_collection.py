@@ -31,10 +31,10 @@ import xacro
 from xacro import substitution_args
 
 from cellplan.cli.main import run
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import Array, inverse, rotation_vector
-from cellplan.io.cell.load import load_cell
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot
+from cellplan.model.cell.cell import Robot
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 URDFS: Final = ("example-robot-data==6.0.0", "131 MB to download, 415 MB unpacked")
 XACROS: Final = ("rtb-data==2.0.0", "60 MB to download, 147 MB unpacked")

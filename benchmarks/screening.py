@@ -24,7 +24,7 @@ from sections import Goal, Section, digits, table
 
 from cellplan import Cell, load_cell
 from cellplan.geometry.transforms import rotation_about
-from cellplan.model.motion import Schedule
+from cellplan.model.motion.motion import Schedule
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, Screening, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks

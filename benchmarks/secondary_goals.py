@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from cellplan import load_cell
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Motion
 from cellplan.model.settings.solver import SecondaryEntry
 from cellplan.model.solver import Integrator
 from cellplan.planning.path.build import build_toolpath

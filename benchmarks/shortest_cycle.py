@@ -13,8 +13,8 @@ from typing import Final
 from sections import Goal, Section, machine, table
 
 from cellplan import load_cell
-from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
-from cellplan.pipeline.fastest.timed_program import TimedProgram
+from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
+from cellplan.jobs.fastest.timed_program import TimedProgram
 
 CELL: Final = Path(__file__).resolve().parent.parent / "cells" / "four_robots.yaml"
 USUAL: Final = {"full_speed_in_s": [0.25, 0.25, 0.25, 0.15]}

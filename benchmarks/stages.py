@@ -29,7 +29,7 @@ BEGUN = "CELLPLAN_BENCHMARK_BEGUN"  # the moment in [s] at which the process was
 STARTING, IMPORTS, REST = "starting Python", "importing libraries", "the rest"
 CHILDREN = "in child processes, meanwhile"
 STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
-    "reading the cell and its robots": {"cellplan.io.cell.load": ("load_cell",)},
+    "reading the cell and its robots": {"cellplan.files.cell.load": ("load_cell",)},
     "bodies, hulls and pairs": {"cellplan.scene.scene": ("Scene.from_cell",)},
     "paths and times of the tools": {
         "cellplan.planning.path.build": ("build_toolpath",),
@@ -41,13 +41,13 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     },
     "joint motion": {"cellplan.planning.plan_motion": ("plan_motion",)},
     "writing and reading back the tables": {
-        "cellplan.io.run.joint_tables": ("render_table", "parse_table", "replace_header")
+        "cellplan.files.run.joint_tables": ("render_table", "parse_table", "replace_header")
     },
     "verifying tools, joints, conditioning": {"cellplan.checks.verify": ("verify_motion", "with_clearance")},
     "certifying the clearance": {"cellplan.checks.clearance.check": ("check_clearance",)},
     "copying the process, waiting for the copy": {
         "cellplan.guard.forked": ("ForkedWork.begin",),
-        "cellplan.pipeline.early_clearance": ("EarlyClearance.of",),
+        "cellplan.runs.early_clearance": ("EarlyClearance.of",),
     },
     "plots": {
         "cellplan.report.plots.run": ("run_figures",),
@@ -55,7 +55,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
         "cellplan.report.plots.rendering": ("pictures",),
     },
     "picture of the worst instant, floor plan": {
-        "cellplan.pipeline.cell_drawings": ("phase_drawings", "phase_floor_plan"),
+        "cellplan.runs.drawings.cell_drawings": ("phase_drawings", "phase_floor_plan"),
     },
     "report.json": {
         "cellplan.report.record.run": ("run_record",),
@@ -63,10 +63,10 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
     },
     "report.html": {"cellplan.report.page.render": ("report_page",)},
     "writing the run folder": {
-        "cellplan.io.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
-        "cellplan.io.cell.write": ("render_cell",),
-        "cellplan.io.run.manifest": ("render_manifest",),
-        "cellplan.pipeline.write_run": ("versions",),
+        "cellplan.files.run.folder": ("RunFolder.__enter__", "RunFolder.write_bytes", "RunFolder.__exit__"),
+        "cellplan.files.cell.write": ("render_cell",),
+        "cellplan.files.run.manifest": ("render_manifest",),
+        "cellplan.runs.write_run": ("versions",),
     },
     "telling the result": {"cellplan.report.text.run": ("summary_lines",)},
 }

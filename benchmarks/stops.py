@@ -17,17 +17,17 @@ import numpy as np
 from coal_shapes import coal_shape
 
 from cellplan import load_cell, solve
-from cellplan.certify.free_clocks import MINIMUM_TOL, watched_pairs
+from cellplan.certify.free_clocks.free_clocks import MINIMUM_TOL, watched_pairs
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.stops import one_stop
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.pinocchio_model import CombinedModel, LinkState
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.stops import StopReport, running_on
+from cellplan.model.robot.robot import BASE
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
-from cellplan.model.stops import StopReport, running_on
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel, LinkState
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

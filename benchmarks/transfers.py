@@ -17,18 +17,18 @@ import numpy as np
 from coal_shapes import coal_shape
 
 from cellplan.errors import TransferNotFoundError
+from cellplan.files.robots.bundled import load_bundled
+from cellplan.files.robots.urdf.load import load_urdf
 from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Solid, Sphere, bounding_sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
-from cellplan.io.robots.bundled import load_bundled
-from cellplan.io.robots.urdf.load import load_urdf
-from cellplan.model.cell import Cell, Mode, MotionSettings, Obstacle, Part, Robot, Tool
+from cellplan.model.cell.cell import Cell, Mode, MotionSettings, Obstacle, Part, Robot, Tool
 from cellplan.model.origin import Origin
-from cellplan.model.robot import Body, RobotModel
+from cellplan.model.robot.robot import Body, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
+from cellplan.runs.plan.retiming import RowLimits, joint_bounds
 from cellplan.scene.scene import Scene
 
 BUNDLED: Final = ("kuka_kr6", "abb_irb1600_8_145", "staubli_rx160", "ur5e", "ur10e", "kuka_kr16_2", "staubli_rx90l")
@@ -97,7 +97,7 @@ def scene_with(model: RobotModel, things: Sequence[Obstacle]) -> Scene:
 
 
 def retimer_of(scene: Scene) -> Retimer:
-    """The limits of all joints, as the pipeline has them."""
+    """The limits of all joints, as the planner has them."""
     limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
     return Retimer(
         bounds=limits.bounds, step=limits.step, feed_share=lambda sigma: np.zeros(len(sigma)), slower=limits.slower

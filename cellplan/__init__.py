@@ -41,107 +41,107 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from cellplan.errors import CellplanError
-    from cellplan.io.cell.load import load_cell
-    from cellplan.io.cell_errors import load_errors
-    from cellplan.model.cell import Cell, Part, Robot
-    from cellplan.model.motion import Motion, Program
-    from cellplan.model.report import Check, Report
-    from cellplan.model.task import Task
-    from cellplan.model.toolpath import Toolpath
-    from cellplan.model.verified_run import VerifiedRun
-    from cellplan.pipeline.base_map.grid import BaseGrid
-    from cellplan.pipeline.base_map.judged import base_map, write_base_map
-    from cellplan.pipeline.base_map.prepared import MapRequest
-    from cellplan.pipeline.base_map.study import map_study
-    from cellplan.pipeline.compare.compare import CompareJob, compare
-    from cellplan.pipeline.export.choice import Choice
-    from cellplan.pipeline.export.program import export_program
-    from cellplan.pipeline.export.several import Exported, export_programs
-    from cellplan.pipeline.fastest.result import write_fastest
-    from cellplan.pipeline.fastest.shortest import ShortestCycles, fastest
-    from cellplan.pipeline.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
-    from cellplan.pipeline.gate.open_gate import open_gate
-    from cellplan.pipeline.layout.request import LayoutRequest
-    from cellplan.pipeline.layout.search import LayoutResult, search_layout
-    from cellplan.pipeline.present.frames import tables, to_frame
-    from cellplan.pipeline.present.notebook import to_html
-    from cellplan.pipeline.recover.recover import Recovery, recover
-    from cellplan.pipeline.recover.result import write_recovery
-    from cellplan.pipeline.rehearsal.rehearse import rehearse
-    from cellplan.pipeline.rehearsal.result import write_rehearsal
-    from cellplan.pipeline.repair.repair import Repair, repair
-    from cellplan.pipeline.repair.result import write_repair
-    from cellplan.pipeline.screen import screen
-    from cellplan.pipeline.solution import Solution
-    from cellplan.pipeline.solve import solve
-    from cellplan.pipeline.sweep import SweepJob, sweep
-    from cellplan.pipeline.verify import verify
-    from cellplan.pipeline.view.write import ViewRequest, view, write_view
-    from cellplan.pipeline.write_run import write_run
+    from cellplan.files.cell.load import load_cell
+    from cellplan.files.cell_errors import load_errors
+    from cellplan.jobs.base_map.grid import BaseGrid
+    from cellplan.jobs.base_map.judged import base_map, write_base_map
+    from cellplan.jobs.base_map.prepared import MapRequest
+    from cellplan.jobs.base_map.study import map_study
+    from cellplan.jobs.compare.compare import CompareJob, compare
+    from cellplan.jobs.fastest.result import write_fastest
+    from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
+    from cellplan.jobs.floor_plan_file import FloorPlanRequest, requested_floor_plan, write_floor_plan
+    from cellplan.jobs.layout.request import LayoutRequest
+    from cellplan.jobs.layout.search import LayoutResult, search_layout
+    from cellplan.jobs.present.frames import tables, to_frame
+    from cellplan.jobs.present.notebook import to_html
+    from cellplan.jobs.recover.recover import Recovery, recover
+    from cellplan.jobs.recover.result import write_recovery
+    from cellplan.jobs.rehearsal.rehearse import rehearse
+    from cellplan.jobs.rehearsal.result import write_rehearsal
+    from cellplan.jobs.repair.repair import Repair, repair
+    from cellplan.jobs.repair.result import write_repair
+    from cellplan.jobs.screen import screen
+    from cellplan.jobs.sweep.sweep import SweepJob, sweep
+    from cellplan.jobs.view.write import ViewRequest, view, write_view
+    from cellplan.model.cell.cell import Cell, Part, Robot
+    from cellplan.model.motion.motion import Motion, Program
+    from cellplan.model.report.report import Check, Report
+    from cellplan.model.report.verified_run import VerifiedRun
+    from cellplan.model.task.task import Task
+    from cellplan.model.task.toolpath import Toolpath
     from cellplan.planning.layout_screening import Candidates, Screening
+    from cellplan.programs.export.choice import Choice
+    from cellplan.programs.export.program import export_program
+    from cellplan.programs.export.several import Exported, export_programs
+    from cellplan.runs.gate.open_gate import open_gate
+    from cellplan.runs.solution import Solution
+    from cellplan.runs.solve import solve
+    from cellplan.runs.verify import verify
+    from cellplan.runs.write_run import write_run
     from cellplan.study.study import Stop
     from cellplan.study.variants import Axis
 
 _HOME: Final = {
     "Axis": "study.variants",
-    "BaseGrid": "pipeline.base_map.grid",
+    "BaseGrid": "jobs.base_map.grid",
     "Candidates": "planning.layout_screening",
-    "Cell": "model.cell",
+    "Cell": "model.cell.cell",
     "CellplanError": "errors",
-    "Check": "model.report",
-    "Choice": "pipeline.export.choice",
-    "CompareJob": "pipeline.compare.compare",
-    "Exported": "pipeline.export.several",
-    "FloorPlanRequest": "pipeline.floor_plan_file",
-    "LayoutRequest": "pipeline.layout.request",
-    "LayoutResult": "pipeline.layout.search",
-    "MapRequest": "pipeline.base_map.prepared",
-    "Motion": "model.motion",
-    "Part": "model.cell",
-    "Program": "model.motion",
-    "Recovery": "pipeline.recover.recover",
-    "Repair": "pipeline.repair.repair",
-    "Report": "model.report",
-    "Robot": "model.cell",
+    "Check": "model.report.report",
+    "Choice": "programs.export.choice",
+    "CompareJob": "jobs.compare.compare",
+    "Exported": "programs.export.several",
+    "FloorPlanRequest": "jobs.floor_plan_file",
+    "LayoutRequest": "jobs.layout.request",
+    "LayoutResult": "jobs.layout.search",
+    "MapRequest": "jobs.base_map.prepared",
+    "Motion": "model.motion.motion",
+    "Part": "model.cell.cell",
+    "Program": "model.motion.motion",
+    "Recovery": "jobs.recover.recover",
+    "Repair": "jobs.repair.repair",
+    "Report": "model.report.report",
+    "Robot": "model.cell.cell",
     "Screening": "planning.layout_screening",
-    "ShortestCycles": "pipeline.fastest.shortest",
-    "Solution": "pipeline.solution",
+    "ShortestCycles": "jobs.fastest.shortest",
+    "Solution": "runs.solution",
     "Stop": "study.study",
-    "SweepJob": "pipeline.sweep",
-    "Task": "model.task",
-    "Toolpath": "model.toolpath",
-    "VerifiedRun": "model.verified_run",
-    "ViewRequest": "pipeline.view.write",
-    "base_map": "pipeline.base_map.judged",
-    "compare": "pipeline.compare.compare",
-    "export_program": "pipeline.export.program",
-    "export_programs": "pipeline.export.several",
-    "fastest": "pipeline.fastest.shortest",
-    "load_cell": "io.cell.load",
-    "load_errors": "io.cell_errors",
-    "map_study": "pipeline.base_map.study",
-    "open_gate": "pipeline.gate.open_gate",
-    "recover": "pipeline.recover.recover",
-    "rehearse": "pipeline.rehearsal.rehearse",
-    "repair": "pipeline.repair.repair",
-    "requested_floor_plan": "pipeline.floor_plan_file",
-    "screen": "pipeline.screen",
-    "search_layout": "pipeline.layout.search",
-    "solve": "pipeline.solve",
-    "sweep": "pipeline.sweep",
-    "tables": "pipeline.present.frames",
-    "to_frame": "pipeline.present.frames",
-    "to_html": "pipeline.present.notebook",
-    "verify": "pipeline.verify",
-    "view": "pipeline.view.write",
-    "write_base_map": "pipeline.base_map.judged",
-    "write_fastest": "pipeline.fastest.result",
-    "write_floor_plan": "pipeline.floor_plan_file",
-    "write_repair": "pipeline.repair.result",
-    "write_recovery": "pipeline.recover.result",
-    "write_rehearsal": "pipeline.rehearsal.result",
-    "write_run": "pipeline.write_run",
-    "write_view": "pipeline.view.write",
+    "SweepJob": "jobs.sweep.sweep",
+    "Task": "model.task.task",
+    "Toolpath": "model.task.toolpath",
+    "VerifiedRun": "model.report.verified_run",
+    "ViewRequest": "jobs.view.write",
+    "base_map": "jobs.base_map.judged",
+    "compare": "jobs.compare.compare",
+    "export_program": "programs.export.program",
+    "export_programs": "programs.export.several",
+    "fastest": "jobs.fastest.shortest",
+    "load_cell": "files.cell.load",
+    "load_errors": "files.cell_errors",
+    "map_study": "jobs.base_map.study",
+    "open_gate": "runs.gate.open_gate",
+    "recover": "jobs.recover.recover",
+    "rehearse": "jobs.rehearsal.rehearse",
+    "repair": "jobs.repair.repair",
+    "requested_floor_plan": "jobs.floor_plan_file",
+    "screen": "jobs.screen",
+    "search_layout": "jobs.layout.search",
+    "solve": "runs.solve",
+    "sweep": "jobs.sweep.sweep",
+    "tables": "jobs.present.frames",
+    "to_frame": "jobs.present.frames",
+    "to_html": "jobs.present.notebook",
+    "verify": "runs.verify",
+    "view": "jobs.view.write",
+    "write_base_map": "jobs.base_map.judged",
+    "write_fastest": "jobs.fastest.result",
+    "write_floor_plan": "jobs.floor_plan_file",
+    "write_repair": "jobs.repair.result",
+    "write_recovery": "jobs.recover.result",
+    "write_rehearsal": "jobs.rehearsal.result",
+    "write_run": "runs.write_run",
+    "write_view": "jobs.view.write",
 }
 
 __all__ = [

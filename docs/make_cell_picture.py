@@ -20,10 +20,10 @@ from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.mesh.topology import make_mesh
 from cellplan.geometry.shapes import Capsule, Mesh
 from cellplan.geometry.transforms import Array, frame_from_axes, inverse, pose_from, transform_points
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.report.plots.palette import INK, robot_colours
 from cellplan.scene.bodies import Kind, body_poses, is_ground, scene_bodies
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 TARGET: Final = ROOT / "docs" / "images" / "four_robots.png"

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cellplan.io.schema import errors_schema, json_schema, robot_table_schema
-from cellplan.io.schema.json_schemas import entry_title
-from cellplan.pipeline.layout.record import layout_schema
-from cellplan.pipeline.repair.record import advice_schema
+from cellplan.files.schema import errors_schema, json_schema, robot_table_schema
+from cellplan.files.schema.json_schemas import entry_title
+from cellplan.jobs.layout.record import layout_schema
+from cellplan.jobs.repair.record import advice_schema
 from cellplan.report.record.schema import report_schema, series_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"

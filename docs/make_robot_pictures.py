@@ -11,12 +11,12 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from PIL import Image
 
+from cellplan.files.robots.bundled import load_bundled
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.transforms import Array, transform_points
-from cellplan.io.robots.bundled import load_bundled
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.robot import RobotModel
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 IMAGES = Path(__file__).resolve().parent / "images"
 SEGMENTS = 36

@@ -12,8 +12,8 @@ import numpy as np
 from make_cell_picture import LENS, Surface, View, axes_of, picture_of, pieces_of, surface_of
 
 from cellplan import load_cell, solve
+from cellplan.files.templates import TEMPLATES, template_named
 from cellplan.geometry.transforms import Array
-from cellplan.io.templates import TEMPLATES, template_named
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 FOLDER: Final = ROOT / "docs" / "images" / "templates"

@@ -11,10 +11,10 @@ import numpy as np
 
 from cellplan import export_program, load_cell, open_gate, solve, write_run
 from cellplan.errors import InputError
-from cellplan.export.dialect import Dialect
-from cellplan.export.text import comment, fixed
-from cellplan.model.exported import ProgramRows, Promise, RobotRows
-from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.model.report.exported import ProgramRows, Promise, RobotRows
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.text import comment, fixed
 
 CELL = Path(__file__).resolve().parent / "plate.yaml"
 RUN, PROGRAMS = Path("outputs/examples/run"), Path("outputs/examples/rows")

@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("certify", "checks", "geometry", "kinematics", "planning", "search")
+FOLDERS = ("certify", "checks", "geometry", "planning", "scene", "search")
 QUICK = ("-q", "-m", "not slow", "--assert=plain", "-p", "no:cacheprovider")
 LIMIT_S = 7200.0  # [s] for all tests under one kernel
 
@@ -22,7 +22,7 @@ def tested(kernel: str, options: list[str]) -> str:
     """What became of the tests under a kernel."""
     begun = time.monotonic()
     folders = [str(ROOT / "tests" / folder) for folder in FOLDERS]
-    same_bytes = str(ROOT / "tests" / "pipeline" / "test_determinism.py")
+    same_bytes = str(ROOT / "tests" / "jobs" / "test_determinism.py")
     command = [sys.executable, "-m", "pytest", *QUICK, *options, *folders, same_bytes]
     run = subprocess.run(command, cwd=ROOT, env=environment(kernel), check=False, timeout=LIMIT_S)
     result = "passed" if run.returncode == 0 else f"FAILED (exit status {run.returncode})"

@@ -14,7 +14,7 @@ from reference_job import BETWEEN, filled, reference_job
 from sections import digits
 
 from cellplan import load_cell
-from cellplan.kinematics.pinocchio_model import CombinedModel
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 
 @pytest.fixture(scope="module")

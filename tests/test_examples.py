@@ -9,7 +9,7 @@ import pytest
 from nbclient import NotebookClient
 
 import cellplan.planning.methods
-from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.programs.dialects import DIALECTS
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 NOTEBOOK = EXAMPLES / "gallery" / "first_look.ipynb"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cellplan.io.templates import TEMPLATES, Template
+from cellplan.files.templates import TEMPLATES, Template
 
 pytestmark = pytest.mark.slow
 

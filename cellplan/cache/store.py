@@ -11,6 +11,7 @@ import io
 import os
 import platform
 import stat
+import sys
 import tempfile
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -23,20 +24,21 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.cache.location import OTHERS_MAY_WRITE, cache_folder
 from cellplan.cache.use import is_cache_used
 
 Arrays = tuple[NDArray[np.generic], ...]
-
 FORMAT: Final = b"cellplan cache 1\n"
 DIGEST: Final = 32  # [bytes] of a SHA-256
 SUFFIX: Final = ".entry"
-CODE_PACKAGES: Final = ("cache", "geometry", "collision")  # packages whose code makes what is kept
+CODE_PACKAGES: Final = ("cache", "geometry", "scene/collision")  # packages whose code makes what is kept
 LIBRARIES: Final = ("numpy", "trimesh", "pycollada", "coal")  # and what they rest on
 MAX_ENTRY: Final = 64_000_000  # [bytes]
 MAX_FOLDER: Final = 256_000_000  # [bytes]; the entries that were not used for longest go first
 MAX_RECENT: Final = 32_000_000  # [bytes] held by this process
 OPEN: Final = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+VARIABLE: Final = "CELLPLAN_CACHE"  # a folder, or a word that turns the cache off
+OFF: Final = frozenset({"off", "0", "no", "false"})
+OTHERS_MAY_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 
 
 class Key(NamedTuple):
@@ -211,3 +213,42 @@ def _code() -> bytes | None:
     except (OSError, PackageNotFoundError):
         return None
     return total.digest() if files else None
+
+
+def cache_folder() -> Path | None:
+    """The folder, made if need be; None when there is to be none, or none that can be trusted."""
+    try:
+        folder = _desired()
+        if folder is None:
+            return None
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        return folder if _is_private(folder) else None
+    except (OSError, ValueError, RuntimeError):  # no home, no leave, no such name
+        return None
+
+
+def _desired() -> Path | None:
+    """The folder that the user wants, or the usual one of the system."""
+    named = os.environ.get(VARIABLE, "")
+    if named.strip().lower() in OFF:
+        return None
+    return Path(named).absolute() if named else _usual() / "cellplan"
+
+
+def _usual() -> Path:
+    """Where programs of this system keep what they can do without."""
+    with suppress(KeyError):
+        if sys.platform == "win32":
+            return Path(os.environ["LOCALAPPDATA"])
+        folder = Path(os.environ["XDG_CACHE_HOME"])
+        if folder.is_absolute():  # others are to be ignored
+            return folder
+    return Path.home() / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether the folder belongs to the user, and no other user may write to it."""
+    status = folder.stat()
+    if not hasattr(os, "getuid"):  # another system, with other rules
+        return stat.S_ISDIR(status.st_mode)
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE

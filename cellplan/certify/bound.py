@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.pair_state import PairState
-from cellplan.collision.nearest_points import nearest_points, point_above
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.collision.distance import nearest_points, point_above
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

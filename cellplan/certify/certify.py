@@ -12,7 +12,7 @@ from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.search import StretchSearch
 from cellplan.certify.survey import Survey
 from cellplan.geometry.arrays import Array
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -5,10 +5,10 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.overlap.depth import ground_depth, overlap_depth
 from cellplan.geometry.transforms import Array
 from cellplan.scene.bodies import is_ground
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.overlap.depth import ground_depth, overlap_depth
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.scene import Scene
 

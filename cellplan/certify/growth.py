@@ -23,12 +23,12 @@ from cellplan.certify.bound import Bound
 from cellplan.certify.certify import certify
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
-from cellplan.collision.distance import APART_TOL, exact_reading, measure, quick_reading
-from cellplan.collision.overlap.containment import is_inside
-from cellplan.collision.overlap.depth import overlap_depth
-from cellplan.collision.overlap.sunk_points import SUNK_TOL
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.units import MM
+from cellplan.scene.collision.distance import APART_TOL, exact_reading, measure, quick_reading
+from cellplan.scene.collision.overlap.containment import is_inside
+from cellplan.scene.collision.overlap.depth import overlap_depth
+from cellplan.scene.collision.overlap.sunk_points import SUNK_TOL
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.robot.robot import BASE, FollowerJoint, Joint
 from cellplan.scene.bodies import SceneBody
 from cellplan.scene.scene import Scene
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.continuous.motion_bound import Bends, Pair
 from cellplan.geometry.transforms import Array, rotated
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.continuous.motion_bound import Bends, Pair
 from cellplan.scene.scene import Scene
 
 

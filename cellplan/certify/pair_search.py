@@ -18,12 +18,12 @@ import numpy as np
 
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_state import PairState, StepBounds
-from cellplan.collision.continuous.motion_bound import BodyMotion, Pair, PairMotion
-from cellplan.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
-from cellplan.collision.distance import APART_TOL, TIGHT_TOL, Reading, exact_reading, quick_reading
-from cellplan.collision.engine import Engine
-from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.scene.collision.continuous.motion_bound import BodyMotion, Pair, PairMotion
+from cellplan.scene.collision.continuous.pieces import PieceMotion, can_be_split, read_piece, split
+from cellplan.scene.collision.distance import APART_TOL, TIGHT_TOL, Reading, exact_reading, quick_reading
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.pairs import ScenePair
 
 RESOLUTION: Final = 1e-6  # [m] steps in which nothing travels farther than this are not cut any more

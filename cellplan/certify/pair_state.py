@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.scene.collision.distance import APART_TOL
 
 SEARCH_TOL: Final = 5e-5  # [m] a search stops when nothing can be nearer than the nearest found by more than this
 MAX_CUTS: Final = 1000  # steps of one pair that are cut to prove the demand, finer ones included

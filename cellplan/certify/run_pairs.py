@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.idle import idle_robots
-from cellplan.model.robot import BASE
+from cellplan.model.cell.idle import idle_robots
+from cellplan.model.robot.robot import BASE
 from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene

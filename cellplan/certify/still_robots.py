@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import APART_TOL, exact_reading, quick_reading
-from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.transforms import Array
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.continuous.motion_bound import Pair
+from cellplan.scene.collision.distance import APART_TOL, exact_reading, quick_reading
+from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

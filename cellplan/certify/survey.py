@@ -15,9 +15,9 @@ import numpy as np
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.pair_search import Search
 from cellplan.certify.pair_state import SEARCH_TOL, PairState
-from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.collision.distance import APART_TOL
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

@@ -30,11 +30,11 @@ from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, stacked_positions
-from cellplan.model.idle import idle_robots
-from cellplan.model.motion import JointTable, Schedule
+from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.cell.idle import idle_robots
+from cellplan.model.motion.motion import JointTable, Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import (
+from cellplan.model.report.report import (
     Check,
     ClearanceReport,
     ClosureAccuracy,

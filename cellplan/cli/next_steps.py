@@ -5,11 +5,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePath
 from typing import Final
 
-from cellplan.io.run.manifest import user_files
-from cellplan.io.yaml.writer import flow_text
-from cellplan.model.cell import Cell
-from cellplan.model.check_kinds import PASSED_BY_TIME
-from cellplan.pipeline.synchronous import is_searchable
+from cellplan.files.run.manifest import user_files
+from cellplan.files.yaml.writer import flow_text
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.check_kinds import PASSED_BY_TIME
+from cellplan.search.synchronous import is_searchable
 
 OPTIONS: Final = {"motion.duration_s": "--duration", "checks.clearance_mm": "--clearance"}  # of layout, by address
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from cellplan.model.cell import Cell
+    from cellplan.model.cell.cell import Cell
 
 
 class CellSource(Protocol):

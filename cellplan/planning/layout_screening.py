@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.clocked_path import distinct
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.presented import Presented
+from cellplan.model.task.clocked_path import distinct
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settled, settling_joints

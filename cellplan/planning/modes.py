@@ -5,11 +5,10 @@ from itertools import pairwise
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Mode
-from cellplan.model.idle import idle_robots
-from cellplan.model.phase import ALL_TASKS, Carry, Hold, Phase, Role, Transfer, Work
-from cellplan.model.plan import Plan
-from cellplan.model.task import Task
+from cellplan.model.cell.cell import Cell, Mode
+from cellplan.model.cell.idle import idle_robots
+from cellplan.model.motion.plan import ALL_TASKS, Carry, Hold, Phase, Plan, Role, Transfer, Work
+from cellplan.model.task.task import Task
 
 
 def plan_phases(cell: Cell, *, only: str | None = None) -> Plan:

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import Motion, NearestSingular, Resolution
+from cellplan.model.motion.motion import Motion, NearestSingular, Resolution
 from cellplan.model.progress import Progress, silent
 from cellplan.model.solver import Integrator
-from cellplan.model.task import TIME_TOLERANCE
+from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.collocation.cyclic import closed_path
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun

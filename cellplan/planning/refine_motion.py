@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.clocked_path import distinct
-from cellplan.model.motion import Motion
-from cellplan.model.name_order import NameOrder
+from cellplan.model.cell.name_order import NameOrder
+from cellplan.model.motion.motion import Motion
 from cellplan.model.progress import Progress, silent
+from cellplan.model.task.clocked_path import distinct
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.tracking.motion_task import MotionTask

@@ -6,14 +6,14 @@ from enum import StrEnum
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses, require_rigid
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Part, Robot
-from cellplan.model.name_order import NameOrder
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell, Grasp, Part, Robot
+from cellplan.model.cell.name_order import NameOrder
+from cellplan.model.robot.robot import BASE
+from cellplan.scene.collision.bodies import BodyPoses, require_rigid
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 class Kind(StrEnum):

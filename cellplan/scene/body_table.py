@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses, CollisionBody
-from cellplan.collision.hull_supports import HullSupports
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.kinematics.link_forest import LinkForest
 from cellplan.scene.bodies import SceneBody
+from cellplan.scene.collision.bodies import BodyPoses, CollisionBody
+from cellplan.scene.collision.hull_supports import HullSupports
+from cellplan.scene.kinematics.link_forest import LinkForest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -6,17 +6,17 @@ from functools import lru_cache
 
 import numpy as np
 
-from cellplan.collision.bodies import CollisionBody, prepare
-from cellplan.collision.engine import Engine
-from cellplan.collision.overlap.contact_zone import outside_zone
 from cellplan.geometry.shapes import HalfSpace, Mesh, Solid
 from cellplan.geometry.transforms import inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.left_out import LeftOutKind
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.left_out import LeftOutKind
+from cellplan.model.task.task import Frame
 from cellplan.scene.bodies import Kind, SceneBody, scene_bodies
+from cellplan.scene.collision.bodies import CollisionBody, prepare
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.collision.overlap.contact_zone import outside_zone
 from cellplan.scene.grips import grip_watch
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.mounting import MountedPair, grasp_of, mounted_pair, works_like_a_tool
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, sort_pairs
 from cellplan.scene.permanent_contacts import apply_design

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from cellplan.model.robot import BASE, FollowerJoint, Joint, RobotModel
+from cellplan.model.robot.robot import BASE, FollowerJoint, Joint, RobotModel
 
 NO_BODY: Final = BASE - 1  # stands for "no link before this one has a body"
 

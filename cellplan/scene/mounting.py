@@ -10,8 +10,8 @@ from enum import StrEnum
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell, Grasp
-from cellplan.model.left_out import LeftOutKind
+from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.report.left_out import LeftOutKind
 from cellplan.scene.bodies import Kind, SceneBody
 
 MOUNT_DEPTH: Final = 0.002  # [m] by which a tool may reach into the link that its flange, without a body, is part of

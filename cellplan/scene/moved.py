@@ -9,9 +9,9 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Box, Cylinder, Solid
 from cellplan.geometry.transforms import is_rigid
-from cellplan.model.cell import Cell
-from cellplan.model.mounting import Bracket
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.mounting import Bracket
+from cellplan.model.robot.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
 
 SAME_SIZE: Final = 1e-12  # [m] by which the height of a column may differ by rounding

@@ -1,23 +1,212 @@
 """Near pairs: the watched pairs of a scene that are nearer than a distance, where, and how that changes with joints."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.line_distances import line_gaps
 from cellplan.geometry.transforms import inverse
-from cellplan.kinematics.link_forest import LinkForest
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.scene.bodies import SceneBody
-from cellplan.scene.body_table import BodyTable
-from cellplan.scene.near_table import NearTable, WatchedPairs, counts_by_hull
+from cellplan.scene.body_table import BodyTable, placed_points
+from cellplan.scene.collision.bodies import BodyPoses, CollisionBody
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.kinematics.link_forest import WORLD, LinkForest
 from cellplan.scene.pairs import Rule
 
 if TYPE_CHECKING:
     from cellplan.scene.scene import Scene
+
+TINY: Final = 1e-12  # [m] lines nearer than that cross
+CLEAR_OF_TIP: Final = 1e-3  # [m] by which the hull of a cut tool keeps clear of the tip where it stands for the tool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WatchedPairs:
+    """Pairs of bodies as arrays; P of two solids, then G of a solid and a half-space."""
+
+    rows: Indices  # what each pair is called, shape (P + G,)
+    solids: Indices  # bodies of the engine of the first ones, shape (P, 2)
+    above: Indices  # solids of the others, shape (G,)
+    planes: Array  # poses of their half-spaces in the world, everything below the xy plane is solid, shape (G, 4, 4)
+    demands: Array  # distances in [m] that are demanded; down to them the hulls of a pair are enough, shape (P + G,)
+    once: Flags  # whether a pair is examined in the first configuration only, shape (P + G,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearbyPairs:
+    """Near pairs; M of them, ordered by sample and row."""
+
+    rows: Indices  # what each pair is called, shape (M,)
+    samples: Indices  # at which configuration, shape (M,)
+    distances: Array  # signed distances in [m], shape (M,)
+    normals: Array  # unit directions from the first body to the second, shape (M, 3)
+    first: Array  # points of the first bodies in the world in [m], shape (M, 3)
+    second: Array  # points of the second bodies, shape (M, 3)
+    bodies: Indices  # the bodies by their places in the engine, -1 for a half-space, shape (M, 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class NearTable:
+    """Links, bodies and pairs."""
+
+    forest: LinkForest
+    bodies: BodyTable  # the bodies of the engine
+    pairs: WatchedPairs
+    is_hull: Flags  # whether the hull of a body is what counts of it, shape (B,)
+
+    def moved(self, poses: Mapping[int, Array], bodies: Mapping[int, CollisionBody]) -> "NearTable":
+        """The same with some bodies elsewhere on their links, and others in place of some; see ``BodyTable``."""
+        return replace(self, bodies=self.bodies.replaced(poses, bodies))
+
+    def find(self, engine: Engine, D: Array, within: float) -> NearbyPairs:
+        """All pairs nearer than a distance in [m].
+
+        Args:
+            D: Displacements of the links, shape (links, K, 4, 4).
+            within: The distance.
+        """
+        poses = self.bodies.poses(D)
+        centres, lines = self.bodies.bounds(poses)
+        parts = [self._solids(engine, poses, (centres, lines), within), self._grounds(poses, centres, within)]
+        rows, samples, distances, normals, first, second, bodies = (
+            np.concatenate(part) for part in zip(*parts, strict=True)
+        )
+        order = np.lexsort((rows, samples))
+        order = order[distances[order] < within]
+        return NearbyPairs(
+            rows=rows[order],
+            samples=samples[order],
+            distances=distances[order],
+            normals=normals[order],
+            first=first[order],
+            second=second[order],
+            bodies=bodies[order],
+        )
+
+    def by_joints(self, D: Array, nearby: NearbyPairs) -> Array:
+        """Derivatives of the distances by the stacked joints in [m/rad] or [m/m], shape (M, nq)."""
+        return self.by_axes(nearby, self.forest.screws(D)) @ self.forest.shares
+
+    def by_axes(self, nearby: NearbyPairs, screws: Array) -> Array:
+        """The work of a unit force along each normal on every axis, shape (M, axes).
+
+        It is the same at both points, as the normal goes through both.
+
+        Args:
+            screws: Of all axes, shape (axes, K, 6).
+        """
+        links = np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])  # that carry the bodies, (M, 2)
+        forces, count = wrenches(nearby), screws.shape[1]
+        moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
+        bounds = np.searchsorted(nearby.samples, np.arange(count + 1)).tolist()
+        for sample, (first, last) in enumerate(pairwise(bounds)):
+            moved[first:last] *= forces[first:last] @ screws[:, sample].T
+        return moved
+
+    def _solids(self, engine: Engine, poses: BodyPoses, bounds: tuple[Array, Array], within: float) -> "Parts":
+        """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""
+        table, ends = self.bodies, self.pairs.solids
+        centres, lines = bounds
+        places, samples = self._near_spheres(centres, within)
+        a, b = ends[places].T
+        gaps = line_gaps(lines[a, samples], lines[b, samples])
+        apart = np.linalg.norm(gaps, axis=1)
+        slim = np.flatnonzero(apart < table.girths[a] + table.girths[b] + within)
+        along = gaps[slim] / np.maximum(apart[slim], TINY)[:, None]
+        slim = slim[self._proved(poses, (a[slim], b[slim]), samples[slim], along) < within]
+        places, samples = places[slim], samples[slim]
+        near, distances, points = engine.signed.below(engine.bodies, ends[places], poses, samples, within=within)
+        places, samples, first, second = places[near], samples[near], points[:, 0].copy(), points[:, 1].copy()
+        bodies = ends[places]
+        is_open = (distances <= self.pairs.demands[places]) & ~self.is_hull[bodies].all(axis=1)
+        for query in np.flatnonzero(is_open).tolist():
+            (i, j), sample = bodies[query].tolist(), int(samples[query])
+            is_apart = not engine.touch(i, j, poses, sample=sample)
+            if is_apart and (nearest := engine.surface_points(i, j, poses, sample=sample)) is not None:
+                first[query], second[query] = nearest
+                distances[query] = np.linalg.norm(nearest[1] - nearest[0])
+        apart = centres[bodies[:, 1], samples] - centres[bodies[:, 0], samples]
+        normals = _directions(distances, first, second, apart)
+        return self.pairs.rows[places], samples, distances, normals, first, second, bodies
+
+    def _proved(self, poses: BodyPoses, ends: tuple[Indices, Indices], samples: Indices, n: Array) -> Array:
+        """Distances in [m] that directions, shape (M, 3), prove between hulls, shape (M,); see ``separation``."""
+        bounds = np.einsum("mi,mi->m", n, poses.p[ends[1], samples] - poses.p[ends[0], samples])
+        for bodies, away in zip(ends, (n, -n), strict=True):
+            local = (away[:, None] @ poses.R[bodies, samples])[:, 0]
+            bounds -= self.bodies.supports.reach(bodies, local)
+        return bounds
+
+    def _near_spheres(self, centres: Array, within: float) -> tuple[Indices, Indices]:
+        """Pairs of solids whose bounding spheres, centres of shape (B, K, 3), are near enough, and at which samples."""
+        radii, (a, b) = self.bodies.radii, self.pairs.solids.T
+        squares = np.zeros((len(a), centres.shape[1]))
+        for component in np.moveaxis(centres, 2, 0):
+            along = np.ascontiguousarray(component)
+            apart = along.take(b, axis=0)
+            apart -= along.take(a, axis=0)
+            apart *= apart
+            squares += apart
+        reach = radii[a] + radii[b] + within
+        is_near = squares < (reach * reach)[:, None]
+        is_near[self.pairs.once[: len(a)], 1:] = False
+        places, samples = np.nonzero(is_near)
+        return places, samples
+
+    def _grounds(self, poses: BodyPoses, centres: Array, within: float) -> "Parts":
+        """Pairs of a solid and a half-space."""
+        table, above, planes = self.bodies, self.pairs.above, self.pairs.planes
+        up, origin = planes[:, :3, 2], planes[:, :3, 3]
+        lowest = ((centres[above] - origin[:, None]) @ up[:, :, None])[..., 0] - table.radii[above, None]
+        is_near = lowest < within
+        is_near[self.pairs.once[len(self.pairs.solids) :], 1:] = False
+        places, samples = np.nonzero(is_near)
+        bodies, up = above[places], up[places]
+        local = (np.swapaxes(poses.R[bodies, samples], 1, 2) @ -up[:, :, None])[..., 0]
+        first = placed_points(poses, bodies, samples, table.supports.points(bodies, local))
+        heights = np.einsum("mi,mi->m", first - origin[places], up)
+        rows = self.pairs.rows[len(self.pairs.solids) :][places]
+        ends = np.stack([bodies, np.full(len(bodies), -1)], axis=1)
+        return rows, samples, heights, -up, first, first - heights[:, None] * up, ends
+
+
+Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attributes of ``NearbyPairs``
+
+
+def wrenches(nearby: NearbyPairs) -> Array:
+    """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
+    (x, y, z), (a, b, c) = nearby.second.T, nearby.normals.T
+    return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=1)
+
+
+def counts_by_hull(body: CollisionBody, tip: Array | None) -> bool:
+    """Whether the hull of a body may stand for it in a search: it is convex, or a tool that is cut off before its tip.
+
+    The surface of such a tool differs from its hull by the hollow that the contact zone leaves at its end. Where the
+    hull keeps clear of the tip only what bulges into that hollow is taken for a contact.
+
+    Args:
+        tip: The tip that it is cut off before, in its own frame in [m], shape (3,); None for a body that is not cut.
+    """
+    if body.is_convex or tip is None:
+        return body.is_convex
+    corners = body.core.vertices
+    toward = tip - corners.mean(axis=0)
+    length = float(np.linalg.norm(toward))
+    return length > 0.0 and float(((corners - tip) @ (toward / length)).max()) < -CLEAR_OF_TIP
+
+
+def _directions(distances: Array, first: Array, second: Array, centres: Array) -> Array:
+    """Unit directions from the first points to the second ones; between centres where bodies just touch."""
+    lengths = np.linalg.norm(second - first, axis=1)
+    along = np.where((lengths > 0.0)[:, None], second - first, centres) * np.where(distances < 0.0, -1.0, 1.0)[:, None]
+    norms = np.linalg.norm(along, axis=1, keepdims=True)
+    return along / np.where(norms > 0.0, norms, 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

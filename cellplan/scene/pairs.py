@@ -8,10 +8,10 @@ from itertools import combinations
 
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell
-from cellplan.model.left_out import LeftOutKind
-from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.left_out import LeftOutKind
+from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import BASE
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, is_ground

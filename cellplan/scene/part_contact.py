@@ -10,16 +10,16 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.bodies import CollisionBody, prepare
-from cellplan.collision.engine import Engine
-from cellplan.collision.overlap.grip_zone import outside_grip
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
-from cellplan.model.cell import Cell, Grasp
-from cellplan.model.left_out import LeftOutKind
+from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.report.left_out import LeftOutKind
 from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody
+from cellplan.scene.collision.bodies import CollisionBody, prepare
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.collision.overlap.grip_zone import outside_grip
 from cellplan.scene.grips import GRIP_TOL
 from cellplan.scene.mounting import Mount, MountedPair, is_rigid_with_flange
 from cellplan.scene.pairs import Excluded, Rule, ScenePair, StraightMotion

@@ -6,19 +6,19 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.distance import measure
-from cellplan.collision.engine import Engine
-from cellplan.collision.overlap.containment import is_inside
-from cellplan.collision.separation import heights
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.left_out import LeftOutKind
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.left_out import LeftOutKind
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.seeds import generator
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, is_ground, part_body
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.distance import measure
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.collision.overlap.containment import is_inside
+from cellplan.scene.collision.separation import heights
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.link_tree import LinkTree
 from cellplan.scene.mounting import (
     MOUNT_DEPTH,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.io.input.files import digest
-from cellplan.io.run.content import LEFT_ALONE, foreign_within, is_run_folder
-from cellplan.io.run.whole_file import refuse_unless_writable, write_whole
+from cellplan.files.input.files import digest
+from cellplan.files.run.content import LEFT_ALONE, foreign_within, is_run_folder
+from cellplan.files.run.whole_file import refuse_unless_writable, write_whole
 from cellplan.study.running import STATE, require_idle
 
 SCHEMA: Final = "cellplan.study/1"

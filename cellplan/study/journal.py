@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import IO, Any, Final, Self
 
 from cellplan.errors import InputError, StudyStoppedError
-from cellplan.io.input.files import read_regular_file
-from cellplan.io.run.whole_file import write_whole
+from cellplan.files.input.files import read_regular_file
+from cellplan.files.run.whole_file import write_whole
 from cellplan.study.folder import AHEAD, JOURNAL, SCHEMA
 from cellplan.study.trial import StudyTrial, Variant
 

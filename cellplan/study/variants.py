@@ -9,8 +9,8 @@ from math import prod
 from typing import Final
 
 from cellplan.errors import InputError
-from cellplan.io.cell.changes import plain_values, read_setting
-from cellplan.io.input.findings import shown
+from cellplan.files.cell.changes import plain_values, read_setting
+from cellplan.files.input.findings import shown
 from cellplan.study.trial import Variant
 
 MAX_VARIANTS: Final = 100_000  # more would take weeks

@@ -10,7 +10,7 @@ from cellplan import Cell, Report
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import pose
 from cellplan.model.progress import silent
-from cellplan.pipeline.solve import solve_motion
+from cellplan.runs.solve import solve_motion
 from reproduction.runs import Numbers, paper_cell
 
 PLACES = 101

@@ -7,11 +7,11 @@ import numpy as np
 from builders.jacobian_cells import model_of
 from builders.random_cells import carried, random_cell, random_model, random_pose, sharing
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.robot import RobotModel
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.robot.robot import RobotModel
+from cellplan.model.task.task import Frame
 from cellplan.planning.collocation.batch_tasks import Desired
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def side_arm(model: RobotModel) -> RobotModel:

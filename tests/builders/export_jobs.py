@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from builders.scene_builders import arm_model, joint, make_cell, placed
-from cellplan.export.dialect import Dialect
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.controller import ControllerZero
-from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.robot.controller import ControllerZero
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
+from cellplan.programs.elements.dialect import Dialect
 
 NAMES = ("alpha", "beta", "gamma", "delta")
 

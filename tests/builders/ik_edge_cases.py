@@ -8,11 +8,11 @@ import numpy as np
 from builders.random_cells import random_cell
 from builders.search_arms import PUMA, arm_cell, dh_arm
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, LockedJoint
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.robot import Joint
+from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.robot.robot import Joint
 from cellplan.model.settings.solver import SearchEntry
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 STEPS = 20
 STEP = 2e-3  # [s]

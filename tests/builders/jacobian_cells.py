@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.cell import Cell
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.cell.cell import Cell
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.task_constraints import TaskConstraints
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 
 def planners_jacobian(cell: Cell, q: Array) -> Array:

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cellplan.model.cell import Cell
-from cellplan.model.exported import ProgramRows, RobotRows
-from cellplan.pipeline.export.interpolant import resting, row_velocities
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.exported import ProgramRows, RobotRows
+from cellplan.programs.rows.interpolant import resting, row_velocities
 
 
 def smooth_rows(cell: Cell, *, seed: int, count: int = 401, step: float = 0.01, size: float = 0.3) -> ProgramRows:

@@ -8,8 +8,8 @@ from builders.random_cells import random_cell, random_model, random_pose
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Obstacle
-from cellplan.model.robot import BASE, Body
+from cellplan.model.cell.cell import Cell, Obstacle
+from cellplan.model.robot.robot import BASE, Body
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 

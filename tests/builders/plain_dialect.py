@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from cellplan.export.dialect import Dialect
-from cellplan.export.joints import from_numbers, to_numbers
-from cellplan.model.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise
-from cellplan.model.verified_run import VerifiedRun
+from cellplan.model.report.exported import ExportFrame, ExportJob, Interpolation, ProgramRows, Promise
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.joints import from_numbers, to_numbers
 
 
 def dialect(

@@ -6,9 +6,9 @@ import numpy as np
 
 from builders.random_cells import make_task, random_cell
 from cellplan.geometry.transforms import Array, pose_from
-from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.cell.cell import Cell, Robot, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
 
 START = np.array([np.pi / 4, np.pi / 6, np.pi / 2, np.pi / 4])  # [Nicolato2007]_ section 4.2
 LINK, RADIUS = 0.2, 0.15  # [m]

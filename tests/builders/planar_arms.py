@@ -8,8 +8,8 @@ import numpy as np
 from builders.jacobian_cells import model_of
 from builders.random_cells import make_task, random_cell
 from cellplan.geometry.transforms import Array, pose_from
-from cellplan.model.cell import Cell, Part, Robot, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import Cell, Part, Robot, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
 

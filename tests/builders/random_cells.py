@@ -6,13 +6,13 @@ import numpy as np
 
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
-from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.cell.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
 from cellplan.model.origin import Origin
-from cellplan.model.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
+from cellplan.model.robot.robot import BASE, FollowerJoint, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind
+from cellplan.model.task.task import CirclePath, Frame, PlaneName, Task, TimeLaw, TimeLawKind
 
 
 def random_pose(rng: np.random.Generator) -> Array:

@@ -19,9 +19,9 @@ from builders.export_jobs import (
 from builders.scene_builders import arm_model, held_part, work
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows, Targets
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell, Robot, Tool
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, RobotRows, Targets
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry
 
 ABB = "abb"

@@ -6,11 +6,11 @@ import numpy as np
 
 from cellplan.geometry.shapes import Cylinder, Solid
 from cellplan.geometry.transforms import Array, pose, rotation_vector
-from cellplan.model.cell import Cell, Mode, MotionSettings, Part
+from cellplan.model.cell.cell import Cell, Mode, MotionSettings, Part
 from cellplan.model.origin import Origin
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.model.task import (
+from cellplan.model.task.task import (
     CirclePath,
     PathSpec,
     PlaneName,
@@ -21,7 +21,7 @@ from cellplan.model.task import (
     TimeLawKind,
     ToleranceEntry,
 )
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.task.toolpath import Toolpath
 
 EX, EY, EZ = np.eye(3)
 ORIGIN = Origin(file="cell.yaml", lines={"tasks.ring": 9, "tasks.ring.path": 14, "motion.corners": 30})

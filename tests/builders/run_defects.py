@@ -13,7 +13,7 @@ import numpy as np
 
 from builders.added_words import counts_beside_the_truth, misshapen_series, more_header_lines, words_in_a_picture
 from builders.run_edits import ROBOTS, Copy, edit_field, edit_json, edit_rows, first_row, pick, replace_in, seal, sign
-from cellplan.io.input.files import digest
+from cellplan.files.input.files import digest
 
 Defect = Callable[[np.random.Generator, Copy], None]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from cellplan.io.input.files import digest
-from cellplan.io.run.joint_tables import program_digest
-from cellplan.io.run.manifest import MADE_LATER
+from cellplan.files.input.files import digest
+from cellplan.files.run.joint_tables import program_digest
+from cellplan.files.run.manifest import MADE_LATER
 
 ROBOTS = ("idle", "left", "right")
 

@@ -1,8 +1,8 @@
 """Export jobs of a verified run, with all of its rows and robots."""
 
-from cellplan.model.exported import ExportFrame, ExportJob, Promise
-from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.rows import full_rows
+from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.programs.rows.rows import full_rows
 
 
 def job_of_run(run: VerifiedRun, *, promise: Promise = Promise.TIMED) -> ExportJob:

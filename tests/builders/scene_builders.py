@@ -6,14 +6,14 @@ import numpy as np
 
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Shape, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
-from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import Cell, Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
-from cellplan.model.robot import Body, Joint, JointKind, RobotModel
+from cellplan.model.robot.robot import Body, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
+from cellplan.model.task.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 
 QUARTER = 0.5 * np.pi
 

@@ -10,15 +10,15 @@ import numpy as np
 from builders.random_cells import make_task
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose_from, rotation_about, rotation_vector
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Mode, MotionSettings, Part, Robot, Tool
-from cellplan.model.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.cell.cell import Cell, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.motion.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.origin import Origin
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SearchEntry, SolverEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 ANTHROPOMORPHIC = [(0.0, np.pi / 2, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]  # a, alpha, d: table 4.1
 FOUR_LINKS = [(0.2, 0.0, 0.0)] * 4  # section 4.2

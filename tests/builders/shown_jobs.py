@@ -10,9 +10,9 @@ from builders.rapid_jobs import multimove_cell
 from builders.scene_builders import arm_model
 from builders.stream_jobs import with_latency
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.controllers import HandshakeEntry, KindName
 
 ARMS = {

@@ -20,10 +20,10 @@ from pathlib import Path, PurePath
 from typing import Any, NamedTuple
 
 import cellplan
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.model.origin import Origin
 from cellplan.model.progress import Progress
-from cellplan.pipeline.solution import Solution
+from cellplan.runs.solution import Solution
 
 Events = list[tuple[Any, ...]]  # what was said of the progress, call by call
 Names = dict[str, dict[str, object]]  # what each name of a module or class of the package stands for
@@ -95,7 +95,7 @@ def _install() -> None:
     for result in pkgutil.walk_packages(cellplan.__path__, "cellplan."):
         if not result.name.endswith("__main__"):
             importlib.import_module(result.name)
-    module = importlib.import_module("cellplan.pipeline.solve")
+    module = importlib.import_module("cellplan.runs.solve")
     module.solve_motion, module.certified = _motion(module.solve_motion), _clearance(module.certified)
     _state.names = _package_names()
 

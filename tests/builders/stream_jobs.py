@@ -17,11 +17,11 @@ from builders.export_jobs import (
     zero_of,
 )
 from builders.scene_builders import arm_model
-from cellplan.export.dialect import Dialect
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.settings.controllers import HandshakeEntry, KindName
+from cellplan.programs.elements.dialect import Dialect
 
 REST = 0.1  # [s] at both ends
 

@@ -10,13 +10,13 @@ import numpy as np
 
 from builders.batch_cells import everyone, relations, seen_poses
 from cellplan.checks.tools.tracking import errors_on_part
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import Array
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell, Grasp
-from cellplan.model.clocked_path import distinct
-from cellplan.model.motion import Motion, Schedule
-from cellplan.model.task import SpacePolylinePath
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.motion.motion import Motion, Schedule
+from cellplan.model.task.clocked_path import distinct
+from cellplan.model.task.task import SpacePolylinePath
+from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.path.build import build_toolpath

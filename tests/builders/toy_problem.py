@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.model.joint_limits import JointLimits
+from cellplan.model.robot.robot import JointLimits
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 END = 2.0  # [s]

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from builders.scene_builders import body, joint, make_cell, placed, stick
+from cellplan.files.robots.bundled import load_bundled
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
-from cellplan.io.robots.bundled import load_bundled
-from cellplan.model.cell import Obstacle, Robot
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Obstacle, Robot
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.pipeline.plan.retiming import RowLimits, joint_bounds
 from cellplan.planning.timing.retime import Retimer
+from cellplan.runs.plan.retiming import RowLimits, joint_bounds
 from cellplan.scene.scene import Scene
 
 CHECKS = ChecksEntry()
@@ -33,7 +33,7 @@ def scene_of(*robots: Robot, things: Sequence[Obstacle] = (), step: float = STEP
 
 
 def retimer_of(scene: Scene) -> Retimer:
-    """The limits of all joints, as the pipeline has them."""
+    """The limits of all joints, as the planner has them."""
     limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
     return Retimer(
         bounds=limits.bounds, step=limits.step, feed_share=lambda sigma: np.zeros(len(sigma)), slower=limits.slower

@@ -4,8 +4,8 @@ import json
 import re
 from pathlib import Path
 
-from cellplan.io.input.files import digest
-from cellplan.io.run.joint_tables import program_digest
+from cellplan.files.input.files import digest
+from cellplan.files.run.joint_tables import program_digest
 
 PAIR = """\
 cellplan: 1

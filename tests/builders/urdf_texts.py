@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.io.robots.urdf.load import UrdfOptions, load_urdf
+from cellplan.files.robots.urdf.load import UrdfOptions, load_urdf
 
 LIMIT = '<limit lower="-1" upper="2" velocity="3"/>'
 

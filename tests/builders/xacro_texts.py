@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.io.input.allowed_folders import AllowedFolders
-from cellplan.io.robots.urdf.document import UrdfDocument, read_document
-from cellplan.io.robots.urdf.xacro import XacroSettings
+from cellplan.files.input.files import AllowedFolders
+from cellplan.files.robots.urdf.document.document import UrdfDocument, read_document
+from cellplan.files.robots.urdf.document.xacro import XacroSettings
 
 HEAD = '<robot name="rig" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 ARM = f"""\

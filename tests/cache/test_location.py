@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cellplan.cache.location import cache_folder
+from cellplan.cache.store import cache_folder
 
 needs_posix = pytest.mark.skipif(os.name == "nt", reason="owners and rights are those of Linux and macOS")
 needs_xdg = pytest.mark.skipif(sys.platform != "linux", reason="the place of Linux")

@@ -10,8 +10,8 @@ from builders.scene_builders import body, floor, joint, make_cell, placed, slide
 from cellplan.certify.certify import certify
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import RobotModel
+from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 

@@ -9,12 +9,12 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import GroundSearch
 from cellplan.certify.pair_state import PairState
-from cellplan.collision.bodies import CollisionBody
-from cellplan.collision.continuous.motion_bound import PairMotion
-from cellplan.collision.distance import measure
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import Array
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot.robot import RobotModel
+from cellplan.scene.collision.bodies import CollisionBody
+from cellplan.scene.collision.continuous.motion_bound import PairMotion
+from cellplan.scene.collision.distance import measure
 from cellplan.scene.scene import Scene
 
 ROUNDING = 1e-9  # [m]

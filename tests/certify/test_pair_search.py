@@ -10,13 +10,13 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.linear_motion import StraightMotion
 from cellplan.certify.pair_search import SolidSearch
 from cellplan.certify.pair_state import MAX_CUTS, PairState
-from cellplan.collision.distance import APART_TOL, measure
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Sphere
 from cellplan.geometry.transforms import Array, frame_from_axes, pose, pose_from
-from cellplan.model.cell import Cell
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.scene.collision.distance import APART_TOL, measure
 from cellplan.scene.scene import Scene
 
 PLACEMENTS = 200

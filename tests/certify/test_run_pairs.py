@@ -19,7 +19,7 @@ from builders.scene_builders import (
 from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows, scene_of_run
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Tool
+from cellplan.model.cell.cell import Tool
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

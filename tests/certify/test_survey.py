@@ -8,9 +8,9 @@ from cellplan.certify import bound, search
 from cellplan.certify.certify import certify
 from cellplan.certify.pair_state import SEARCH_TOL
 from cellplan.certify.survey import CLOSEST_COUNT, Survey
-from cellplan.collision.distance import APART_TOL
 from cellplan.geometry.transforms import Array
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.collision.distance import APART_TOL
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.cli.main import run
-from cellplan.pipeline.gate.equal_text import first_difference
+from cellplan.runs.gate.equal_text import first_difference
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.model.task import TimeLaw, TimeLawKind
-from cellplan.model.time_law import advance, peak_rate
+from cellplan.model.task.task import TimeLaw, TimeLawKind
+from cellplan.model.task.time_law import advance, peak_rate
 
 DOCS = Path(__file__).resolve().parent.parent.parent / "docs"
 TAU = np.linspace(0.0, 1.0, 60_001)

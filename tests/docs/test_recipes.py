@@ -22,7 +22,7 @@ TRACES = {
     "resolution method": r"\bjacobian_transpose\b",
     "check": r"\bcheck_locked\b",
     "figure": r"\benergy_proxy_s\b",
-    "kind of result": r"\bsweep_result\b",
+    "kind of result": r"\bcellplan\.jobs\.sweep\.result\b",
     "program format": r"\brender_csv\b|\bimport CSV\b",
     "command": r"\bcellplan\.cli\.verify\b",
     "bundled robot": r"\bplanar_3r\b",
@@ -52,7 +52,7 @@ CHECK = '''"""Check of the travel of all joints."""
 
 import numpy as np
 
-from cellplan.model.report import Check
+from cellplan.model.report.report import Check
 
 
 def check_travel(q, *, limit):
@@ -69,7 +69,7 @@ FORMAT = '''"""CSV with semicolons."""
 
 from dataclasses import replace
 
-from cellplan.export.csv import CSV, read_csv, render_csv
+from cellplan.programs.formats.csv import CSV, read_csv, render_csv
 
 
 def render_semicolons(job):
@@ -93,9 +93,9 @@ FIGURE = {
 }  # what is written into the table of figures, by what it stands behind
 KIND = '''"""How far each joint of a cell travels: the work, and its record, text, page and tables."""
 
-from cellplan.model.report import CAUTION
-from cellplan.pipeline.solve import solve
-from cellplan.pipeline.write_run import versions
+from cellplan.model.report.report import CAUTION
+from cellplan.runs.solve import solve
+from cellplan.runs.write_run import versions
 from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
 from cellplan.report.record.common import as_json, number
@@ -115,7 +115,7 @@ def write_travels(record, folder):
     """Write record and page."""
     folder.mkdir()
     (folder / "travels.json").write_text(as_json(record))
-    (folder / "travels.html").write_text(template("travels.html").render(r=record, caution=CAUTION))
+    (folder / "travels.html").write_text(template("jobs/travels.html").render(r=record, caution=CAUTION))
 
 
 TRAVELS = ResultKind(
@@ -156,9 +156,9 @@ class TravelsOptions(Options):
 
 def travels(options: TravelsOptions) -> Result:
     """How far each joint travels."""
-    from cellplan.io.cell.load import load_cell
-    from cellplan.pipeline.travels import travels as made
-    from cellplan.pipeline.travels import write_travels
+    from cellplan.files.cell.load import load_cell
+    from cellplan.jobs.travels import travels as made
+    from cellplan.jobs.travels import write_travels
 
     record = made(load_cell(options.cell))
     write_travels(record, options.output)
@@ -253,33 +253,33 @@ def add_check(copy: Path) -> None:
     insert(verify, "import numpy as np\n", "from cellplan.checks.joints.travel import check_travel\n")
     insert(verify, "        checks=tuple(checks", ") + tuple(check_travel(q, limit=10.0)")
     insert(
-        copy / "model" / "check_kinds.py",
+        copy / "model" / "report" / "check_kinds.py",
         "# the gravest first\n",
         '    CheckKind("travel", "travel small", "Too far"),\n',
     )
 
 
 def add_format(copy: Path) -> None:
-    (copy / "export" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
-    dialects = copy / "pipeline" / "export" / "dialects.py"
-    insert(dialects, "from typing import Final\n", "\nfrom cellplan.export.semicolons import SEMICOLONS\n")
+    (copy / "programs" / "formats" / "semicolons.py").write_text(FORMAT, encoding="utf-8")
+    dialects = copy / "programs" / "dialects.py"
+    insert(dialects, "from typing import Final\n", "\nfrom cellplan.programs.formats.semicolons import SEMICOLONS\n")
     insert(dialects, "dialect.name: dialect for dialect in (", "SEMICOLONS, ")
 
 
 def add_figure(copy: Path) -> None:
     for after, text in FIGURE.items():
         insert(copy / "report" / "record" / "figures.py", after, text)
-    insert(copy / "pipeline" / "sweep_result.py", "COLUMNS: Final = (", '"travel_s", ')
+    insert(copy / "jobs" / "sweep" / "result.py", "COLUMNS: Final = (", '"travel_s", ')
 
 
 def add_kind(copy: Path) -> None:
-    (copy / "pipeline" / "travels.py").write_text(KIND, encoding="utf-8")
-    (copy / "report" / "page" / "templates" / "travels.html").write_text(KIND_PAGE, encoding="utf-8")
+    (copy / "jobs" / "travels.py").write_text(KIND, encoding="utf-8")
+    (copy / "jobs" / "travels.html").write_text(KIND_PAGE, encoding="utf-8")
     (copy / "cli" / "improve" / "travels.py").write_text(KIND_COMMAND, encoding="utf-8")
     insert(copy / "cli" / "main.py", "import sweep\n", "from cellplan.cli.improve.travels import travels\n")
     insert(copy / "cli" / "main.py", '"sweep": sweep, ', '"travels": travels, ')
-    kinds = copy / "pipeline" / "present" / "kinds.py"
-    insert(kinds, "import STUDY\n", "from cellplan.pipeline.travels import TRAVELS\n")
+    kinds = copy / "jobs" / "present" / "kinds.py"
+    insert(kinds, "import STUDY\n", "from cellplan.jobs.travels import TRAVELS\n")
     insert(kinds, "OF_JOBS: Final = (", "TRAVELS, ")
 
 

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cellplan import load_cell, solve
-from cellplan.pipeline.solution import Run, Solution
+from cellplan.runs.solution import Run, Solution
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 

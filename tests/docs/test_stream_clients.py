@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from builders.shown_jobs import streamed_arm
 
-from cellplan.pipeline.export.dialects import DIALECTS
+from cellplan.programs.dialects import DIALECTS
 
 PAGE = Path(__file__).resolve().parent.parent.parent / "docs" / "guides" / "programs-stream.md"
 RSI, RTDE = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.M | re.S)

@@ -14,12 +14,12 @@ import pytest
 from fuzz.failing_disk import faulty
 
 from cellplan.errors import InputError
-from cellplan.io.cell.load import load_cell
-from cellplan.io.run.folder import RunFolder
-from cellplan.io.templates import write_folder
-from cellplan.pipeline.solution import Solution
-from cellplan.pipeline.solve import solve
-from cellplan.pipeline.write_run import write_run
+from cellplan.files.cell.load import load_cell
+from cellplan.files.run.folder import RunFolder
+from cellplan.files.templates import write_folder
+from cellplan.runs.solution import Solution
+from cellplan.runs.solve import solve
+from cellplan.runs.write_run import write_run
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = [sys.executable, "-m", "cellplan"]

@@ -10,7 +10,7 @@ from fuzz import hostile_files
 
 from cellplan.cli.terminal.errors import error_lines
 from cellplan.errors import InputError, OverrunError
-from cellplan.io.cell.load import load_cell
+from cellplan.files.cell.load import load_cell
 
 LONGEST_S = 10.0
 LINE = re.compile(r"[\w./-]+(:\d+)?: \S.*")

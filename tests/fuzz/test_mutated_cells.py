@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from cellplan.cli.terminal.errors import error_lines
 from cellplan.errors import InputError, OverrunError
-from cellplan.io.cell.load import load_cell
-from cellplan.io.cell_errors import load_errors
+from cellplan.files.cell.load import load_cell
+from cellplan.files.cell_errors import load_errors
 
 ROOT = Path(__file__).resolve().parents[2]
 CELLS = sorted(path.relative_to(ROOT / "cells").as_posix() for path in (ROOT / "cells").rglob("*.yaml"))

@@ -136,7 +136,7 @@ def test_a_file_named_as_a_module_in_the_working_folder_is_not_run(tmp_path: Pat
 
 def test_a_cell_without_files_of_its_own_needs_no_child(cells: Path) -> None:
     code = (
-        "import sys; from cellplan.io.cell.load import load_cell; from cellplan.guard import isolated_call; "
+        "import sys; from cellplan.files.cell.load import load_cell; from cellplan.guard import isolated_call; "
         "load_cell(sys.argv[1]); print(len(isolated_call._running))"
     )
     counts = [

@@ -8,11 +8,11 @@ from builders.timed_cells import Case, case_of, shipped, slowly_clocked
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.cell import Cell
-from cellplan.model.joint_spline import JointSpline
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.layout_screening import Candidates, screen_layouts
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 COEFFICIENTS = 30
 CELL = shipped("four_robots")

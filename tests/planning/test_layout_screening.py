@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import Array, pose
-from cellplan.io.cell.load import load_cell
 from cellplan.planning.layout_screening import AT_ONCE, Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion

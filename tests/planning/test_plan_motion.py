@@ -12,12 +12,12 @@ from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangl
 
 from cellplan.errors import DivergedError, InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.solver import Integrator
-from cellplan.model.task import SpacePolylinePath
+from cellplan.model.task.task import SpacePolylinePath
 from cellplan.planning.methods.weighted_pseudo_inverse import SINGULAR_REGION
 from cellplan.planning.tracking.weighted_inverse import LARGEST_DAMPING
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 EULER = Integrator.EULER
 MOST_SOLVES = 20_000  # [-] systems of equations, four times what the hardest of these motions takes

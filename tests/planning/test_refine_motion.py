@@ -9,11 +9,11 @@ from builders.timed_cells import Case, case_of, shipped
 from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.curves.curve import Curve, Interval
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.motion import Motion
+from cellplan.model.motion.motion import Motion
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.refine_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import schedule_paths
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 DENT = 2e-5  # [m] depth
 DENT_AT, DENT_WIDTH = 2.9, 0.004  # [rad] along a circle of 0.1 m: narrower than the distance of two nodes

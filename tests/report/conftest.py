@@ -10,9 +10,9 @@ import pytest
 
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
+from cellplan.model.cell.cell import Cell, Grasp, Mode, MotionSettings, Part, Robot, Tool
 from cellplan.model.origin import Origin
-from cellplan.model.report import (
+from cellplan.model.report.report import (
     Check,
     ClearanceClass,
     ClearanceMinimum,
@@ -25,11 +25,11 @@ from cellplan.model.report import (
     RobotSpeed,
     TaskAccuracy,
 )
-from cellplan.model.robot import Joint, JointKind, RobotModel
+from cellplan.model.robot.robot import Joint, JointKind, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
+from cellplan.model.task.task import CirclePath, PlaneName, Task, TimeLaw, TimeLawKind
 from cellplan.report.record.common import Provenance
 
 N = 4001

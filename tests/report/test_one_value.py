@@ -5,18 +5,17 @@ from typing import Any
 
 import pytest
 
-from cellplan.model.cell import Mode
-from cellplan.model.verdict import verdict
-from cellplan.pipeline.compare.result import ROWS
-from cellplan.pipeline.still.instant import heading, worst_instant
-from cellplan.pipeline.view.run_scene import _facts
+from cellplan.jobs.compare.result import ROWS
+from cellplan.jobs.view.run_scene import _facts
+from cellplan.model.cell.cell import Mode
+from cellplan.model.report.verdict import verdict
 from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.render import MODES, report_page
-from cellplan.report.record.columns import page_cells, terminal_table
-from cellplan.report.record.figures import SHOWN
+from cellplan.report.record.figures import SHOWN, page_cells, terminal_table
 from cellplan.report.record.numbers import plain, seconds
 from cellplan.report.record.run import run_record
 from cellplan.report.text.run import figure_lines, motion_text
+from cellplan.runs.drawings.instant import heading, worst_instant
 
 
 @pytest.fixture

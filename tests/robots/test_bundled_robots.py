@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from cellplan.files.robots.bundled import load_bundled
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse, rotation_from_rpy, transform_points
-from cellplan.io.robots.bundled import load_bundled
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.robot import BASE, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.robot import BASE, RobotModel
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cellplan.files.robots.bundled import bundled_names, load_bundled
+from cellplan.files.robots.urdf.load import UrdfOptions, load_urdf
 from cellplan.geometry.shapes import support
 from cellplan.geometry.transforms import Array
-from cellplan.io.robots.bundled import bundled_names, load_bundled
-from cellplan.io.robots.urdf.load import UrdfOptions, load_urdf
-from cellplan.kinematics.reach import arm_reach
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.robot import Body, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.robot import Body, RobotModel
+from cellplan.scene.kinematics.reach import arm_reach
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 POSITION_TOL = 1e-12  # [m] rounding of a few metres
 

@@ -11,14 +11,14 @@ import pytest
 import trimesh
 from body_accuracy import compare, distance_to, mesh_points, skin_points
 
+from cellplan.files.robots import bundled
+from cellplan.files.robots.joint_table import read_robot_table
+from cellplan.files.robots.urdf.load import read_urdf
 from cellplan.geometry.transforms import Array, inverse, pose, pose_from, rotation_about, transform_points
-from cellplan.io.robots import bundled
-from cellplan.io.robots.joint_table import read_robot_table
-from cellplan.io.robots.urdf.load import read_urdf
-from cellplan.kinematics.reach import arm_reach
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.robot import BASE, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.robot import BASE, RobotModel
+from cellplan.scene.kinematics.reach import arm_reach
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SAME = 1e-9  # [m], [-]: two chains of double products over ten frames
 TOUCHING = 0.012  # [m] bearing gap between the bodies of neighbouring links

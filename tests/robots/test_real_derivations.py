@@ -8,10 +8,10 @@ import pytest
 from builders.jacobian_cells import planners_jacobian
 from builders.random_cells import random_cell
 
-from cellplan.io.robots.urdf.load import read_urdf
-from cellplan.kinematics.derivations.davies import davies_cooperation_jacobian
-from cellplan.kinematics.derivations.denavit_hartenberg import dh_cooperation_jacobian
-from cellplan.kinematics.derivations.successive_screws import screw_cooperation_jacobian
+from cellplan.files.robots.urdf.load import read_urdf
+from cellplan.jobs.explain.derivations.davies import davies_cooperation_jacobian
+from cellplan.jobs.explain.derivations.denavit_hartenberg import dh_cooperation_jacobian
+from cellplan.jobs.explain.derivations.successive_screws import screw_cooperation_jacobian
 
 ROBOTS = ["kuka_kr16_2", "kuka_kr5_arc", "abb_irb1600_8_145", "abb_irb2400_12_155", "staubli_rx160"]
 AGREEMENT = 1e-11  # [-] of the largest entry

@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 import yaml
 
+from cellplan.files.robots.urdf.load import load_urdf, read_urdf
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, pose_from, rotation_about
-from cellplan.io.robots.urdf.load import load_urdf, read_urdf
-from cellplan.model.robot import BASE, FollowerJoint, Joint, RobotModel
+from cellplan.model.robot.robot import BASE, FollowerJoint, Joint, RobotModel
 
 ROBOTS = [
     *("kuka_kr16_2", "kuka_kr5_arc", "abb_irb1600_8_145", "abb_irb2400_12_155"),

@@ -24,10 +24,10 @@ from cellplan.errors import InputError
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, Grasp
-from cellplan.model.left_out import LeftOutKind
-from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.report.left_out import LeftOutKind
+from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import RobotModel
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

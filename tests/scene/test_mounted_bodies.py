@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import InputError
+from cellplan.files.robots.bundled import load_bundled
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.io.robots.bundled import load_bundled
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.mounting import Hanger, Pedestal
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.mounting import Hanger, Pedestal
+from cellplan.model.robot.robot import BASE
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

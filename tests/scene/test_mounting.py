@@ -20,8 +20,8 @@ from builders.scene_builders import (
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, Grasp, Part
-from cellplan.model.left_out import LeftOutKind
+from cellplan.model.cell.cell import Cell, Grasp, Part
+from cellplan.model.report.left_out import LeftOutKind
 from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
 from cellplan.scene.mounting import Mount
 from cellplan.scene.pairs import Rule

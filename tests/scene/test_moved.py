@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cellplan.errors import CellplanError
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, pose
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.scene.bodies import is_ground
 from cellplan.scene.scene import Scene
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.collision.bodies import checked_poses, prepare
-from cellplan.collision.distance import measure
-from cellplan.collision.signed_distance import _along_centres
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import pose
-from cellplan.io.cell.load import load_cell
+from cellplan.scene.collision.bodies import checked_poses, prepare
+from cellplan.scene.collision.distance import measure
+from cellplan.scene.collision.signed_distance import _along_centres
 from cellplan.scene.near import NearPairs
 from cellplan.scene.scene import Scene
 

@@ -23,11 +23,11 @@ from builders.scene_builders import (
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell, Grasp, Part
-from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import FollowerJoint, JointKind, Link, RobotModel
+from cellplan.model.cell.cell import Cell, Grasp, Part
+from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import FollowerJoint, JointKind, Link, RobotModel
 from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
-from cellplan.model.task import Frame
+from cellplan.model.task.task import Frame
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

@@ -11,11 +11,11 @@ from cellplan import load_cell
 from cellplan.checks.verify import run_clearance
 from cellplan.errors import InputError
 from cellplan.model.progress import silent
-from cellplan.model.report import Check
-from cellplan.pipeline.plan.program_faults import refuse_hanging_parts
-from cellplan.pipeline.plan.sequence import _Worked
+from cellplan.model.report.report import Check
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import program_stages
+from cellplan.runs.plan.program_faults import refuse_hanging_parts
+from cellplan.runs.plan.sequence import _Worked
 
 FLAT = "bodies: [{cylinder: {radius_mm: 50, length_mm: 120}, at: {xyz_mm: [0, 0, 60]}}]"
 PIN = "{cylinder: {radius_mm: 8, length_mm: 120}, at: {xyz_mm: [0, 0, 60]}}"

@@ -21,7 +21,7 @@ from builders.scene_builders import (
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Box, Cylinder
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.scene.scene import Scene
 
 

@@ -12,9 +12,9 @@ from cellplan.certify.run_pairs import scene_of_run, with_straight_move
 from cellplan.certify.survey import CLOSEST_COUNT
 from cellplan.checks.clearance.contacts import EXACT_TOL, clearance_check, collision_checks, find_contacts, time_of
 from cellplan.geometry.arrays import Array
-from cellplan.model.motion import Schedule
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceMinimum, ClearanceReport, ClosePair
 from cellplan.scene.scene import Scene
 
 STAGE: Final = "checking clearance"

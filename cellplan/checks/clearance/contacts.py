@@ -6,10 +6,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.bound import Bound, PairBound
-from cellplan.collision.distance import TIGHT_TOL
 from cellplan.geometry.arrays import Array
-from cellplan.model.report import Check, ClearanceClass, ClearanceMinimum, Contact
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceMinimum, Contact
 from cellplan.model.units import MM, rounded_down
+from cellplan.scene.collision.distance import TIGHT_TOL
 from cellplan.scene.pairs import Rule
 
 MAX_BREAK: Final = 0.010  # [s] touches with shorter breaks between them are one contact

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.report.report import Check
 
 HOME_TOL: Final = 1e-7  # [deg] or [mm]: tables have twelve decimals, and cells as many
 

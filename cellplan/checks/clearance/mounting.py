@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.certify.depths import PairDepth, mounted_depths
 from cellplan.geometry.transforms import Array
-from cellplan.model.report import Check
+from cellplan.model.report.report import Check
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.grips import closed_gap

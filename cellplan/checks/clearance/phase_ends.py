@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.certify.free_clocks import ClockRegion, certify_regions
+from cellplan.certify.free_clocks.free_clocks import ClockRegion, certify_regions
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.skew import stands_still
@@ -23,11 +23,11 @@ from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse
-from cellplan.model.cell import Cell, Relation, stacked_positions
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Report
-from cellplan.model.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit
-from cellplan.model.task import Frame, Task
+from cellplan.model.cell.cell import Cell, Relation, stacked_positions
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Report
+from cellplan.model.report.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit
+from cellplan.model.task.task import Frame, Task
 from cellplan.scene.scene import Scene
 
 HALVINGS: Final = 14  # of a skew, from 200 ms to 12 us; below that none is proved

@@ -13,18 +13,18 @@ from itertools import combinations
 
 import numpy as np
 
-from cellplan.certify.free_motion import FreeMotion
-from cellplan.certify.free_shift import ShiftBound, free_shift
+from cellplan.certify.free_clocks.free_motion import FreeMotion
+from cellplan.certify.free_clocks.free_shift import ShiftBound, free_shift
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolTravel
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, stacked_positions
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import ToolDepth
-from cellplan.model.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit, SkewReport, ToolSkew
-from cellplan.model.task import Frame
+from cellplan.model.report.report import ToolDepth
+from cellplan.model.report.skew import MOST_SKEW, AllowedSkew, PairSkew, SkewLimit, SkewReport, ToolSkew
+from cellplan.model.task.task import Frame
 from cellplan.scene.scene import Scene
 
 STAGE = "searching the allowed skew"

@@ -6,19 +6,19 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.tools.tracking import part_poses
-from cellplan.collision.bodies import BodyPoses, prepare
-from cellplan.collision.distance import measure
-from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Flags
 from cellplan.geometry.line_spans import line_spans
 from cellplan.geometry.shapes import Solid, Sphere
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Check, Standoff
-from cellplan.model.task import Frame, OffPart, Task
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Check, Standoff
+from cellplan.model.task.task import Frame, OffPart, Task
 from cellplan.model.units import MM
+from cellplan.scene.collision.bodies import BodyPoses, prepare
+from cellplan.scene.collision.distance import measure
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 UNSTATED: Final = 0.002  # [m] beyond its tolerance: a process that states nothing is at the surface within that
 TIP_RADIUS: Final = 1e-6  # [m] of the ball that stands for a tip: less than distances are worked out to

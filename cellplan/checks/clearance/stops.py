@@ -14,19 +14,19 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.certify.free_clocks import ClockRegion, RegionBound, band, certify_regions
+from cellplan.certify.free_clocks.free_clocks import ClockRegion, RegionBound, band, certify_regions
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.checks.clearance.skew import stands_still
 from cellplan.checks.clearance.tool_depth import tool_axis_depths, tool_depth_at
 from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.model.cell import Cell, Grasp
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell, Grasp
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.report import Check
-from cellplan.model.stops import StopDepth, StopDistance, StopGrip, StopInstant, StopReport, running_on
-from cellplan.model.task import Frame
+from cellplan.model.report.report import Check
+from cellplan.model.report.stops import StopDepth, StopDistance, StopGrip, StopInstant, StopReport, running_on
+from cellplan.model.task.task import Frame
 from cellplan.model.units import MM
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene

@@ -10,12 +10,12 @@ from cellplan.checks.tools.tracking import part_poses
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.tool_columns import Columns, body_columns, depths, line_depths
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import Check, ToolDepth
-from cellplan.model.task import Frame, SampledPath, Task, TimedPath
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check, ToolDepth
+from cellplan.model.task.task import Frame, SampledPath, Task, TimedPath
 from cellplan.model.units import MM
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 AXIS: Final = "axis"
 AXIS_COMPONENTS: Final = (0, 1, 2, 3, 4)  # of a task: they leave no more than the turn about one axis open

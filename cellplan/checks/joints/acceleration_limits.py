@@ -12,8 +12,7 @@ from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import process_speeds
 from cellplan.geometry.arrays import Array, Flags, first_peak
 from cellplan.geometry.shapes import bounding_box
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.acceleration import (
+from cellplan.model.cell.acceleration import (
     JointAcceleration,
     LimitSource,
     MotionAccelerations,
@@ -22,9 +21,10 @@ from cellplan.model.acceleration import (
     PointAcceleration,
     full_speed_in,
 )
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Check
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 FAILURE_ROWS: Final = (1.5, 2.5)  # [-] steps before and after the instant at which a joint fails: not judged
 FAILURE_REASON: Final = "a failing joint stops instantly, and the others compensate instantly"

@@ -9,12 +9,12 @@ from cellplan.checks.joints.acceleration_limits import acceleration_limit, retim
 from cellplan.checks.joints.accelerations import jerks, point_accelerations
 from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Timing
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.process_times import fixed_rests, process_span
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task import TIME_TOLERANCE, Task
+from cellplan.model.task.process_times import fixed_rests, process_span
+from cellplan.model.task.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene
 

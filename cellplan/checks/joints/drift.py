@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
-from cellplan.model.repeatability import JointDrift, Repeatability
-from cellplan.model.report import Check
-from cellplan.model.task import TIME_TOLERANCE
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Check
+from cellplan.model.robot.repeatability import JointDrift, Repeatability
+from cellplan.model.task.task import TIME_TOLERANCE
 
 REVOLUTE_DRIFT_TOL: Final = float(np.deg2rad(0.001))  # [rad] below the repeatability of any arm's joints
 PRISMATIC_DRIFT_TOL: Final = 1e-6  # [m] likewise

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, Report
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, Report
 
 
 def check_joins(cell: Cell, reports: Sequence[Report]) -> Check:

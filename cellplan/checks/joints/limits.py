@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, first_peak
-from cellplan.model.cell import Robot
-from cellplan.model.doubts import doubt_about_velocity
-from cellplan.model.report import Check, JointUse
+from cellplan.model.cell.cell import Robot
+from cellplan.model.cell.doubts import doubt_about_velocity
+from cellplan.model.report.report import Check, JointUse
 
 SHOWN_TOL: Final = 1e-9  # [rad] sums of rounded positions
 

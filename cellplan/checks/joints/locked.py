@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, LockedJoint
-from cellplan.model.report import Check, TaskAccuracy
+from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.report.report import Check, TaskAccuracy
 from cellplan.model.settings.task import ToleranceEntry
 
 STANDSTILL_TOL: Final = 1e-9  # [deg] or [mm] a joint that stands still may differ by: a thousand units in the tables

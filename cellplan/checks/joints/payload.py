@@ -9,13 +9,13 @@ import numpy as np
 from cellplan.checks.joints.accelerations import point_accelerations
 from cellplan.geometry.inertia import centre_and_inertia
 from cellplan.geometry.transforms import Array, inverse, transform_points
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Robot
-from cellplan.model.payload import AxisUse, LoadUse
-from cellplan.model.report import Check
-from cellplan.model.robot import BASE, FollowerJoint, Joint
+from cellplan.model.cell.cell import Cell, Grasp, Robot
+from cellplan.model.report.report import Check
+from cellplan.model.robot.payload import AxisUse, LoadUse
+from cellplan.model.robot.robot import BASE, FollowerJoint, Joint
 from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
 from cellplan.model.units import MM
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 GRAVITY: Final = 9.80665  # [m/s^2] standard gravity, downwards along the world's z
 UP: Final = np.array([0.0, 0.0, 1.0])

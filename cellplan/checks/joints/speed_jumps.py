@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_vector
-from cellplan.model.motion import Schedule
+from cellplan.model.motion.motion import Schedule
 
 SIDE_S: Final = 1e-6  # [s] before and after a time: the velocities on its two sides
 JUMP_TOL: Final = 1e-4  # [m/s] or [rad/s]: a smaller change of a tool's speed is no jump

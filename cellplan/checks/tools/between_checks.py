@@ -6,10 +6,10 @@ from typing import Final
 
 from cellplan.checks.tools.between_rows import ErrorsBetweenRows
 from cellplan.geometry.transforms import Array
-from cellplan.model.between_rows import BetweenError
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Check, ClosureAccuracy, TaskAccuracy
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.between_rows import BetweenError
+from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.model.units import DEGREES, MILLIMETRES
 from cellplan.scene.scene import Scene

@@ -24,11 +24,11 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Indices
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.model.between_rows import BetweenError, BetweenRows
-from cellplan.model.cell import Relation, stacked_positions
-from cellplan.model.motion import Schedule
-from cellplan.model.report import ClosureAccuracy, TaskAccuracy
-from cellplan.model.task import TIME_TOLERANCE, Frame, Task
+from cellplan.model.cell.cell import Relation, stacked_positions
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.between_rows import BetweenError, BetweenRows
+from cellplan.model.report.report import ClosureAccuracy, TaskAccuracy
+from cellplan.model.task.task import TIME_TOLERANCE, Frame, Task
 from cellplan.scene.scene import Scene
 
 SUBDIVISION_COUNT: Final = 10  # [-] subdivisions of a step

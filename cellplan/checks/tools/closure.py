@@ -8,10 +8,10 @@ import numpy as np
 
 from cellplan.checks.tools.tracking import errors_on_part, worst_error
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, ClosureAccuracy
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, ClosureAccuracy
 from cellplan.model.units import DEG, MM
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 CURE: Final = "a shorter motion.step_s, a slower motion or a path farther from singularities reduces it"
 

@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, skew
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Conditioning
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Conditioning
+from cellplan.model.task.task import Frame
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 MAX_SAMPLES: Final = 2000  # [-] worked on at once, however small the stack is
 WELL_CONDITIONED: Final = 1e-3  # [-] ratio of singular values down to which their squares give them to nine digits

@@ -18,8 +18,8 @@ import numpy as np
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Relation
+from cellplan.model.cell.cell import Relation
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 MAX_PARTS: Final = 16  # finer steps that the fastest steps are cut into

@@ -6,13 +6,13 @@ import numpy as np
 
 from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.acceleration import STEADY_FRACTION, ProcessSpeed
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import REDUCED_SPEED, Check, RobotSpeed
+from cellplan.model.cell.acceleration import STEADY_FRACTION, ProcessSpeed
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import REDUCED_SPEED, Check, RobotSpeed
 from cellplan.model.settings.units import si_or_none
 from cellplan.model.units import MM
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> RobotSpeed:

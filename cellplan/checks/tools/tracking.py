@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import Check, TaskAccuracy
-from cellplan.model.task import Frame, Task
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check, TaskAccuracy
+from cellplan.model.task.task import Frame, Task
 from cellplan.model.units import DEG, MM
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def part_poses(cell: Cell, chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> Array:

@@ -12,8 +12,8 @@ from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
-    from cellplan.model.cell import Cell, Robot
-    from cellplan.pipeline.check import CellCheck
+    from cellplan.jobs.check import CellCheck
+    from cellplan.model.cell.cell import Cell, Robot
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,10 +48,10 @@ def check(options: CheckOptions) -> Result:
 def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Read and check a cell; ``follow`` is called with the cell as soon as it is read."""
     from cellplan.cli.next_steps import after_check
-    from cellplan.io.cell.load import load_cell
-    from cellplan.pipeline.check import check as check_cell
-    from cellplan.pipeline.check import check_lines
-    from cellplan.pipeline.overrides import with_overrides
+    from cellplan.files.cell.load import load_cell
+    from cellplan.jobs.check import check as check_cell
+    from cellplan.jobs.check import check_lines
+    from cellplan.runs.overrides import with_overrides
 
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
     follow(given)
@@ -66,12 +66,12 @@ def _checked(options: CheckOptions, follow: "Callable[[Cell], None]", progress: 
 
 def _record(result: "CellCheck") -> dict[str, Any]:
     """The result in printed units."""
-    from cellplan.report.record.clearance import left_out_record
     from cellplan.report.record.common import check_record, number
-    from cellplan.report.record.missing_tools import missing_tools
-    from cellplan.report.record.open_surfaces import open_surfaces_record
-    from cellplan.report.record.solver import moved_start_record
-    from cellplan.report.record.tasks import direction_record
+    from cellplan.report.record.sections.clearance import left_out_record
+    from cellplan.report.record.sections.open_surfaces import open_surfaces_record
+    from cellplan.report.record.sections.rests_on import missing_tools
+    from cellplan.report.record.sections.solver import moved_start_record
+    from cellplan.report.record.sections.tasks import direction_record
     from cellplan.report.text.notes import open_surface_notes
 
     open_surfaces = open_surfaces_record(result.cell)

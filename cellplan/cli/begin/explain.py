@@ -25,10 +25,10 @@ def explain(options: ExplainOptions) -> Result:
 
     Exit status: 0 shown, 2 bad input, 4 internal error.
     """
-    from cellplan.io.cell.load import load_cell
-    from cellplan.pipeline.explain import explain as explain_cell
-    from cellplan.pipeline.explain_result import structure_lines, structure_record
-    from cellplan.pipeline.overrides import with_overrides
+    from cellplan.files.cell.load import load_cell
+    from cellplan.jobs.explain.explain import explain as explain_cell
+    from cellplan.jobs.explain.result import structure_lines, structure_record
+    from cellplan.runs.overrides import with_overrides
 
     cell = with_overrides(load_cell(options.cell, allow_dirs=options.allow_dirs), options.settings)
     record = structure_record(explain_cell(cell))

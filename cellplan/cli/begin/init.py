@@ -12,7 +12,7 @@ from cellplan.cli.terminal.output import Result, say, say_json
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
-    from cellplan.io.templates import Template
+    from cellplan.files.templates import Template
 
 NOTES = {
     "cell.yaml": "the cell, with comments",
@@ -24,7 +24,7 @@ NOTES = {
 
 def _names() -> list[str]:
     """Names that a shell may complete."""
-    from cellplan.io.templates import TEMPLATES
+    from cellplan.files.templates import TEMPLATES
 
     return [template.name for template in TEMPLATES]
 
@@ -49,7 +49,7 @@ def init(options: InitOptions) -> Result | None:
     The cell is commented and passes check and solve at once. Beside it come its JSON Schema, which lets editors
     complete and explain every key, and a page on what to do next. Existing files are never overwritten.
     """
-    from cellplan.io.templates import TEMPLATES, template_files, template_named, write_folder
+    from cellplan.files.templates import TEMPLATES, template_files, template_named, write_folder
 
     folder = options.folder
     if options.show_list == (folder is not None) or (options.show_list and options.template is not None):

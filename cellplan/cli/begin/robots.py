@@ -13,7 +13,7 @@ from cellplan.cli.options.shared import AsJson
 from cellplan.cli.terminal.output import say, say_json, show
 
 if TYPE_CHECKING:
-    from cellplan.model.robot import RobotModel
+    from cellplan.model.robot.robot import RobotModel
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,14 +62,14 @@ def robots(options: RobotsOptions) -> None:
                 say("")
             show(_lines(record))
     else:
-        from cellplan.pipeline.robot_description import description_lines
+        from cellplan.jobs.robot_description import description_lines
 
         show(description_lines(records[0]))
 
 
 def _listed() -> list[dict[str, Any]]:
     """All bundled robots."""
-    from cellplan.io.robots.bundled import bundled_names, load_bundled
+    from cellplan.files.robots.bundled import bundled_names, load_bundled
 
     return [_record(name, load_bundled(name)) for name in bundled_names()]
 
@@ -89,9 +89,9 @@ def _arguments(texts: Sequence[str]) -> dict[str, str]:
 
 def _described(model: str, options: RobotsOptions, xacro_args: dict[str, str]) -> dict[str, Any]:
     """What one robot's file says."""
-    from cellplan.io.cell.robot_file import describe_robot
-    from cellplan.kinematics.reach import arm_reach
-    from cellplan.pipeline.robot_description import description_record
+    from cellplan.files.cell.robot_file import describe_robot
+    from cellplan.jobs.robot_description import description_record
+    from cellplan.scene.kinematics.reach import arm_reach
 
     described = describe_robot(model, flange=options.flange, package_dirs=options.package_dirs, xacro_args=xacro_args)
     return description_record(described, None if described.model is None else arm_reach(described.model))
@@ -99,10 +99,10 @@ def _described(model: str, options: RobotsOptions, xacro_args: dict[str, str]) -
 
 def _record(name: str, model: "RobotModel") -> dict[str, Any]:
     """One robot in printed units."""
-    from cellplan.kinematics.reach import arm_reach
-    from cellplan.pipeline.robot_description import published_reach
-    from cellplan.report.record.controller import zero_record
-    from cellplan.report.record.joint_limits import joint_record
+    from cellplan.jobs.robot_description import published_reach
+    from cellplan.report.record.sections.controller import zero_record
+    from cellplan.report.record.sections.joint_limits import joint_record
+    from cellplan.scene.kinematics.reach import arm_reach
 
     return {
         "name": name,
@@ -117,7 +117,7 @@ def _record(name: str, model: "RobotModel") -> dict[str, Any]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """One robot as text: joint, range, largest speed."""
-    from cellplan.report.record.joint_limits import limits_text
+    from cellplan.report.record.sections.joint_limits import limits_text
 
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     if (published := record["published_reach"]) is not None:

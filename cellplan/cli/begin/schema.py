@@ -24,16 +24,16 @@ def schema(options: SchemaOptions) -> None:
     if options.robot + options.report + options.series + options.layout > 1:
         raise typer.BadParameter("expected at most one of --robot, --report, --series and --layout")
     if options.robot:
-        from cellplan.io.schema import robot_table_schema
+        from cellplan.files.schema import robot_table_schema
 
         say_json(robot_table_schema())
     elif options.report or options.series or options.layout:
-        from cellplan.pipeline.layout.record import layout_schema
+        from cellplan.jobs.layout.record import layout_schema
         from cellplan.report.record.schema import report_schema, series_schema
 
         say_json(report_schema() if options.report else series_schema() if options.series else layout_schema())
     else:
-        from cellplan.io.robots.bundled import bundled_names
-        from cellplan.io.schema import json_schema
+        from cellplan.files.robots.bundled import bundled_names
+        from cellplan.files.schema import json_schema
 
         say_json(json_schema(bundled_names()))

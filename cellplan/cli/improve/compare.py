@@ -58,9 +58,9 @@ def compare(options: CompareOptions) -> Result:
     input, 130 interrupted (--resume goes on).
     """
     from cellplan.guard import processors
-    from cellplan.pipeline.compare.compare import CompareJob, first_name
-    from cellplan.pipeline.compare.compare import compare as run_comparison
-    from cellplan.pipeline.compare.result import comparison_lines
+    from cellplan.jobs.compare.compare import CompareJob, first_name
+    from cellplan.jobs.compare.compare import compare as run_comparison
+    from cellplan.jobs.compare.result import comparison_lines
 
     job = options.to(CompareJob)
     folder, workers = options.output or Path("outputs") / f"{first_name(job)}-compare", options.workers or processors()

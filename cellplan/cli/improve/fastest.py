@@ -89,13 +89,13 @@ def fastest(options: FastestOptions) -> Result:
     """
     if options.free is not None:
         return _free(options, options.free)
+    from cellplan.files.cell.load import load_cell
+    from cellplan.files.run.folder import refuse_unless_replaceable
     from cellplan.guard import processors
-    from cellplan.io.cell.load import load_cell
-    from cellplan.io.run.folder import refuse_unless_replaceable
-    from cellplan.pipeline.fastest.demand import read_demand
-    from cellplan.pipeline.fastest.result import fastest_lines, fastest_record, write_fastest
-    from cellplan.pipeline.fastest.shortest import fastest as shortest
-    from cellplan.pipeline.overrides import require_task, with_overrides
+    from cellplan.jobs.fastest.demand import read_demand
+    from cellplan.jobs.fastest.result import fastest_lines, fastest_record, write_fastest
+    from cellplan.jobs.fastest.shortest import fastest as shortest
+    from cellplan.runs.overrides import require_task, with_overrides
 
     demand = None if options.demand is None else read_demand(options.demand)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)

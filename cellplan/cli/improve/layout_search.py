@@ -7,22 +7,22 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
+from cellplan.cli.options.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
+from cellplan.files.cell.load import load_cell
+from cellplan.files.input.findings import did_you_mean, listed, shown
+from cellplan.files.run.folder import refuse_unless_replaceable
 from cellplan.guard import processors
-from cellplan.io.cell.load import load_cell
-from cellplan.io.input.findings import did_you_mean, listed, shown
-from cellplan.io.run.folder import refuse_unless_replaceable
-from cellplan.pipeline.layout.quantities import read_angle, read_length, read_misplacement, read_time
-from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.result import layout_lines
-from cellplan.pipeline.layout.search import refuse_search, search_layout
-from cellplan.pipeline.layout.workers import layout_workers
-from cellplan.pipeline.repair.record import SCHEMA
-from cellplan.pipeline.repair.repair import repair
-from cellplan.pipeline.repair.result import advice_lines, write_repair
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.result import layout_lines
+from cellplan.jobs.layout.search import refuse_search, search_layout
+from cellplan.jobs.layout.workers import layout_workers
+from cellplan.jobs.repair.record import SCHEMA
+from cellplan.jobs.repair.repair import repair
+from cellplan.jobs.repair.result import advice_lines, write_repair
 from cellplan.search.programs.objective import CycleTiming, Objective
 from cellplan.study.session import Stop
 

@@ -59,11 +59,11 @@ def sweep(options: SweepOptions) -> Result:
     A variant that fails is a row with its reason. Exit status: 0 at least one variant passed, 1 none did, 2 bad input,
     130 interrupted (--resume goes on).
     """
+    from cellplan.files.cell.load import load_cell
     from cellplan.guard import processors
-    from cellplan.io.cell.load import load_cell
-    from cellplan.pipeline.sweep import SweepJob
-    from cellplan.pipeline.sweep import sweep as run_sweep
-    from cellplan.pipeline.sweep_result import study_lines
+    from cellplan.jobs.sweep.result import study_lines
+    from cellplan.jobs.sweep.sweep import SweepJob
+    from cellplan.jobs.sweep.sweep import sweep as run_sweep
     from cellplan.study.variants import read_axis
 
     axes = [read_axis(text) for text in options.vary]

@@ -19,7 +19,7 @@ Completer = Callable[[str], list[str]]
 
 
 def one_of(*choices: str) -> Completer:
-    """Completes one of some words, or the first word of a member of an enumeration, as in ``cellplan.model.cell:Mode``.
+    """Completes one of some words, or the first word of a member of an enumeration: ``cellplan.model.cell.cell:Mode``.
 
     Enumerations are read when a shell asks: help texts load no engine.
     """
@@ -62,7 +62,7 @@ def robot_names(ctx: typer.Context, incomplete: str) -> list[str]:
 def _names_in_cell(ctx: typer.Context, key: str, incomplete: str) -> list[str]:
     """Keys below a key of the cell file; none if it cannot be read."""
     from cellplan.errors import CellplanError
-    from cellplan.io.yaml.reader import read_yaml
+    from cellplan.files.yaml.reader import read_yaml
 
     words = [ctx.params.get("cell"), *ctx.args]  # the option without its value ends the parsing: the rest is in args
     path = next((Path(word) for word in words if word and Path(word).suffix in CELL_SUFFIXES), None)

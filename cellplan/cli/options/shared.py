@@ -25,7 +25,7 @@ Mode = Annotated[
     option(
         "--mode MODE",
         "Which robots move: simultaneous, pairwise, part_at_rest or semi_coordinated.",
-        autocompletion=one_of("cellplan.model.cell:Mode"),
+        autocompletion=one_of("cellplan.model.cell.cell:Mode"),
     ),
 ]
 Method = Annotated[

@@ -45,15 +45,10 @@ def recover(options: RecoverOptions) -> Result:
     status: 0 written, 1 a check fails, 2 bad input, or a run that is changed or stale, 3 no recovery was found (the
     reason is written, no tables), 4 internal error.
     """
-    from cellplan.pipeline.gate.open_gate import open_gate
-    from cellplan.pipeline.recover.recover import recover as recovered
-    from cellplan.pipeline.recover.result import (
-        default_folder,
-        recovery_lines,
-        refuse_unless_recoverable,
-        write_recovery,
-    )
-    from cellplan.pipeline.recover.state import refuse_state
+    from cellplan.jobs.recover.recover import recover as recovered
+    from cellplan.jobs.recover.result import default_folder, recovery_lines, refuse_unless_recoverable, write_recovery
+    from cellplan.jobs.recover.state import refuse_state
+    from cellplan.runs.gate.open_gate import open_gate
 
     at, frozen, keep = options.at, frozen_times(options.frozen), options.keep
     require_choice(options.cell, without_cell=options.without_cell)

@@ -45,13 +45,13 @@ def rehearse(options: RehearseOptions) -> Result:
     Exit status: 0 the true errors are within tolerance (with --feedback: after correction), 1 they are not,
     2 bad input, 3 no solution, 4 internal error.
     """
-    from cellplan.io.cell.load import load_cell
-    from cellplan.io.cell_errors import load_errors
-    from cellplan.io.run.folder import REHEARSAL, refuse_unless_replaceable
-    from cellplan.pipeline.overrides import with_draws, with_overrides
-    from cellplan.pipeline.rehearsal.rehearse import rehearse as rehearse_cell
-    from cellplan.pipeline.rehearsal.result import summary_lines, write_rehearsal
+    from cellplan.files.cell.load import load_cell
+    from cellplan.files.cell_errors import load_errors
+    from cellplan.files.run.folder import REHEARSAL, refuse_unless_replaceable
+    from cellplan.jobs.rehearsal.rehearse import rehearse as rehearse_cell
+    from cellplan.jobs.rehearsal.result import summary_lines, write_rehearsal
     from cellplan.report.plots.rendering import require_formats
+    from cellplan.runs.overrides import with_draws, with_overrides
 
     require_formats(options.plots)
     cell = with_overrides(load_cell(options.cell, allow_dirs=options.allow_dirs), options.settings)

@@ -15,7 +15,7 @@ from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import InputError
 
 if TYPE_CHECKING:
-    from cellplan.pipeline.export.choice import Choice
+    from cellplan.programs.export.choice import Choice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class ExportOptions(Options):
             "Format: csv, json or ros2 for any controller; krl, rapid, urscript or val3 for those of a maker; stream: "
             "rows at the cycle of each controller; wide: one table of all robots. May be repeated; all: every one that "
             "can take the run.",
-            autocompletion=one_of("cellplan.pipeline.export.dialects:DIALECTS", "wide", "all"),
+            autocompletion=one_of("cellplan.programs.dialects:DIALECTS", "wide", "all"),
         ),
     ]
     output: Annotated[
@@ -48,7 +48,7 @@ class ExportOptions(Options):
         option(
             "--targets KIND",
             "What rows state: joints, or part: tool poses on the part.",
-            autocompletion=one_of("cellplan.model.exported:Targets"),
+            autocompletion=one_of("cellplan.model.report.exported:Targets"),
         ),
     ] = "joints"
     promise: Annotated[
@@ -56,7 +56,7 @@ class ExportOptions(Options):
         option(
             "--promise WORD",
             "Only this promise: timed, synchronised or sequence (default: the best that holds).",
-            autocompletion=one_of("cellplan.model.exported:Promise"),
+            autocompletion=one_of("cellplan.model.report.exported:Promise"),
         ),
     ] = None
     split: Annotated[int | None, option("--split N", "Most rows of a file or routine (default: of the format).")] = None
@@ -80,17 +80,17 @@ def export(options: ExportOptions) -> Result:
     fails, 2 bad input, or a run that is changed or stale, 4 internal error. One format is written only if it is 0. Of
     several each is written or refused by itself; 1 or 2 if one that was named is refused, or all are.
     """
-    from cellplan.io.run.folder import PROGRAMS
-    from cellplan.pipeline.export.program import default_folder, export_program, refuse_choice
-    from cellplan.pipeline.export.several import (
+    from cellplan.files.run.folder import PROGRAMS
+    from cellplan.programs.export.program import default_folder, export_program, refuse_choice
+    from cellplan.programs.export.several import (
         NothingFitsError,
         chosen_formats,
         export_programs,
         refuse_unfit_run,
         refuse_unless_writable,
     )
-    from cellplan.pipeline.export.stored import read_stored_export
-    from cellplan.pipeline.gate.open_gate import open_gate
+    from cellplan.programs.export.stored import read_stored_export
+    from cellplan.runs.gate.open_gate import open_gate
 
     formats = chosen_formats(options.forms)
     require_choice(options.cell, without_cell=options.without_cell)
@@ -121,8 +121,8 @@ def _choice(options: ExportOptions) -> "Choice":
     Raises:
         InputError: There is no such kind of row, or no such promise.
     """
-    from cellplan.model.exported import Promise, Targets
-    from cellplan.pipeline.export.choice import Choice
+    from cellplan.model.report.exported import Promise, Targets
+    from cellplan.programs.export.choice import Choice
 
     targets = {str(kind): kind for kind in Targets}
     promises = {None: None} | {promise.split()[0]: promise for promise in Promise}

@@ -9,8 +9,8 @@ from cellplan.cli.terminal.output import Result, notes
 from cellplan.errors import ExitStatus, InputError
 
 if TYPE_CHECKING:
-    from cellplan.model.verified_run import ReadRun, VerifiedRun
-    from cellplan.pipeline.export.several import Exported
+    from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+    from cellplan.programs.export.several import Exported
 
 SCHEMA: Final = "cellplan.exported/1"
 

@@ -40,7 +40,7 @@ def floor_plan(options: FloorPlanOptions) -> None:
     Of a run it shows what its motion sweeps; of a cell that was not solved the start. DXF needs the package ezdxf, as
     pip install 'cellplan[dxf]' brings it. Exit status: 0 the drawing was written, 2 bad input, 4 internal error.
     """
-    from cellplan.pipeline.floor_plan_file import (
+    from cellplan.jobs.floor_plan_file import (
         FloorPlanRequest,
         PlanFormat,
         requested_floor_plan,

@@ -25,10 +25,10 @@ from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
 
 if TYPE_CHECKING:
-    from cellplan.model.cell import Cell
-    from cellplan.pipeline.solution import Solution
+    from cellplan.model.cell.cell import Cell
     from cellplan.planning.transfer.best_try import BlockedTransferError
     from cellplan.report.record.common import Record
+    from cellplan.runs.solution import Solution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,12 +86,12 @@ def solve(options: SolveOptions) -> Result:
 
 def _solved(options: SolveOptions, follow: "Callable[[Cell], None]", progress: Listener) -> Result:
     """Solve and write; ``follow`` is called with the cell as soon as it is read."""
-    from cellplan.io.cell.load import load_cell
-    from cellplan.io.run.folder import refuse_unless_replaceable
-    from cellplan.pipeline.overrides import require_task, with_overrides
-    from cellplan.pipeline.parallel import solve_in_parallel
+    from cellplan.files.cell.load import load_cell
+    from cellplan.files.run.folder import refuse_unless_replaceable
     from cellplan.planning.transfer.best_try import BlockedTransferError
     from cellplan.report.plots.rendering import require_formats
+    from cellplan.runs.overrides import require_task, with_overrides
+    from cellplan.runs.solve import solve_in_parallel
 
     require_formats(options.plots)
     given = load_cell(options.cell, allow_dirs=options.allow_dirs)
@@ -118,7 +118,7 @@ def _solved(options: SolveOptions, follow: "Callable[[Cell], None]", progress: L
 
 def _with_page(error: "BlockedTransferError", folder: Path) -> "BlockedTransferError":
     """The error with the 3-D page of the best try, which is written beside the run folder."""
-    from cellplan.pipeline.view.write import write_view_of_blocked
+    from cellplan.jobs.view.write import write_view_of_blocked
 
     page = folder.with_name(f"{folder.name}-{error.name or 'transfer'}.html")
     shown = f"; 3-D page of the best try: {page}" if write_view_of_blocked(error, page) else ""
@@ -145,11 +145,11 @@ def _result(options: SolveOptions, changed: "Cell", solution: "Solution", record
 
 def _written(solution: "Solution", folder: Path, options: SolveOptions, progress: Listener) -> "Record":
     """Write a run folder, with its 3-D page where that is desired."""
-    from cellplan.pipeline.write_run import write_run
+    from cellplan.runs.write_run import write_run
 
     record = write_run(solution, folder, keep_rejected=options.keep_rejected, formats=options.plots, progress=progress)
     if options.with_view:
-        from cellplan.pipeline.view.write import write_view_of_run
+        from cellplan.jobs.view.write import write_view_of_run
 
         write_view_of_run(folder, solution.cell, progress=progress)
     return record

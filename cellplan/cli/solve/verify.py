@@ -17,7 +17,7 @@ from cellplan.errors import ExitStatus, InputError, NotVerifiedError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from cellplan.model.verified_run import VerifiedRun
+    from cellplan.model.report.verified_run import VerifiedRun
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +48,7 @@ def verify(options: VerifyOptions) -> Result:
 
     Exit status: 0 verified, 1 a check fails, 2 not a run, changed or stale, 4 internal error.
     """
-    from cellplan.pipeline.export.stored import is_export
+    from cellplan.programs.export.stored import is_export
 
     try:
         if is_export(options.run):
@@ -66,9 +66,9 @@ def verify(options: VerifyOptions) -> Result:
 def _verified_run(options: VerifyOptions) -> Result:
     """Verify a run."""
     from cellplan.cli.next_steps import export_line
-    from cellplan.pipeline.gate.open_gate import open_gate
     from cellplan.report.text.failures import count_text
     from cellplan.report.text.run import figure_lines, motion_text, read_record
+    from cellplan.runs.gate.open_gate import open_gate
 
     with progress_listener(quiet=options.quiet) as progress:
         run = open_gate(options.run, cell=options.cell, allow_dirs=options.allow_dirs, progress=progress)
@@ -89,10 +89,10 @@ def _verified_run(options: VerifyOptions) -> Result:
 
 def _verified_programs(options: VerifyOptions) -> Result:
     """Verify a folder of exported programs against the run that they were made from."""
-    from cellplan.pipeline.export.program import require_format
-    from cellplan.pipeline.export.stored import read_stored_export, refuse_other_run, run_of_export
-    from cellplan.pipeline.export.verify_export import verify_export
-    from cellplan.pipeline.gate.open_gate import open_gate
+    from cellplan.programs.export.program import require_format
+    from cellplan.programs.export.stored import read_stored_export, refuse_other_run, run_of_export
+    from cellplan.programs.export.verify_export import verify_export
+    from cellplan.runs.gate.open_gate import open_gate
 
     stored = read_stored_export(options.run)
     source = options.of_run or run_of_export(options.run)

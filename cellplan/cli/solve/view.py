@@ -43,8 +43,8 @@ def view(options: ViewOptions) -> Result:
     its start, with the bases to move; of a layout search its best layouts. Exit status: 0 the page was written,
     whatever it shows, 2 bad input, 4 internal error.
     """
-    from cellplan.pipeline.view.write import ViewRequest, write_view
-    from cellplan.pipeline.view.write import view as view_record
+    from cellplan.jobs.view.write import ViewRequest, write_view
+    from cellplan.jobs.view.write import view as view_record
 
     with progress_listener(quiet=options.quiet) as progress:
         record, target = view_record(options.to(ViewRequest), progress=progress)

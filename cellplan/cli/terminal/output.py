@@ -3,15 +3,33 @@
 import contextlib
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from cellplan.cli.terminal.errors import OutputError, error_lines, exit_status
-from cellplan.cli.terminal.screen import is_terminal, screen_text
 from cellplan.errors import ExitStatus
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+SIGNS: Final = {True: "✓", False: "✗", None: ""}  # of a verdict: passed, failed, or neither
+COLOURS: Final = {True: "bold green", False: "bold red", None: "bold"}
+WHOLE: Final = re.compile(r"next: |[A-Za-z0-9-]+( page)?: \S+$")  # commands and paths to copy are not broken
+STYLES: Final = (  # of a whole line, by what it begins with; the first that fits counts
+    (re.compile(r"\s+FAILED "), "red"),
+    (re.compile(r"\s+note: "), "yellow"),
+    (re.compile(r"\s+(not checked in full|not judged|payload not judged|grip): "), "dim"),
+    (re.compile(r"next: "), "bold cyan"),
+    (re.compile(r"[A-Za-z0-9-]+( page)?: \S+$"), "cyan"),
+)
+COLUMN_GAP: Final = re.compile(r"\S {2,}(?=\S)")
+MAX_HANGING: Final = 0.6  # [-] fraction of the width at which further lines may begin, at most
+TABLE_GAPS: Final = 3  # [-] gaps from which a line is a row of a table, which would be harder to read if wrapped
+NARROW: Final = 20  # [columns] of a terminal below which nothing is wrapped
 
 
 class Result(NamedTuple):
@@ -112,3 +130,84 @@ def _abandon_stdout() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
+
+
+def is_terminal() -> bool:
+    """Whether standard output is a terminal that shows colours and signs."""
+    if sys.stdout is None or not sys.stdout.isatty() or os.environ.get("TERM", "dumb") == "dumb":
+        return False
+    return (sys.stdout.encoding or "").lower().startswith("utf")
+
+
+def screen_text(lines: Sequence[str], *, passed: bool | None, width: int) -> str:
+    """Lines with signs and colours, wrapped at a width; colours are left out if NO_COLOR is set.
+
+    Args:
+        passed: The verdict; None for a result that neither passes nor fails.
+        width: Columns of the terminal.
+    """
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(width=width, force_terminal=True, highlight=False, no_color=None)
+    plain = bool(os.environ.get("NO_COLOR"))
+    with console.capture() as capture:
+        for number, line in enumerate(lines):
+            styled = _verdict(line, passed) if number == 0 else _styled(line)
+            for piece in _wrapped(styled, width):
+                shown = Text(piece.plain) if plain else piece
+                console.print(shown, soft_wrap=True)
+    return capture.get().removesuffix("\n")
+
+
+def _verdict(line: str, passed: bool | None) -> "Text":
+    """The first line, with its sign."""
+    from rich.text import Text
+
+    return Text(f"{SIGNS[passed]} {line}".lstrip(), style=COLOURS[passed])
+
+
+def _styled(line: str) -> "Text":
+    """A further line in the style of its kind; FAILED becomes the sign."""
+    from rich.text import Text
+
+    style = next((style for pattern, style in STYLES if pattern.match(line)), "")
+    return Text(re.sub(r"^(\s+)FAILED ", rf"\1{SIGNS[False]} ", line), style=style)
+
+
+def _wrapped(line: "Text", width: int) -> "list[Text]":
+    """The line in pieces of at most ``width`` columns; a word that is longer, such as a path, is left whole."""
+    from rich.text import Text
+
+    if len(line.plain) <= width or width < NARROW or _is_whole(line.plain):
+        return [line]
+    hanging = " " * _hanging_indent(line.plain, width)
+    pieces, start, left = [], 0, width
+    while len(line.plain) - start > left:
+        text = line.plain[start:]
+        first = len(text) - len(text.lstrip())
+        end = text.rfind(" ", first, left + 1)
+        if end <= first:
+            end = text.find(" ", left)
+        if end <= first:
+            break
+        pieces.append(line[start : start + end])
+        start = len(line.plain) - len(text[end:].lstrip())
+        left = width - len(hanging)
+    pieces.append(line[start:])
+    for piece in pieces:
+        piece.rstrip()
+    return pieces[:1] + [Text.assemble(hanging, piece) for piece in pieces[1:]]
+
+
+def _is_whole(text: str) -> bool:
+    """Whether a line stands on one line whatever the width: something to copy, or a row of a table."""
+    return WHOLE.match(text) is not None or len(COLUMN_GAP.findall(text)) >= TABLE_GAPS
+
+
+def _hanging_indent(text: str, width: int) -> int:
+    """Where the further pieces of a line begin: below its last column, or a little right of its beginning."""
+    gaps = [match.end() for match in COLUMN_GAP.finditer(text)]
+    begin = len(text) - len(text.lstrip())
+    below = [gap for gap in gaps if gap <= MAX_HANGING * width]
+    return below[-1] if below else begin + 2

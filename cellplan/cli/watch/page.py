@@ -8,7 +8,7 @@ from typing import Final
 from urllib.parse import quote
 
 from cellplan.errors import InputError
-from cellplan.io.run.whole_file import write_whole
+from cellplan.files.run.whole_file import write_whole
 from cellplan.report.page.watch import MARK, state_script, watch_page
 
 MARK_WITHIN: Final = 400  # [bytes]

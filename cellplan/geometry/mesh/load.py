@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from cellplan.cache import key_of
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.cache import keep_mesh, recall_mesh
-from cellplan.geometry.mesh.collada_file import parse_collada
+from cellplan.geometry.mesh.formats.collada_file import parse_collada
+from cellplan.geometry.mesh.formats.polygons import Triangles
+from cellplan.geometry.mesh.formats.stl_obj import parse_mesh, require_likely_count, unknown_format
 from cellplan.geometry.mesh.healing import require_few_pieces
-from cellplan.geometry.mesh.polygons import Triangles
 from cellplan.geometry.mesh.rays import RayHits, ray_hits
-from cellplan.geometry.mesh.stl_obj import parse_mesh, require_likely_count, unknown_format
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.mesh.topology import (
     components,

@@ -5,11 +5,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import CACHE_BLOCK
 from cellplan.planning.collocation.batch_targets import sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import largest
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.batched import CACHE_BLOCK
 
 STEPS: Final = 2  # of Newton's method: from a thousandth of a millimetre the first one goes nearly all the way
 SMALL: Final = 1e-3  # [rad] and [m] of such a step: a larger one is no correction any more

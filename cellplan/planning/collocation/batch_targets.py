@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Grasp
-from cellplan.model.clocked_path import ClockedPath
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Grasp
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.start_offset import StartOffset
 from cellplan.planning.collocation.windows import Window

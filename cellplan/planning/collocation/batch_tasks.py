@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import SMALL_ANGLE, Array
-from cellplan.kinematics.batched import BatchChains, BatchState, Placement
-from cellplan.model.cell import Cell, Relation
+from cellplan.model.cell.cell import Cell, Relation
 from cellplan.planning.collocation.arrow_inverse import ArrowInverse
 from cellplan.planning.tracking.task_constraints import TaskConstraints
+from cellplan.scene.kinematics.batched import BatchChains, BatchState, Placement
 
 # Desired tool poses, shape (4, 4, tasks, batch), and twists, linear first, shape (6, tasks, batch), in the frames that
 # the tasks are relative to.

@@ -7,8 +7,8 @@ import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import Schedule
-from cellplan.model.task import TIME_TOLERANCE
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath, joined
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.euler.cycle_closing import SAME_POSE, closing_drift, not_back

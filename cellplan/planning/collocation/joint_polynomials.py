@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
+from cellplan.model.motion.joint_path import JointPath
 from cellplan.planning.collocation.windows import Panel
 
 

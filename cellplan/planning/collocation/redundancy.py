@@ -5,15 +5,15 @@ from collections.abc import Callable
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import Placement
-from cellplan.kinematics.link_forest import LinkForest
-from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.joint_weights import HEADING_DAMPING, JointWeights
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.scene.kinematics.batched import Placement
+from cellplan.scene.kinematics.link_forest import LinkForest
+from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel
 
 Screws = Callable[[], Array]  # of all axes, shape (K, 6, axes)
 

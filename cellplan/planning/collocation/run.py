@@ -6,12 +6,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import CACHE_BLOCK
-from cellplan.model.cell import Cell
-from cellplan.model.clocked_path import distinct
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
-from cellplan.model.task import TIME_TOLERANCE
+from cellplan.model.task.clocked_path import distinct
+from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.collocation.batch_targets import desired_motion, in_windows, sampled
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
@@ -31,6 +30,7 @@ from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
 from cellplan.planning.tracking.given_path import GivenPath
 from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.batched import CACHE_BLOCK
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path
 SHORTEST_SHARE: Final = 1.0 / 4096.0  # of the motion: panels may be that short where steps of the clock are longer

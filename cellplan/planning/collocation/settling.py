@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import Placement
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.task.task import Frame
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
+from cellplan.scene.kinematics.batched import Placement
 
 NEWTON_STEPS: Final = 20  # to bring the tools to the starts of their paths; about six where they come there
 LARGEST_STEP: Final = 0.5  # [rad] or [m] of one of them

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import Placement
 from cellplan.planning.collocation.batch_targets import DesiredAt, in_windows
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.collocation.redundancy import Redundancy
 from cellplan.planning.collocation.windows import Window
+from cellplan.scene.kinematics.batched import Placement
 
 Indices = NDArray[np.intp]
 Drift = Callable[[Array], Array]  # times in [s], shape (K,), to joint velocities, shape (nq, K)

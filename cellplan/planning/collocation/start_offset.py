@@ -6,10 +6,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, rotation_exp
-from cellplan.kinematics.batched import Placement
-from cellplan.model.approach_retract import REST_TO_REST
-from cellplan.model.time_law import advance
+from cellplan.model.task.time_law import REST_TO_REST, advance
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired
+from cellplan.scene.kinematics.batched import Placement
 
 QUIET: Final = 0.1  # share of the accuracy up to which a start counts as on its path
 ROUNDS: Final = 8  # of projecting the offset through the components that a task keeps; the first is nearly right

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.task import TIME_TOLERANCE
+from cellplan.model.task.task import TIME_TOLERANCE
 
 NONE: Final = np.zeros(0)
 DEGREES: Final = (6, 12, 24)  # of polynomials: a panel that is not exact enough gets the next one, or is cut

@@ -6,8 +6,8 @@ import numpy as np
 
 from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, joint_at
-from cellplan.model.motion import Motion
+from cellplan.model.cell.cell import Cell, joint_at
+from cellplan.model.motion.motion import Motion
 from cellplan.model.progress import Progress, silent
 from cellplan.planning.euler.cycle_closing import closed
 from cellplan.planning.methods import method_named

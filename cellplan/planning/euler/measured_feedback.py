@@ -12,9 +12,9 @@ import numpy as np
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp, rotation_vector
-from cellplan.model.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.motion.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.settings.solver import SecondaryEntry
-from cellplan.model.task import Task
+from cellplan.model.task.task import Task
 from cellplan.planning.euler.integrate import integrate_schedule, refuse_long_step
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors

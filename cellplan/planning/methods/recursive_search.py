@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.methods.support.configuration_search import (
     STALLED,
     Bounds,

@@ -19,8 +19,16 @@ from cellplan.geometry.curves.curve import (
 from cellplan.geometry.curves.spline import spline_through
 from cellplan.geometry.curves.surface_patch import Patch
 from cellplan.geometry.transforms import Array
-from cellplan.model.path_direction import outside_of, plane_axes
-from cellplan.model.task import CirclePath, PolygonPath, RunDirection, SampledPath, SpacePolylinePath, Task, TimedPath
+from cellplan.model.task.path_direction import outside_of, plane_axes
+from cellplan.model.task.task import (
+    CirclePath,
+    PolygonPath,
+    RunDirection,
+    SampledPath,
+    SpacePolylinePath,
+    Task,
+    TimedPath,
+)
 from cellplan.planning.path.formatting import direction_name, in_mm, length
 from cellplan.planning.path.point_spacing import largest_bulge, named_points, refuse_near_points, refuse_near_times
 

@@ -7,7 +7,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.curves.curve import BezierCurve
 from cellplan.geometry.transforms import Array
-from cellplan.model.task import SampledPath, TimedPath
+from cellplan.model.task.task import SampledPath, TimedPath
 from cellplan.planning.path.formatting import in_mm, length
 
 NEAR_SMOOTH: Final = 0.01  # [-] of the distance to their other neighbours: a smooth curve turns with such a pair …

@@ -13,8 +13,8 @@ from cellplan.geometry.curves.surface_patch import Patch, ProjectedCurve, patche
 from cellplan.geometry.mesh.load import corner_normals, ray_hits
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Mesh, Sphere, bounding_sphere, support
 from cellplan.geometry.transforms import Array, inverse, transform_points
-from cellplan.model.cell import Part
-from cellplan.model.task import Task
+from cellplan.model.cell.cell import Part
+from cellplan.model.task.task import Task
 from cellplan.planning.path.curve import PathCurve
 from cellplan.planning.path.formatting import AXIS_NAMES, direction_name, in_mm, length
 

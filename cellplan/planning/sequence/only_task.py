@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell
-from cellplan.model.task import Task
+from cellplan.model.cell.cell import Cell
+from cellplan.model.task.task import Task
 
 
 def with_only_task(cell: Cell, name: str) -> Cell:

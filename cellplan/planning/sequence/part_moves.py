@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.task import Frame, SampledPath, Task, TimeLaw, TimeLawKind
-from cellplan.model.time_law import peak_rate
+from cellplan.model.task.task import Frame, SampledPath, Task, TimeLaw, TimeLawKind
+from cellplan.model.task.time_law import peak_rate
 
 PEAK_SPEED: Final = 0.1  # [m/s] of the tool near a part that is gripped or put down: slow
 QUINTIC: Final = TimeLaw(kind=TimeLawKind.QUINTIC)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.program import PartPlaceEntry
 from cellplan.planning.sequence.part_moves import PartMove, part_lying
 from cellplan.planning.sequence.stages import Stage

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Mode, Robot
-from cellplan.model.phase import Hold, Phase, Role, Transfer
+from cellplan.model.cell.cell import Cell, Mode, Robot
+from cellplan.model.motion.plan import Hold, Phase, Role, Transfer
 from cellplan.model.settings.program import PartPlaceEntry, ProgramEntry
-from cellplan.model.task import Task
+from cellplan.model.task.task import Task
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.part_moves import PartMove, part_lying, with_move

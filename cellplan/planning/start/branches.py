@@ -7,10 +7,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.clocked_path import ClockedPath
-from cellplan.model.task import Frame, Task
+from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.task import Frame, Task
 from cellplan.planning.start.failures import Failures, MissedGoal
 from cellplan.planning.start.given import is_off, part_pose, tool_distance
 from cellplan.planning.start.inverse_kinematics import (
@@ -25,6 +24,7 @@ from cellplan.planning.start.inverse_kinematics import (
 from cellplan.planning.start.near_ties import best_first
 from cellplan.planning.start.seeds import seeded
 from cellplan.planning.start.trial_motion import StartTrials
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SEEDS: Final = 48  # random starts of the inverse kinematics per robot and place; finds all 8 branches of a 6-axis arm
 SEEDS_PER_HOLDER: Final = 16  # the same when many configurations of the positioner are to be tried

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import finite_limits, random_configurations
 from cellplan.planning.start.trial_motion import StartTrials

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Relation
+from cellplan.model.cell.cell import Relation
 
 MOST_CANDIDATES: Final = 24  # configurations of a robot, or of the cell, that are considered again
 MOST_GOALS: Final = 6  # goals of a robot that are considered again

@@ -13,14 +13,14 @@ from cellplan.errors import (
     StartOutsideLimitsError,
 )
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.doubts import doubt_about_limits
-from cellplan.model.robot import Joint
-from cellplan.model.task import Frame, Task
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.cell.doubts import doubt_about_limits
+from cellplan.model.robot.robot import Joint
+from cellplan.model.task.task import Frame, Task
+from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.task_constraints import constraint_rows
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def start_place(cell: Cell, robot: Robot) -> str:

@@ -10,10 +10,10 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array, inverse, skew
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot.robot import RobotModel
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 RETREATS: Final = (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7)  # [m] by which the tool is drawn back
 SHARES: Final = (0.02, 0.04, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5)  # of its range by which a single joint moves

@@ -6,11 +6,11 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.transforms import inverse, skew
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Relation
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Relation
+from cellplan.model.robot.robot import RobotModel
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.task_constraints import constraint_rows
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 CLOSED: Final = 1e-12  # [m, rad] a configuration counts as found when the tool is this near its goal: rounding is 1e-15
 SAME_POSTURE: Final = 1e-3  # [rad, m] solutions nearer to each other are one branch

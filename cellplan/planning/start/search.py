@@ -1,7 +1,8 @@
 """Starts that are to be found: several inverse-kinematics branches per robot, tried out, the best one kept."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from itertools import islice
 from typing import Final
 
@@ -9,13 +10,12 @@ import numpy as np
 
 from cellplan.errors import StartNotFoundError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, joint_at
-from cellplan.model.clocked_path import ClockedPath
-from cellplan.model.name_order import NameOrder
+from cellplan.model.cell.cell import Cell, joint_at
+from cellplan.model.cell.name_order import NameOrder
 from cellplan.model.progress import Progress, silent
 from cellplan.model.seeds import generator
+from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.planning.start.branches import Branch, StartSearch, branches_of, holder_configurations
-from cellplan.planning.start.combinations import Picks, best_combinations
 from cellplan.planning.start.failures import Failures
 from cellplan.planning.start.near_ties import best_first, levels
 from cellplan.planning.start.reasons import why_nothing
@@ -25,6 +25,8 @@ from cellplan.scene.scene import Scene
 CANDIDATES: Final = 10  # configurations of the whole cell that are tried out at first
 ROUNDS: Final = 3  # times that as many are tried out while none keeps all limits and touches nothing
 COMBINATIONS_PER_HOLDER: Final = 3  # candidates taken from one configuration of the positioner, to compare several
+Picks = tuple[int, ...]
+MOST_LOOKS: Final = 20_000  # partial combinations evaluated before the search is given up: a second of work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -177,3 +179,35 @@ def _fault(trial: StartTrial, joints: Sequence[tuple[str, str]]) -> str:
         name = "/".join(joints[int(trial.speeds.argmin())])
         faults.append(f"{name} is {-100.0 * trial.speeds.min():.3g} % above its top speed")
     return " and ".join(faults)
+
+
+def best_combinations(scores: Sequence[Sequence[float]], is_ruled_out: Callable[[Picks], bool]) -> Iterator[Picks]:
+    """Combinations in the order of their worst score, the best first; equal ones in the order of the lists.
+
+    Partial combinations are grown best first, each by the worst score that it cannot do without: that of its own picks
+    and of the best branches of the robots to come. So the number of all combinations, which grows exponentially with
+    the number of robots, is never worked through. The search ends after ``MOST_LOOKS`` partial combinations.
+
+    Args:
+        scores: Scores of each robot's branches; a larger one is better.
+        is_ruled_out: Says of a partial combination, one pick for each of the first robots, that nothing can come of it;
+            evaluated anew for each, so that what is learned meanwhile counts.
+
+    Yields:
+        The index of the branch for each robot.
+    """
+    least = [min((-score for score in branches), default=float("inf")) for branches in scores]
+    to_come = [max(least[count:], default=float("-inf")) for count in range(len(scores) + 1)]
+    heap: list[tuple[float, int, Picks]] = [(to_come[0], 0, ())]
+    for _ in range(MOST_LOOKS):
+        if not heap:
+            return
+        badness, _, picks = heappop(heap)
+        if is_ruled_out(picks):
+            continue
+        if len(picks) == len(scores):
+            yield picks
+            continue
+        for pick, score in enumerate(scores[len(picks)]):
+            worst = max(badness, -score, to_come[len(picks) + 1])
+            heappush(heap, (worst, -len(picks) - 1, (*picks, pick)))

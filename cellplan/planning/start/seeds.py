@@ -12,15 +12,15 @@ import numpy as np
 
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array, inverse, rotation_exp
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.branches import MovedStart
-from cellplan.model.cell import Cell, Grasp, Relation, Robot
-from cellplan.model.task import Frame, Task
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.motion.branches import MovedStart
+from cellplan.model.task.task import Frame, Task
+from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance
 from cellplan.planning.start.inverse_kinematics import reaching_configurations
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.task_constraints import constraint_rows
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SEED_TURN: Final = np.radians(10.0)  # [rad] that a joint of a given start is moved at most: farther, it is a mistake
 SEED_SLIDE: Final = 0.05  # [m] likewise of a joint that slides

@@ -9,21 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.certify.depths import mounted_depths
+from cellplan.certify.run_pairs import rows_moved_by
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.clocked_path import ClockedPath
-from cellplan.model.motion import Schedule
-from cellplan.model.name_order import NameOrder
-from cellplan.model.phase import Phase
-from cellplan.model.task import Task
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.name_order import NameOrder
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.motion.plan import Phase
+from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.task import Task
 from cellplan.model.units import MM
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.layout_screening import Candidates, Screening, screen_layouts
-from cellplan.planning.modes import plan_phases, standing
+from cellplan.planning.modes import homeless, plan_phases, standing
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.start.near_ties import ALIKE
-from cellplan.planning.start.present_pairs import present_pairs
 from cellplan.planning.timing.schedule import clock_path, clock_times, schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.mounting import Mount
@@ -307,3 +307,11 @@ def _range_shares(cell: Cell, margins: Array) -> Array:
     half = 0.5 * (cell.joint_limits.upper - cell.joint_limits.lower)
     half = np.where(np.isfinite(half), half, np.pi)
     return np.minimum(margins / np.where(half > 0.0, half, 1.0), 1.0)
+
+
+def present_pairs(scene: Scene, phase: Phase) -> NDArray[np.bool_]:
+    """Which pairs of a scene do not depend on a home that is still to be found, shape (pairs,)."""
+    is_present = np.ones(len(scene.pairs), dtype=bool)
+    for name in homeless(scene.cell, phase):
+        is_present[rows_moved_by(scene, name)] = False
+    return is_present

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import Schedule
+from cellplan.model.motion.motion import Schedule
 
 SAME_PERIOD: Final = 1e-9  # [s] difference of cycles that take equally long: rounding
 

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
+from cellplan.model.motion.joint_path import JointPath
 
 STEPS_BETWEEN_BREAKS: Final = 12  # [-] intervals of integration between two breaks of the path
 FEWEST_STEPS: Final = 2000  # [-] intervals of integration of a whole path

@@ -8,12 +8,12 @@ motion with that jerk. The motion is then made slower as a whole until every lim
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final, Protocol
+from typing import Final, Protocol, Self
 
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
+from cellplan.model.motion.joint_path import JointPath
 from cellplan.planning.timing.fixed_rates import (
     FEWEST_STEPS,
     RATES,
@@ -25,7 +25,6 @@ from cellplan.planning.timing.fixed_rates import (
     whole_steps,
 )
 from cellplan.planning.timing.path_length import PathStretch, stretches
-from cellplan.planning.timing.retimed_path import AsWritten, RestToRest, RetimedPath, TimedRows
 from cellplan.planning.timing.speed_profile import SpeedProfile, fastest_profile
 
 POINTS_PER_ROW: Final = 5  # [-] lengths for every row of the tables at first; at least doubled once
@@ -39,8 +38,8 @@ MOST_STRETCHINGS: Final = 40  # [-] until every limit holds
 MOST_TIGHTENINGS: Final = 6  # [-] times that the speed is lowered where tools miss their tolerances between rows
 MOST_ROOTS: Final = 8  # [-] times that errors between rows are taken to grow with the square of the step
 MARGIN: Final = 1e-7  # [-] by which a motion is made slower than the limits ask for
-
 Slower = Callable[[Array, Array], float]  # nominal times and joints in the rows -> factor of time for the limits
+TIME_DECIMALS: Final = 12  # decimals kept of nominal times
 
 
 class StepTolerance(Protocol):
@@ -66,6 +65,54 @@ class JointLimitsInTime:
         """Time in [s] in which every limited joint can build up its full acceleration; 0 without a limit of jerk."""
         limited = np.isfinite(self.jerk) & np.isfinite(self.acceleration)
         return float((self.acceleration[limited] / self.jerk[limited]).max(initial=0.0))
+
+
+class TimedRows(Protocol):
+    """Motion of one stretch: its rows for any number of steps."""
+
+    def rows(self, count: int) -> Array:
+        """Nominal times of its rows in [s] when it takes so many steps, both ends included, shape (count + 1,)."""
+
+    @property
+    def is_fixed(self) -> bool:
+        """Whether it must take the steps that it takes."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RetimedPath:
+    """Motion along a whole path; every rest of all joints is a row."""
+
+    motions: tuple[TimedRows, ...]  # the motion of each stretch
+    counts: tuple[int, ...]  # steps that each of them takes
+    end: float  # last nominal time in [s]
+
+    @property
+    def steps(self) -> int:
+        """Steps that the whole takes; 1 where no joint moves at all."""
+        return max(1, sum(self.counts))
+
+    @property
+    def sigma(self) -> Array:
+        """Nominal times of the rows in [s], shape (steps + 1,)."""
+        rows = [motion.rows(count)[1:] for motion, count in zip(self.motions, self.counts, strict=True)]
+        sigma = np.concatenate([[0.0], *rows]) if rows else np.array([0.0, self.end])
+        sigma[-1] = self.end
+        return np.round(sigma, TIME_DECIMALS)
+
+    def lasting(self, steps: int) -> Self:
+        """The same motion slower as a whole, so that all loads fall alike; what is fixed takes no more.
+
+        Args:
+            steps: What it is to take, at least as many as it takes.
+        """
+        given = np.array(self.counts)
+        free = np.array([not motion.is_fixed for motion in self.motions], dtype=bool)
+        if not free.any():
+            return self
+        exact = np.where(free, given * ((steps - given[~free].sum()) / given[free].sum()), given)
+        counts = np.floor(exact).astype(int)
+        counts[np.argsort(counts - exact, kind="stable")[: steps - int(counts.sum())]] += 1
+        return replace(self, counts=tuple(counts.tolist()))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -225,3 +272,45 @@ class Retimer:
 def _longer(count: int, factor: float) -> int:
     """Steps of a motion that is slower by a factor: more than before."""
     return max(count + 1, int(np.ceil(count * factor * (1.0 - MARGIN))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AsWritten:
+    """The motion that the time laws give, slower or faster as a whole."""
+
+    piece: PathStretch
+
+    def rows(self, count: int) -> Array:
+        """See ``TimedRows``."""
+        return np.linspace(self.piece.sigma[0], self.piece.sigma[-1], count + 1)
+
+    @property
+    def is_fixed(self) -> bool:
+        """See ``TimedRows``."""
+        return False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestToRest:
+    """The fastest motion of one stretch, its speed averaged over a window in [s]."""
+
+    piece: PathStretch
+    profile: SpeedProfile
+    window: float
+
+    @property
+    def duration(self) -> float:
+        """Time that it takes in [s]."""
+        return self.profile.duration + self.window
+
+    def rows(self, count: int) -> Array:
+        """See ``TimedRows``."""
+        share = np.arange(count + 1) / count
+        lengths = self.profile.at(share * self.duration, self.window)
+        lengths[-1] = self.piece.length
+        return self.piece.at(np.maximum.accumulate(lengths))
+
+    @property
+    def is_fixed(self) -> bool:
+        """See ``TimedRows``."""
+        return False

@@ -1,5 +1,6 @@
 """Schedule: all toolpaths on one common clock."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Final
@@ -9,18 +10,16 @@ import numpy as np
 from cellplan.errors import InputError, TooFewStepsError
 from cellplan.geometry.curves.arc_length import quickly
 from cellplan.geometry.transforms import Array, rotation_vector
-from cellplan.model.approach_retract import stand_off
-from cellplan.model.cell import Cell
-from cellplan.model.clock import Clock
-from cellplan.model.clocked_path import ClockedPath
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.process_times import demanded_spans, leaves_at, ramp_shares
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.clock import Clock
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task import TIME_TOLERANCE, Task
-from cellplan.model.time_law import peak_rate, reached_at
-from cellplan.model.toolpath import Toolpath
+from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.process_times import demanded_spans, leaves_at, ramp_shares
+from cellplan.model.task.task import TIME_TOLERANCE, Task
+from cellplan.model.task.time_law import peak_rate, reached_at, stand_off
+from cellplan.model.task.toolpath import Toolpath
 from cellplan.model.units import MM
-from cellplan.planning.timing.sample_memory import require_memory
 
 MOST_SAMPLES: Final = 2_000_000  # tables longer than this fill disks, not controllers
 ROTATIONS: Final = 3  # components of a task from here on are rotations
@@ -28,6 +27,8 @@ FEWEST_STEPS: Final = 10  # a task of fewer has so few samples that checks at th
 STEP_TOLERANCE: Final = 1e-9  # [-] share of a step by which the last task may outlast the clock: rounding of a quotient
 WHOLE_TURN: Final = 1e-9  # [rad] a turn per cycle this near to whole turns brings the tool back
 TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 0.003
+MOST_VALUES: Final = 10_000_000  # [-] samples times joints: 24 joints for seven minutes at 1 ms
+BYTES_OF_A_VALUE: Final = 600  # [bytes] that a solve takes for each at most: measured 420 with few bodies
 
 
 def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
@@ -284,3 +285,21 @@ def _stops(task: Task, toolpath: Toolpath) -> Array:
         )
     cycles = np.arange(task.repeat)[:, None] * toolpath.length
     return np.append((cycles + behind[:-1]).ravel(), task.repeat * toolpath.length)
+
+
+def require_memory(cell: Cell, samples: int) -> None:
+    """Refuse a clock whose samples of all joints do not fit an ordinary machine.
+
+    Raises:
+        InputError: With the memory that they would take, and the shortest step that fits.
+    """
+    joints = sum(len(robot.model.joints) for robot in cell.robots)
+    if samples * joints <= MOST_VALUES:
+        return
+    least = cell.motion.step * samples * joints / MOST_VALUES
+    digits = 10.0 ** (math.floor(math.log10(least)) - 1)
+    raise InputError(
+        f"{cell.origin.at('motion.step_s')}: expected at most {MOST_VALUES} samples times joints, got {samples} x "
+        f"{joints}, which take about {samples * joints * BYTES_OF_A_VALUE / 1e9:.2g} GB of memory; make the step at "
+        f"least {math.ceil(least / digits) * digits:g} s"
+    )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, rotation_vector, skew
-from cellplan.kinematics.pinocchio_model import CellState
+from cellplan.scene.kinematics.pinocchio_model import CellState
 
 
 def cooperation_jacobian(state: CellState, p_WT: Array, signs: Array, *, X_WR: Array | None = None) -> Array:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.joint_spline import JointSpline
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline
+from cellplan.model.motion.motion import Schedule
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

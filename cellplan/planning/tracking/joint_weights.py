@@ -5,9 +5,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel
 
 LARGEST_FACTOR: Final = 1e4  # beyond it a joint stands still for all purposes, and the inverse loses digits
 NEAREST: Final = 1e-3  # [-] of the range: nearer to a limit than this, and beyond it, the gradient grows no more

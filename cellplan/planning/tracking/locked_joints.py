@@ -3,7 +3,7 @@
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 
 
 def locked_since(cell: Cell) -> Array:

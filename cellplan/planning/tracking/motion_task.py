@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Grasp, Relation
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell, Grasp, Relation
+from cellplan.model.motion.motion import Schedule
 
 
 @dataclass(frozen=True, slots=True, eq=False)

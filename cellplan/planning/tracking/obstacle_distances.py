@@ -7,9 +7,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Flags, Indices
 from cellplan.geometry.transforms import Array
-from cellplan.model.report import ClearanceClass
-from cellplan.scene.near import NearPairs, near_pairs_of
-from cellplan.scene.near_table import NearTable, WatchedPairs
+from cellplan.model.report.report import ClearanceClass
+from cellplan.scene.near import NearPairs, NearTable, WatchedPairs, near_pairs_of
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

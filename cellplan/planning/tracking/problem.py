@@ -10,8 +10,7 @@ import numpy as np
 
 from cellplan.errors import DivergedError
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.kinematics.pinocchio_model import CellState, CombinedModel
-from cellplan.model.cell import Cell, Grasp, Relation
+from cellplan.model.cell.cell import Cell, Grasp, Relation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.given_path import GivenRows
 from cellplan.planning.tracking.joint_weights import JointWeights
@@ -19,6 +18,7 @@ from cellplan.planning.tracking.locked_joints import locked_since
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel
 
 Drift = Callable[[int, Array], Array]
 

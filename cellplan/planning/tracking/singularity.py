@@ -3,7 +3,7 @@
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import NearestSingular
+from cellplan.model.motion.motion import NearestSingular
 from cellplan.planning.tracking.problem import TrackingProblem
 
 

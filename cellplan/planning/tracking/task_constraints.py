@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.task.task import Frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

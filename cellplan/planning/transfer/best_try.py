@@ -14,10 +14,10 @@ import numpy as np
 
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
-from cellplan.collision.overlap.depth import ground_depth, overlap_depth
 from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.arrays import Array
 from cellplan.model.units import MM
+from cellplan.scene.collision.overlap.depth import ground_depth, overlap_depth
 from cellplan.scene.pairs import ScenePair
 from cellplan.scene.scene import Scene
 

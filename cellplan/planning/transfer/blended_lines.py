@@ -18,7 +18,7 @@ import numpy as np
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
+from cellplan.model.motion.joint_path import JointPath
 
 DEGREE: Final = 4  # [-] of the polynomials
 SAME_TIME: Final = 1e-9  # [s] breaks that differ by less are one

@@ -14,10 +14,10 @@ import numpy as np
 
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import rows_moved_by
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.continuous.motion_bound import Pair
-from cellplan.collision.distance import APART_TOL, exact_reading, quick_reading
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.continuous.motion_bound import Pair
+from cellplan.scene.collision.distance import APART_TOL, exact_reading, quick_reading
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

@@ -6,6 +6,7 @@ limits of all joints and then certified as it stands in the rows: nothing is ret
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import islice
 from typing import Final
 
@@ -14,7 +15,6 @@ import numpy as np
 from cellplan.certify.certify import certify
 from cellplan.geometry.transforms import Array
 from cellplan.model.progress import Progress, silent
-from cellplan.model.rung import Rung
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.planning.transfer.best_try import Try
@@ -30,6 +30,19 @@ RESERVES: Final = (0.002, 0.006)  # [m] beyond the demand while planning; the la
 RESERVES_IN_TIME: Final = (0.004, 0.012)  # [m] likewise where several robots move
 MOST_RETIMED: Final = 3  # orders of the robots that are retimed and certified
 STRAIGHT_ROWS: Final = 33  # rows of a straight move that is certified before it is retimed
+
+
+class Rung(StrEnum):
+    """The ways in which transfer moves are planned, in the order in which they are tried."""
+
+    STRAIGHT = "straight"  # all robots that move, straight in joint space, together
+    IN_TURN = "in_turn"  # one robot after the other, all others standing
+    IN_TIME = "in_time"  # in joint space and time, against the motion of the robots planned before
+
+    @property
+    def words(self) -> str:
+        """How it reads in a report."""
+        return {Rung.STRAIGHT: "straight", Rung.IN_TURN: "one after the other", Rung.IN_TIME: "beside the others"}[self]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

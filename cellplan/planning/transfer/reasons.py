@@ -7,7 +7,7 @@ from typing import Final
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.arrays import Array
-from cellplan.model.report import ClearanceClass
+from cellplan.model.report.report import ClearanceClass
 from cellplan.model.units import MM
 from cellplan.planning.transfer.best_try import BlockedTransferError, Try, best_try, blocked_try
 from cellplan.planning.transfer.query import TransferQuery

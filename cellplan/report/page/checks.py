@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import Any, Final
 
-from cellplan.model.check_kinds import CHECK_KINDS, GRAVITY
-from cellplan.model.report import Check
+from cellplan.model.report.check_kinds import CHECK_KINDS, GRAVITY
+from cellplan.model.report.report import Check
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, floored, small, stated
 

@@ -2,10 +2,10 @@
 
 from typing import Any, Final
 
-from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, seconds, small, stated
 from cellplan.report.record.phases import phase_key
+from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.notes import accuracy_note, clock_note
 
 BETWEEN: Final = "_between_rows"  # part of the keys of errors there

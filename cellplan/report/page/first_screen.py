@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from cellplan.model.cell import Cell
-from cellplan.model.left_out import TITLES, LeftOutKind, left_out_lines
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.left_out import TITLES, LeftOutKind, left_out_lines
 from cellplan.report.page.checks import failure_groups
 from cellplan.report.page.times import phase_begins
 from cellplan.report.record.common import Entries, Record

@@ -1,27 +1,35 @@
 """``report.html``: verdict and evidence of a run as one self-contained page."""
 
+import importlib.util
+import sys
+import zlib
+from base64 import b64encode
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Annotated, Final, TypedDict, Unpack
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+import jinja2
+from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined, Template
+from jinja2.bccache import Bucket
 
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
-from cellplan.report.page.compiled import TEMPLATES, CompiledTemplates
 from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.first_screen import MAX_SPEEDS, not_judged, process_speeds, worst_instant
 from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
-from cellplan.report.page.scripts import SCRIPTS, page_scripts
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import TimeLinks, page_begin, phase_begins
 from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
-from cellplan.report.record.clearance import CLASSES
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, power, range_bar, small, stated, worst
-from cellplan.report.record.tasks import direction_text
+from cellplan.report.record.sections.clearance import CLASSES
+from cellplan.report.record.sections.tasks import direction_text
 from cellplan.report.text.method import method_lines
 from cellplan.report.text.notes import grip_notes, left_out_notes, open_surface_notes
 
@@ -34,6 +42,12 @@ MODES: Final = {
 MAX_UNFOLDED: Final = 8  # robots; with more, pictures and long lists are folded
 NARROW_FRACTION: Final = 0.05  # [-] fraction of the half range: smaller margins are marked
 FAST_FRACTION: Final = 0.95  # [-] fraction of the speed limit: higher speeds are marked
+SCRIPTS: Final = ("page.js", "figures.js")
+TEMPLATES: Final = Path(__file__).resolve().parent / "templates"
+PACKAGE: Final = TEMPLATES.parents[
+    2
+]  # the template of a kind of result stands beside its job: jobs/fastest/fastest.html
+OPTIONS: Final = ("autoescape", "trim_blocks", "lstrip_blocks", "keep_trailing_newline", "optimized")
 
 
 class PageFiles(TypedDict, total=False):
@@ -131,14 +145,14 @@ def cell_page(name: str, record: Record, cell: Cell, parts: Mapping[str, object]
 
 
 def template(name: str) -> Template:
-    """The template of a page by its file name."""
+    """The template of a page by its path, in ``templates`` or in the package."""
     return _environment().get_template(name)
 
 
 @cache
 def _environment() -> Environment:
     environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
+        loader=FileSystemLoader((TEMPLATES, PACKAGE)),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -199,3 +213,52 @@ def inline_plots(plots: Mapping[str, bytes]) -> dict[str, str]:
 def svg_element(text: str) -> str:
     """An SVG element without what a file may have before it."""
     return text[text.index("<svg") :] if text else ""
+
+
+@dataclass(frozen=True, slots=True)
+class PageScripts:
+    """Scripts as they stand in a page."""
+
+    texts: tuple[str, ...]  # what stands between the tags, one text for each
+    policy: str  # the sources of scripts that its content security policy allows: these, and no others
+
+
+def page_scripts(texts: Iterable[str]) -> PageScripts:
+    """Scripts with the policy that allows them.
+
+    A browser compares the digest with the text between the tags to the byte, so that a script that was changed or
+    added does not run; see https://www.w3.org/TR/CSP3/#match-element-to-source-list.
+    """
+    scripts = tuple(texts)
+    digests = (b64encode(sha256(text.encode()).digest()).decode() for text in scripts)
+    return PageScripts(scripts, " ".join(f"'sha256-{digest}'" for digest in digests))
+
+
+class CompiledTemplates(FileSystemBytecodeCache):
+    """Keeps compiled templates in the folder ``__pycache__`` beside them, or below ``PYTHONPYCACHEPREFIX``.
+
+    A template is compiled again when its text, the release of Python or of jinja2, or the options of the environment
+    have changed. Where nothing can or may be written, it is compiled by each process.
+    """
+
+    def __init__(self, environment: Environment) -> None:
+        """Prepare."""
+        options = {name: getattr(environment, name) for name in OPTIONS}
+        release = zlib.crc32(f"{jinja2.__version__} {options} {sorted(environment.extensions)}".encode())
+        module = importlib.util.cache_from_source(str(TEMPLATES / "page.py"))
+        super().__init__(str(Path(module).parent), f"%s.{sys.implementation.cache_tag}.{release:08x}.template")
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """Fill in what is kept of a template, unless something is wrong with it."""
+        try:
+            super().load_bytecode(bucket)
+        except Exception:  # noqa: BLE001 - a damaged file is made again
+            bucket.reset()
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Keep a compiled template."""
+        if sys.dont_write_bytecode:
+            return
+        with suppress(OSError):
+            Path(self.directory).mkdir(parents=True, exist_ok=True)
+            super().dump_bytecode(bucket)

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from cellplan.model.cell import Cell
-from cellplan.model.task import Task
+from cellplan.model.cell.cell import Cell
+from cellplan.model.task.task import Task
 from cellplan.report.page.times import phase_begins
 from cellplan.report.record.common import Entries, Record
 

@@ -16,7 +16,7 @@ def unmade_view_page(cell: str, *, cell_file: str) -> str:
         cell: Name of the cell.
         cell_file: Name of its cell file where that line must name it; empty otherwise.
     """
-    return template("view/unmade.html").render(cell=cell, cell_file=cell_file, mark=MARK)
+    return template("unmade.html").render(cell=cell, cell_file=cell_file, mark=MARK)
 
 
 def is_view_page(path: Path) -> bool:

@@ -4,16 +4,37 @@ The layout is the one of the SVG files: the axes of the plotting library would t
 """
 
 import io
+import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
+from typing import Any, Final
 
 import numpy as np
 
 from cellplan.report.plots.figure import Figure, Limit, PlotBox, PlotCurve, PlotMark
-from cellplan.report.plots.no_backend import no_backend
 from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, INK, LIMIT
 from cellplan.report.plots.placing import INCH, SWATCH, TICK, PlacedFigure, PlacedPanel, Words, placed
+
+VARIABLE: Final = "MPLBACKEND"  # a shell started by a notebook may name a backend that is not installed
+
+
+@contextmanager
+def no_backend() -> Iterator[None]:
+    """Allow the library to be imported although the environment names an unknown backend.
+
+    The environment and the choice of a known backend are restored afterwards, for a calling program that opens windows.
+    """
+    desired = None if "matplotlib" in sys.modules else os.environ.pop(VARIABLE, None)
+    try:
+        yield
+    finally:
+        if desired is not None:
+            os.environ[VARIABLE] = desired
+    if desired:
+        with suppress(ValueError):
+            sys.modules["matplotlib"].rcParams["backend"] = desired
+
 
 with no_backend():
     import matplotlib as mpl
@@ -24,8 +45,8 @@ with no_backend():
     from matplotlib.text import Text
     from matplotlib.transforms import Affine2D
 
-DPI = 110  # [1/inch] of the PNG files
 
+DPI = 110  # [1/inch] of the PNG files
 _STYLE: Any = {
     "pdf.fonttype": 42,
     "text.parse_math": False,  # names may hold a dollar sign

@@ -4,7 +4,7 @@ import colorsys
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:  # rendering needs no cells
-    from cellplan.model.cell import Cell
+    from cellplan.model.cell.cell import Cell
 
 INK = "#1d2733"
 GREY = "#5f6b79"

@@ -4,6 +4,7 @@ Lengths are in points. The curves of a panel lie in an inner ``svg`` whose coord
 upper left corner of its box; ``data-x`` and ``data-y`` of the panel give the values at the edges of that box.
 """
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -11,11 +12,10 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.report.plots.figure import Figure, Limit, PlotBox, PlotCurve, PlotMark
 from cellplan.report.plots.palette import FORBIDDEN, FRAME, GREY, GRID, LIMIT, PAPER, dark_rules
 from cellplan.report.plots.placing import SWATCH, TICK, PlacedFigure, PlacedPanel, Words, gaps, placed
-from cellplan.report.plots.thinning import peak_samples, straightened
 
 FINE: Final = 100  # coordinates to a point
 POINT_DENSITY: Final = 1.5  # of a curve in a point of width: one per pixel, more would only enlarge the files
@@ -24,6 +24,8 @@ FARTHEST: Final = 1e7  # of coordinates: what lies far outside its box
 FONT: Final = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 STAR: Final = tuple(((0.5, 0.2)[k % 2], np.pi * (0.5 + k / 5.0)) for k in range(10))  # radius and angle of its corners
 STYLE: Final = re.compile(r"<style>.*?</style>", re.DOTALL)
+# [-] of the tolerance in each round: steps of twice the length leave a bent curve four times as far
+ROUND_SHARES: Final = tuple(4.0**k / 341.0 for k in range(5))
 
 
 def svg_text(figure: Figure) -> str:
@@ -220,3 +222,47 @@ def _dot(x: int, y: int, colour: str, size: float) -> str:
     """A dot."""
     pen = f'stroke="{colour}" stroke-width="{size:g}" stroke-linecap="round"'
     return f'<path class="mark" d="M{_numbers([x, y])}h0" {pen}/>'
+
+
+def peak_samples(values: Array, points: int) -> Indices:
+    """Indices of some samples, among them the first, the last, and the extremes of every interval.
+
+    Args:
+        values: Shape (N,).
+        points: About how many there may be.
+    """
+    n = len(values)
+    if n <= points:
+        return np.arange(n)
+    length = math.ceil(2 * n / points)
+    whole = n // length * length
+    stretches = values[:whole].reshape(-1, length)
+    starts = np.arange(0, whole, length)
+    rest = np.arange(whole, n)
+    ends = rest[[np.argmin(values[rest]), np.argmax(values[rest])]] if len(rest) else rest
+    lows, highs = starts + stretches.argmin(axis=1), starts + stretches.argmax(axis=1)
+    return np.unique(np.concatenate([[0], lows, highs, ends, [n - 1]]))
+
+
+def straightened(x: Array, y: Array, tolerance: float) -> Indices:
+    """Indices of the points of a curve without those that lie on the straight line between their neighbours.
+
+    Every second point is tested in each round, and removed where it lies no farther above or below that line than
+    a share of the tolerance: the curve through the remaining points lies nowhere farther from the given one than
+    the tolerance.
+
+    Args:
+        x: Increasing, shape (K,).
+        y: Shape (K,).
+        tolerance: In the unit of ``y``.
+    """
+    indices = np.arange(len(x))
+    for share in ROUND_SHARES:
+        if len(indices) < 3:
+            break
+        middle = np.arange(1, len(indices) - 1, 2)
+        before, at, after = indices[middle - 1], indices[middle], indices[middle + 1]
+        shares = (x[at] - x[before]) / np.maximum(x[after] - x[before], np.finfo(float).tiny)
+        apart = np.abs(y[before] + shares * (y[after] - y[before]) - y[at])
+        indices = np.delete(indices, middle[apart <= share * tolerance])
+    return indices

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Final, TypedDict
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, Report
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, Report
 from cellplan.model.settings.entry import Entry
 
 Number = float | None

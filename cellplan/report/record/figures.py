@@ -1,5 +1,7 @@
 """Figures of a program: what each phase measures as one table, the worst of it, and how that is called and shown."""
 
+import csv
+import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,11 +12,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.model.report import Report
+from cellplan.model.report.report import Report
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, Record, number
-from cellplan.report.record.joints import velocity_ratio
 from cellplan.report.record.numbers import fixed, floored, percent, plain, small
+from cellplan.report.record.sections.joints import velocity_ratio
 
 SECONDS_PER_HOUR: Final = 3600.0
 REDUCED: Final = 250.0  # [mm/s]
@@ -84,7 +86,6 @@ QUANTITIES: Final[Mapping[str, FigureQuantity]] = MappingProxyType({quantity.key
 SUBJECTS: Final[Mapping[str, FigureQuantity]] = MappingProxyType(
     {quantity.subject: quantity for quantity in _LISTED if quantity.subject}
 )
-
 # fmt: off
 KEY: Final = (
     "cycle_time_s", "failed_checks", "max_position_error_mm", "max_orientation_error_deg", "min_margin_deg",
@@ -99,6 +100,8 @@ LOAD: Final = (
     "max_axis_speed_joint", "share_above_250_mm_s", "share_above_250_robot", "energy_proxy_s", "min_margin_deg",
     "min_margin_joint", "min_clearance_mm", "min_clearance_pair", "failed_checks",
 )  # how hard joints and tools work at a cycle time
+
+
 # fmt: on
 
 
@@ -228,3 +231,41 @@ def energy_proxy(report: Report) -> float:
         turns = limits > 0.0
         total += float(steps @ np.sum((velocities[:, turns] / limits[turns]) ** 2, axis=1))
     return total
+
+
+def terminal_lines(rows: Sequence[Sequence[str]], indent: str) -> list[str]:
+    """Rows of a table, the first one its headings, every column flush right.
+
+    Args:
+        rows: Texts by column.
+        indent: What every line begins with.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [indent + "  ".join(map(str.rjust, row, widths)).rstrip() for row in rows]
+
+
+def terminal_table(keys: Iterable[str], figures: Iterable[Mapping[str, Any]], indent: str) -> list[str]:
+    """A line of headings and a line for each row of figures."""
+    shown = {key: SHOWN[key] for key in keys}
+    heads = [figure.column for figure in shown.values()]
+    rows = [heads, *([figure.text(row[key]) for key, figure in shown.items()] for row in figures)]
+    return terminal_lines(rows, indent)
+
+
+def page_headings(keys: Iterable[str]) -> str:
+    """Headings of the columns of a page: of each quantity, and of what is worst of it."""
+    heads = [None if key in SUBJECTS else SHOWN[key].heading for key in keys]
+    name = '<th scope="col" class="text">joint</th>'
+    return "".join(name if head is None else f'<th scope="col">{head}</th>' for head in heads)
+
+
+def page_cells(keys: Iterable[str], figures: Mapping[str, Any]) -> list[tuple[bool, str]]:
+    """Whether each cell of a row is a name, and its text."""
+    return [(True, figures[key] or "") if key in SUBJECTS else (False, SHOWN[key].page(figures[key])) for key in keys]
+
+
+def csv_text(rows: Iterable[Sequence[Any]]) -> str:
+    """Rows as CSV, the first one its names."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()

@@ -3,11 +3,17 @@
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Final, TypedDict
 
-from cellplan.model.phase import Phase
+from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.motion.plan import Phase
 from cellplan.report.record.common import Number, Record, number
 
 AT: Final = "at_s"  # ends the key of an instant, which counts from the begin of its phase
 PHASE: Final = "phase"  # ends the key of its phase instead
+STEP_TOL: Final = 1e-9  # [-] relative rounding error of the number of steps
+GIVEN: Final = "motion.duration_s"
+NEXT_STEP: Final = "step after motion.duration_s"
+TASKS: Final = "tasks"
+TIMING: Final = "motion.timing"
 
 
 class PhaseRecord(TypedDict):
@@ -62,3 +68,14 @@ def instant_text(entry: Record, key: str = AT) -> str:
         return ""
     phase = entry.get(phase_key(key))
     return f"at {entry[key]:.3f} s" + (f" of {phase}" if phase else "")
+
+
+def clock_from(cell: Cell) -> str:
+    """The timing, the stated duration, the step after it if it is no whole number of steps, or the last task."""
+    if cell.motion.timing is not Timing.AS_WRITTEN:
+        return TIMING
+    duration = cell.motion.duration
+    if duration is None:
+        return TASKS
+    steps = duration / cell.motion.step
+    return GIVEN if abs(steps - round(steps)) <= STEP_TOL * max(steps, 1.0) else NEXT_STEP

@@ -8,9 +8,9 @@ bodies of a pair are ``first`` and ``second``.
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, get_type_hints
 
-from cellplan.model.phase import ALL_TASKS
-from cellplan.report.record.clearance import ClosestPair, Contact, LeftOutRecord
+from cellplan.model.motion.plan import ALL_TASKS
 from cellplan.report.record.common import CheckRecord, Record
+from cellplan.report.record.sections.clearance import ClosestPair, Contact, LeftOutRecord
 
 Row = dict[str, Any]
 Table = Callable[[], dict[str, Any]]  # values of each column by its name

@@ -3,12 +3,23 @@
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Final
 
-from cellplan.model.branches import MovedStart
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion
-from cellplan.model.report import CAUTION, Report
-from cellplan.report.record.accelerations import AccelerationsRecord, accelerations_record
-from cellplan.report.record.clearance import (
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.branches import MovedStart
+from cellplan.model.motion.motion import Motion
+from cellplan.model.report.report import CAUTION, Report
+from cellplan.report.record.common import (
+    CheckRecord,
+    Number,
+    OriginRecord,
+    Provenance,
+    check_record,
+    number,
+    origin_record,
+    status,
+)
+from cellplan.report.record.phases import PhaseRecord, clock_from, phases_record
+from cellplan.report.record.sections.accelerations import AccelerationsRecord, accelerations_record
+from cellplan.report.record.sections.clearance import (
     ClosestPair,
     Contact,
     ExclusionRecord,
@@ -22,19 +33,8 @@ from cellplan.report.record.clearance import (
     exclusions_record,
     left_out_record,
 )
-from cellplan.report.record.clock import clock_from
-from cellplan.report.record.common import (
-    CheckRecord,
-    Number,
-    OriginRecord,
-    Provenance,
-    check_record,
-    number,
-    origin_record,
-    status,
-)
-from cellplan.report.record.idle import idle_record
-from cellplan.report.record.joints import (
+from cellplan.report.record.sections.idle import idle_record
+from cellplan.report.record.sections.joints import (
     JointRecord,
     LockedJointRecord,
     RepeatabilityRecord,
@@ -42,15 +42,14 @@ from cellplan.report.record.joints import (
     locked_joints_record,
     repeatability_record,
 )
-from cellplan.report.record.open_surfaces import OpenSurfaceRecord, open_surfaces_record
-from cellplan.report.record.phases import PhaseRecord, phases_record
-from cellplan.report.record.rests_on import RestsOnRecord, rests_on_record
-from cellplan.report.record.skew import SkewKey, skew_record
-from cellplan.report.record.solver import SolverRecord, solver_record
-from cellplan.report.record.stops import StopsKey, stops_record
-from cellplan.report.record.tasks import TaskRecord, tasks_record
-from cellplan.report.record.tool_errors import RunClosureRecord, closures_record
-from cellplan.report.record.world_motion import (
+from cellplan.report.record.sections.open_surfaces import OpenSurfaceRecord, open_surfaces_record
+from cellplan.report.record.sections.rests_on import RestsOnRecord, rests_on_record
+from cellplan.report.record.sections.skew import SkewKey, skew_record
+from cellplan.report.record.sections.solver import SolverRecord, solver_record
+from cellplan.report.record.sections.stops import StopsKey, stops_record
+from cellplan.report.record.sections.tasks import TaskRecord, tasks_record
+from cellplan.report.record.sections.tool_errors import RunClosureRecord, closures_record
+from cellplan.report.record.sections.world_motion import (
     MotionShareRecord,
     SingularityRecord,
     SpeedRecord,

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final, TypedDict
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.motion import Motion
-from cellplan.model.report import ClearanceReport, JointUse, Report
+from cellplan.model.motion.motion import Motion
+from cellplan.model.report.report import ClearanceReport, JointUse, Report
 from cellplan.model.units import MM
 from cellplan.report.record.common import SIGNIFICANT, Number
 

@@ -1,35 +1,36 @@
 """``report.json`` of a program whose tasks have a report each: the worst values of all of them."""
 
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, TypedDict
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain
+from typing import Annotated, Any, Final, NamedTuple, TypedDict
 
-from cellplan.model.branches import MovedStart
-from cellplan.model.cell import Cell
-from cellplan.model.report import CAUTION, Report
-from cellplan.report.record.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
-from cellplan.report.record.clearance import clearance_record, left_out_record
-from cellplan.report.record.clock import clock_from
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.branches import MovedStart
+from cellplan.model.report.report import CAUTION, Report
 from cellplan.report.record.common import (
     Number,
     Provenance,
+    Record,
     RunCheckRecord,
     check_record,
     number,
     origin_record,
     status,
 )
-from cellplan.report.record.idle import missing_moves
-from cellplan.report.record.joints import joints_record, repeatability_record
-from cellplan.report.record.merging import worst_of
-from cellplan.report.record.open_surfaces import open_surfaces_record
-from cellplan.report.record.payload import hardest_loads, loads_record
-from cellplan.report.record.phases import in_phase, phases_record
-from cellplan.report.record.rests_on import rests_on_record
+from cellplan.report.record.figures import Fold
+from cellplan.report.record.phases import AT, clock_from, in_phase, phase_key, phases_record
 from cellplan.report.record.run import SCHEMA, HeadRecord
-from cellplan.report.record.skew import SkewKey, least_skew_record
-from cellplan.report.record.solver import solver_record
-from cellplan.report.record.tasks import tasks_record
-from cellplan.report.record.tool_errors import ClosureRecord, closures_record, without_means
+from cellplan.report.record.sections.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
+from cellplan.report.record.sections.clearance import clearance_record, left_out_record
+from cellplan.report.record.sections.idle import missing_moves
+from cellplan.report.record.sections.joints import joints_record, repeatability_record, with_worst_time
+from cellplan.report.record.sections.open_surfaces import open_surfaces_record
+from cellplan.report.record.sections.payload import hardest_loads, loads_record
+from cellplan.report.record.sections.rests_on import rests_on_record
+from cellplan.report.record.sections.skew import SkewKey, least_skew_record
+from cellplan.report.record.sections.solver import solver_record
+from cellplan.report.record.sections.tasks import tasks_record
+from cellplan.report.record.sections.tool_errors import ClosureRecord, closures_record, without_means
 
 
 class _RunEntry(TypedDict):
@@ -166,3 +167,67 @@ def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
             entry["max_position_error_between_rows_mm"] = task["max_position_error_between_rows_mm"]
             entry["max_orientation_error_between_rows_deg"] = task["max_orientation_error_between_rows_deg"]
     return entry
+
+
+class Figure(NamedTuple):
+    """A figure of a record, and what of the same run goes with it."""
+
+    key: str  # of the figure
+    worst: Fold  # max or min
+    at: str  # key of its time; empty without one
+    further: tuple[str, ...] = ()  # keys of what else belongs to it
+
+
+LOAD: Final = ("mass_kg", "tool_mass_kg", "part_mass_kg", "part_shared", "centre_in_flange_mm")
+LIMIT: Final = ("acceleration_limit", "acceleration_limit_source", "acceleration_ratio")
+# fmt: off
+FIGURES: Final = (
+    Figure("min", min, ""),
+    Figure("max", max, ""),
+    Figure("margin", min, "margin_at_s"),
+    Figure("peak_velocity", max, "peak_velocity_at_s", ("velocity_ratio",)),
+    Figure("peak_acceleration", max, "peak_acceleration_at_s", LIMIT),
+    Figure("peak_jerk", max, "peak_jerk_at_s"),
+    Figure("peak_acceleration_m_s2", max, "peak_acceleration_at_s"),
+    Figure("peak_jerk_m_s3", max, "peak_jerk_at_s"),
+    Figure("minimum_mm", min, AT, ("pair", "exact", "points_mm", "accuracies_mm")),
+    Figure("max_position_error_mm", max, AT),
+    Figure("max_orientation_error_deg", max, "max_orientation_error_at_s"),
+    Figure("max_position_error_between_rows_mm", max, "max_position_error_between_rows_at_s"),
+    Figure("max_orientation_error_between_rows_deg", max, "max_orientation_error_between_rows_at_s"),
+    Figure("felt_mass_kg", max, "felt_at_s", LOAD),
+    Figure("static_moment_nm", max, "static_moment_at_s"),
+    Figure("moment_nm", max, "moment_at_s"),
+    Figure("inertia_kg_m2", max, "inertia_at_s"),
+)
+
+
+# fmt: on
+
+
+def worst_of(records: Sequence[Record]) -> Any:
+    """One record of several of the same form: of each figure the worst, the first one of those that are alike.
+
+    Joints travel the sum of all runs; a distance is certified if that of every run is. What is no figure is that of
+    the first run that has it.
+
+    Args:
+        records: Records by name, or of one subject, of each run.
+    """
+    merged: dict[str, Any] = {}
+    for key in dict.fromkeys(chain.from_iterable(records)):
+        values = [record[key] for record in records if record.get(key) is not None] or [None]
+        merged[key] = worst_of(values) if isinstance(values[0], Mapping) else values[0]
+    for figure in FIGURES:
+        known = [record for record in records if record.get(figure.key) is not None]
+        if known:
+            worst = figure.worst(known, key=lambda record: record[figure.key])
+            keys = (figure.key, figure.at, phase_key(figure.at), *figure.further)
+            merged |= {key: worst[key] for key in keys if key in worst}
+    if "travel" in merged:
+        merged["travel"] = number(sum(record["travel"] for record in records))
+        merged = with_worst_time(merged)
+    if "certified" in merged and merged["minimum_mm"] is not None:
+        merged["certified"] = all(record["certified"] for record in records if record["minimum_mm"] is not None)
+        merged["exact"] = merged["certified"] and merged["exact"]
+    return merged

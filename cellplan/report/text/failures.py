@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Final
 
-from cellplan.model.check_kinds import CHECK_KINDS
+from cellplan.model.report.check_kinds import CHECK_KINDS
 from cellplan.report.record.common import Record
 
 MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from cellplan.model.left_out import left_out_lines
-from cellplan.report.record.clock import NEXT_STEP, TASKS, TIMING
+from cellplan.model.report.left_out import left_out_lines
 from cellplan.report.record.common import Number, Record
+from cellplan.report.record.phases import NEXT_STEP, TASKS, TIMING
 
 JOINED: Final = frozenset({"grip_depth", "mount_depth"})  # checks of two bodies that are joined
 MAX_NAMES: Final = 3  # links of a robot that a line names; further ones are counted

@@ -5,19 +5,17 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from cellplan.model.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
+from cellplan.model.report.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
-from cellplan.report.record.clearance import other_classes
 from cellplan.report.record.common import Record
-from cellplan.report.record.numbers import floored, percent, plain, seconds, small
+from cellplan.report.record.numbers import fixed, floored, percent, plain, seconds, small
 from cellplan.report.record.phases import instant_text
-from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
+from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.columns import Row, aligned
 from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
 from cellplan.report.text.skew import skew_row
-from cellplan.report.text.stops import stop_rows
 
 
 def read_record(folder: Path) -> Record:
@@ -230,3 +228,79 @@ def _place_lines(folder: Path) -> Iterator[str]:
 
 def _short(value: float | None) -> str:
     return "unknown" if value is None else small(value)
+
+
+def stop_rows(record: Record) -> Iterator[Row]:
+    """The deepest tool and the nearest robots when one robot stops; none where no controller says how others go on."""
+    if "stops" not in record:
+        return
+    depths = record["stops"]["depths"]
+    if depths:
+        task = max(depths, key=lambda name: float(depths[name]["depth_mm"]))
+        yield "depth at a stop", f"{small(depths[task]['depth_mm'])} mm", f"task {task}{_when(depths[task]['worst'])}"
+    apart = [distance for distance in record["stops"]["distances"] if distance["distance_mm"] is not None]
+    if apart:
+        nearest = min(apart, key=lambda distance: float(distance["distance_mm"]))
+        bodies = "" if nearest["bodies"] is None else " - ".join(nearest["bodies"])
+        yield "clearance at a stop", f"{small(nearest['distance_mm'])} mm", f"{bodies}{_when(nearest['worst'])}"
+    for robot, grip in record["stops"]["grips"].items():
+        yield "grip at a stop", f"{small(grip['distance_mm'])} mm", f"{robot} from its grasp{_when(grip['worst'])}"
+
+
+def _when(worst: Record | None) -> str:
+    """Who stops when, and how far the other one has gone."""
+    if worst is None:
+        return ""
+    return f", {worst['stopped']} stops at {worst['at_s']:.3f} s, {worst['going']} {worst['goes_on_ms']:.0f} ms farther"
+
+
+def acceleration_rows(record: Record) -> Iterator[Row]:
+    """Rows about the accelerations of a run; none for a record without them."""
+    accelerations = record.get("accelerations")
+    if accelerations is not None:
+        yield from _joint_rows(record["joints"])
+        yield from _world_rows(accelerations)
+
+
+def not_judged_lines(record: Record) -> Iterator[str]:
+    """One line for each quantity that was not judged, with its robots and the reason."""
+    robots: dict[tuple[str, str], list[str]] = {}
+    for left in (record.get("accelerations") or {"not_judged": []})["not_judged"]:
+        robots.setdefault((left["what"], left["reason"]), []).extend([left["robot"]] if left["robot"] else [])
+    for (what, reason), names in robots.items():
+        of = f" of {', '.join(names)}" if names else ""
+        yield f"  not judged: {what}{of} ({reason})"
+
+
+def _joint_rows(joints: Record) -> Iterator[Row]:
+    """The joint with the largest fraction of its limit, or else the largest acceleration; the largest jerk."""
+    uses = [(f"{robot} {name}", use) for robot, named in joints.items() for name, use in named.items()]
+    known = [use for use in uses if use[1].get("peak_acceleration") is not None]
+    limited = [entry for entry in known if entry[1]["acceleration_ratio"] is not None]
+    if limited:
+        joint, use = max(limited, key=lambda entry: float(entry[1]["acceleration_ratio"]))
+        source = "assumed" if use["acceleration_limit_source"] == "assumed" else "stated"
+        figure = f"{percent(use['acceleration_ratio'], 1)} of its {source} limit"
+        yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
+    elif known:
+        joint, use = max(known, key=lambda entry: (entry[1]["unit"] == "deg", entry[1]["peak_acceleration"]))
+        figure = f"{fixed(use['peak_acceleration'])} {use['unit']}/s2, not limited"
+        yield "largest joint acceleration", figure, f"{joint} {instant_text(use, 'peak_acceleration_at_s')}"
+    if known:
+        joint, use = max(known, key=lambda entry: (entry[1]["unit"] == "deg", entry[1]["peak_jerk"]))
+        figure = f"{fixed(use['peak_jerk'], 0)} {use['unit']}/s3 over {use['jerk_window_ms']:g} ms"
+        yield "largest joint jerk", figure, f"{joint} {instant_text(use, 'peak_jerk_at_s')}"
+
+
+def _world_rows(accelerations: Record) -> Iterator[Row]:
+    """The tool tip and the part with the largest acceleration."""
+    if accelerations["tools"]:
+        robot, tool = max(accelerations["tools"].items(), key=lambda it: it[1]["peak_acceleration_m_s2"])
+        yield "largest tool acceleration", *_figure(tool, f"tool tip of {robot}")
+    if accelerations["part"] is not None:
+        yield "largest part acceleration", *_figure(accelerations["part"]["corner"], "part")
+
+
+def _figure(point: Record, what: str) -> tuple[str, str]:
+    """Figure of a point, and when it is reached."""
+    return f"{small(point['peak_acceleration_m_s2'])} m/s2", f"{what} {instant_text(point, 'peak_acceleration_at_s')}"

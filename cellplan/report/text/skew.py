@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from cellplan.model.skew import MOST_SKEW, PairSkew, SkewLimit, SkewReport
+from cellplan.model.report.skew import MOST_SKEW, PairSkew, SkewLimit, SkewReport
 from cellplan.report.record.common import Record
 from cellplan.report.record.phases import instant_text
 from cellplan.report.text.columns import Row

@@ -13,10 +13,8 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import inverse
-from cellplan.kinematics.reach import reach_bound
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Relation, Robot
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Relation, Robot
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import (
     SAME_POSTURE,
@@ -26,6 +24,8 @@ from cellplan.planning.start.inverse_kinematics import (
     reached_by_rows,
 )
 from cellplan.planning.tracking.task_constraints import constraint_rows
+from cellplan.scene.kinematics.reach import reach_bound
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.search.base_map.places import Places
 
 APART: Final = 400.0  # [mm] at most from one place with random configurations to the next, where the grid is finer

@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.model.cell import joint_at
+from cellplan.model.cell.cell import joint_at
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
 from cellplan.search.base_map.places import Places

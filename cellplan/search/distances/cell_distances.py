@@ -13,15 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.collision.bodies import CollisionBody, prepare
-from cellplan.collision.engine import Engine
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import pose, rotation_about
-from cellplan.kinematics.link_forest import WORLD
-from cellplan.model.cell import Cell
-from cellplan.model.mounting import Bracket
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.mounting import Bracket
 from cellplan.scene.body_table import BodyTable
-from cellplan.scene.near_table import NearbyPairs, NearTable, wrenches
+from cellplan.scene.collision.bodies import CollisionBody, prepare
+from cellplan.scene.collision.engine import Engine
+from cellplan.scene.kinematics.link_forest import WORLD
+from cellplan.scene.near import NearbyPairs, NearTable, wrenches
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import (

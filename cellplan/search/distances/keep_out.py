@@ -8,9 +8,9 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import rotation_about
-from cellplan.model.cell import Cell
-from cellplan.model.layout import KeepOut
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.layout import KeepOut
+from cellplan.model.robot.robot import BASE
 from cellplan.scene.bodies import Kind, SceneBody
 
 TALL: Final = 100.0  # [m] of a column: the way out of it is sideways

@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.scene.bodies import is_ground
-from cellplan.scene.near_table import WatchedPairs
+from cellplan.scene.near import WatchedPairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

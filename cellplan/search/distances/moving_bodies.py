@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Capsule, Cylinder, Solid, support
 from cellplan.geometry.transforms import inverse, pose
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.scene.bodies import Kind, part_body
 from cellplan.scene.scene import Scene
 

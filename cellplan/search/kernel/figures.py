@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.errors import NotFiniteError
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.model.cell import joint_at
+from cellplan.model.cell.cell import joint_at
 from cellplan.search.kernel.job import Job
 from cellplan.search.kernel.run import Motions
 

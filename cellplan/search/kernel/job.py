@@ -8,15 +8,15 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
-from cellplan.kinematics.batched import Placement
-from cellplan.model.cell import Cell, Relation
-from cellplan.model.joint_limits import JointLimits
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell, Relation
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.robot.robot import JointLimits
 from cellplan.planning.collocation.batch_targets import desired_motion
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.settling import settling_joints
 from cellplan.planning.tracking.motion_task import closures
 from cellplan.planning.tracking.task_constraints import TaskConstraints
+from cellplan.scene.kinematics.batched import Placement
 
 SAME_TWIST: Final = 1e-9  # [m/s] and [rad/s] by which a desired twist may differ on both sides of a time and not jump
 STRAIGHT: Final = 0.1  # [-] of the largest twist: up to that parabolas through nodes are good to 1 %

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array
-from cellplan.kinematics.batched import Placement
 from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
+from cellplan.scene.kinematics.batched import Placement
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.memory import keep_freed_memory
 

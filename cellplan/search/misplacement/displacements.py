@@ -9,7 +9,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.geometry.frozen import derive
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import inverse
-from cellplan.model.cell import Cell, Robot
+from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.settings.layout import MisplacementEntry
 from cellplan.search.distances.moving_bodies import NeighbourCells
 from cellplan.search.kernel.job import Layouts

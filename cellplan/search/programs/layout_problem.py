@@ -8,9 +8,9 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.frozen import derive
-from cellplan.model.cell import joint_at
-from cellplan.model.joint_limits import JointLimits
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import joint_at
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.robot.robot import JointLimits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, enough_nodes

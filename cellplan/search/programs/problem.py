@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.model.joint_limits import JointLimits
+from cellplan.model.robot.robot import JointLimits
 from cellplan.search.kernel.varied import Varied
 
 

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell
-from cellplan.model.joint_spline import JointSpline
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline
+from cellplan.model.motion.motion import Schedule
 from cellplan.search.kernel.job import Job, Layouts, enough_nodes
 from cellplan.search.kernel.run import run
 

@@ -9,10 +9,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.geometry.curves.chebyshev import chebyshev
-from cellplan.model.cell import Cell
-from cellplan.model.clocked_path import distinct
-from cellplan.model.joint_spline import JointSpline, basis
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline, basis
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.task.clocked_path import distinct
 from cellplan.search.kernel.job import Job
 
 LOWEST: Final = 4  # degree of the polynomials between two breaks

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell
-from cellplan.model.joint_spline import JointSpline
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline
 from cellplan.model.units import joint_unit
 
 DECIMALS: Final = 6  # of a degree or a millimetre, as coefficients are written

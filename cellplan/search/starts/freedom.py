@@ -7,7 +7,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.search.distances.moving_bodies import LayoutVariables
 from cellplan.search.kernel.varied import KernelVariables
 

@@ -5,7 +5,7 @@ Start number ``index`` depends on the cell, the seed and this number only, so an
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
 
@@ -16,16 +16,18 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import SAME_POSTURE
 from cellplan.search.kernel.run import run
-from cellplan.search.starts.at_rest import settings
+from cellplan.search.starts.at_rest import MOST_BASES, Pool, Setting, pool, settings
 from cellplan.search.starts.combined import Judged, combined, judged
 from cellplan.search.starts.freedom import random_within
-from cellplan.search.starts.pools import pools, words
 from cellplan.search.starts.postures import branch_starts
 from cellplan.search.starts.problem import StartProblem
 
 SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until a combination follows all paths
 RANDOM: Final = 16  # [-] random layouts that are drawn for one start
 EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
+LEADING: Final = 12  # [-] bases of an operator beside which those that follow it are sought
+SHOWN: Final = 3  # [-] reasons that are named for one robot
+FOLLOWING: Final = 4  # [-] of the ones that follow for each
 
 
 class StartOrigin(StrEnum):
@@ -196,3 +198,69 @@ def _most_frequent(reasons: Sequence[str]) -> str:
     """The reason that comes most often, and how often."""
     (reason, count), *_ = sorted(Counter(reasons).items(), key=lambda entry: (-entry[1], entry[0]))
     return f"{reason} (in {count} of {len(reasons)} layouts)"
+
+
+def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> tuple[list[Pool], str]:
+    """Pools of all operators, and the first one that has none in words.
+
+    Args:
+        problem: The cell.
+        setting: Where the part rests.
+        rng: Random numbers.
+    """
+    pools = list[Pool]()
+    for first, *others in problem.freedom.groups(problem.operators):
+        together = _finer(problem, first, setting, rng)
+        robot = first
+        for other in others if len(together.q) else ():
+            robot, together = other, _with_follower(problem, together, other, setting, rng)
+            if not len(together.q):
+                break
+        if not len(together.q):
+            drops, name = together.drops, problem.cell.robots[robot].name
+            return [], f"'{name}' follows its path from none of {drops.total()} bases: {words(drops)}"
+        pools.append(together)
+    return pools, ""
+
+
+def _finer(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
+    """The pool of one operator, its path at more nodes where no base follows."""
+    finer = pool(problem, robot, setting, rng)
+    if len(finer.q):
+        return finer
+    return pool(replace(problem, at_rest=problem.at_rest_fine), robot, setting, rng)
+
+
+def _with_follower(problem: StartProblem, led: Pool, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
+    """A pool with one operator more, whose base follows from those of the pool."""
+    x, q, cost, drops = list(led.x[:0]), list(led.q[:0]), list[float](), Counter[str]()
+    follower = led
+    for row in range(min(len(led.q), LEADING)):
+        there, start = setting.x.copy(), setting.start.copy()
+        there[led.columns], start[led.joints] = led.x[row, led.columns], led.q[row]
+        X_WB = problem.placed_layouts(there[None], start[None]).X_WB[0]
+        follower = pool(problem, robot, replace(setting, x=there, start=start, X_WB=X_WB), rng)
+        drops += follower.drops
+        first = slice(0, FOLLOWING)
+        x += list(follower.x[first])
+        q += [np.append(led.q[row], start) for start in follower.q[first]]
+        cost += (led.cost[row] + follower.cost[first]).tolist()
+        if len(x) >= MOST_BASES:
+            break
+    order = np.argsort(cost, kind="stable")[:MOST_BASES].astype(np.intp)
+    return Pool(
+        x=np.array(x).reshape(-1, led.x.shape[1])[order],
+        columns=np.append(led.columns, follower.columns),
+        q=np.array(q).reshape(len(x), -1)[order],
+        joints=np.append(led.joints, follower.joints),
+        cost=np.array(cost)[order],
+        drops=drops,
+    )
+
+
+def words(drops: Counter[str]) -> str:
+    """The most frequent reasons in words."""
+    shown = sorted(
+        ((count, reason) for reason, count in drops.items() if count), key=lambda entry: (-entry[0], entry[1])
+    )
+    return ", ".join(f"{reason} ({count})" for count, reason in shown[:SHOWN]) or "nothing was drawn"

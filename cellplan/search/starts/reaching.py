@@ -12,11 +12,11 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.geometry.transforms import inverse, pose_from, rotation_about
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Relation, Robot
+from cellplan.model.cell.cell import Relation, Robot
 from cellplan.planning.start.inverse_kinematics import finite_limits, tip_jacobian
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
 from cellplan.planning.tracking.task_constraints import constraint_rows
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 UP: Final = np.array([0.0, 0.0, 1.0])
 CLOSED: Final = 1e-7  # [m] and [rad] up to which a tool counts as at its goal: the motion settles the rest

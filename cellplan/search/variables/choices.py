@@ -6,8 +6,8 @@ from itertools import product
 from typing import Any
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell
-from cellplan.model.layout import ChoiceKind, LayoutChoice
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.layout import ChoiceKind, LayoutChoice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

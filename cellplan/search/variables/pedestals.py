@@ -10,9 +10,9 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.shapes import Box, Cylinder
-from cellplan.model.cell import Cell, Obstacle, Robot
-from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange
-from cellplan.model.mounting import Hanger, Pedestal, Wedge
+from cellplan.model.cell.cell import Cell, Obstacle, Robot
+from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.cell.mounting import Hanger, Pedestal, Wedge
 from cellplan.model.units import MM
 from cellplan.search.variables.written import written_quantity
 

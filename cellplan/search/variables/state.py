@@ -9,9 +9,9 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse, pose, rotation_about
-from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.layout import VariableKind, VaryRange
-from cellplan.model.rod import Rod
+from cellplan.model.cell.cell import Cell, Robot, Tool
+from cellplan.model.cell.layout import VariableKind, VaryRange
+from cellplan.model.cell.rod import Rod
 from cellplan.model.units import MM
 from cellplan.search.variables.twists import Z
 

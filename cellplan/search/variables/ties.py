@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange, mirror_image
+from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange, mirror_image
 
 USUAL_LENGTH: Final = 0.1  # [m] of a step, and of a change that costs 1
 USUAL_ANGLE: Final = math.radians(10.0)  # [rad] likewise

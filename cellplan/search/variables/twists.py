@@ -4,7 +4,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import cross, rotation_about
-from cellplan.model.rod import Rod
+from cellplan.model.cell.rod import Rod
 
 X, Y, Z = np.eye(3)
 

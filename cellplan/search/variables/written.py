@@ -3,9 +3,9 @@
 from typing import Any, Final
 
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell import Cell, Robot
-from cellplan.model.layout import LayoutSettings, VariableKind, VaryRange
-from cellplan.model.robot import Joint
+from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
+from cellplan.model.robot.robot import Joint
 from cellplan.model.units import DEG, MM
 
 LENGTH_DIGITS: Final = 3  # of a millimetre

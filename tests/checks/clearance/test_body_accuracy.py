@@ -9,11 +9,11 @@ from builders.scene_builders import make_cell, placed, schedule, slide_model, th
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, ClearanceClass, ClearanceReport
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.robot import BodyAccuracyEntry
-from cellplan.report.record.rests_on import unstated_bodies
+from cellplan.report.record.sections.rests_on import unstated_bodies
 from cellplan.report.text.notes import accuracy_note
 from cellplan.scene.scene import Scene
 

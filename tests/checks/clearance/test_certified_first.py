@@ -9,9 +9,9 @@ from cellplan.certify import pair_state as budget
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.shapes import Capsule
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, ClearanceClass, ClearanceReport
-from cellplan.model.robot import Body, RobotModel
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceReport
+from cellplan.model.robot.robot import Body, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 

@@ -20,8 +20,8 @@ from cellplan.checks.clearance.check import check_clearance
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.report import Check, ClearanceClass, ClearanceReport
+from cellplan.model.cell.cell import Cell, Robot, Tool
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceReport
 from cellplan.scene.scene import Scene
 
 EXACT = 1e-4  # [m] promised accuracy of a minimum

@@ -9,8 +9,8 @@ from builders.scene_builders import arm_model, make_cell, placed, schedule, slid
 from cellplan.checks.clearance.idle import check_idle
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check
 
 BLOCK = Box((0.1, 0.1, 0.1))
 HOME = np.array([0.1, 0.2, 0.3, 0.0, 0.5, 0.0])

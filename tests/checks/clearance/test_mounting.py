@@ -10,8 +10,8 @@ from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, HalfSpace, Shape
 from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check
 from cellplan.model.settings.checks import ChecksEntry, ExclusionEntry
 from cellplan.scene.scene import Scene
 

@@ -8,11 +8,11 @@ import pytest
 from builders.home_to_home import PICK_AND_PLACE
 
 from cellplan import load_cell, open_gate, solve, write_run
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.skew import MOST_SKEW, AllowedSkew, SkewLimit
-from cellplan.model.task import Frame
-from cellplan.model.verified_run import VerifiedRun
-from cellplan.pipeline.export.skew import run_skew
+from cellplan.model.report.skew import MOST_SKEW, AllowedSkew, SkewLimit
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.model.task.task import Frame
+from cellplan.programs.promises.skew import run_skew
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 CONTROLLERS = """\
 controllers: {a: {kind: other}, b: {kind: other}}

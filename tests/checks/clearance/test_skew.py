@@ -11,16 +11,16 @@ from cellplan import load_cell, solve
 from cellplan.checks.clearance.skew import allowed_skew, has_clocks
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Part
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Report, ToolDepth
+from cellplan.model.cell.cell import Cell, Part
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Report, ToolDepth
+from cellplan.model.report.skew import MOST_SKEW, SkewLimit, SkewReport
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.task import ToleranceEntry
-from cellplan.model.skew import MOST_SKEW, SkewLimit, SkewReport
-from cellplan.model.task import Frame
+from cellplan.model.task.task import Frame
 from cellplan.report.text.skew import skew_notes
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 SHIPPED = Path(__file__).parents[3] / "cells"

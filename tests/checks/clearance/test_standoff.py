@@ -11,13 +11,13 @@ from cellplan.checks.clearance.standoff import check_standoffs, standoff_on, sta
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, Mesh, Solid, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import Check, Standoff
+from cellplan.model.cell.cell import Cell, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check, Standoff
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry
-from cellplan.model.task import Frame, OffPart, Task
-from cellplan.report.record.rests_on import unstated_standoffs
+from cellplan.model.task.task import Frame, OffPart, Task
+from cellplan.report.record.sections.rests_on import unstated_standoffs
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 PLATE = Box((0.2, 0.2, 0.02))
 DOWN = (np.pi, 0.0, 0.0)  # z of the tool points against z of the part

@@ -8,13 +8,13 @@ import pytest
 from builders.scene_builders import body, fixed_part, held_part, make_cell, placed, slide_model, work
 
 from cellplan import load_cell, solve
-from cellplan.certify.free_boxes import Boxes
-from cellplan.certify.free_clocks import MINIMUM_TOL
+from cellplan.certify.free_clocks.free_boxes import Boxes
+from cellplan.certify.free_clocks.free_clocks import MINIMUM_TOL
 from cellplan.checks.clearance.stops import BAND_PARTS, check_stops, one_stop, stop_report
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, Robot, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import Cell, Robot, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.settings.checks import ChecksEntry, StopEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.scene.scene import Scene

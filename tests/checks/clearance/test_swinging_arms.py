@@ -16,15 +16,15 @@ from builders.scene_builders import (
 )
 
 from cellplan.checks.clearance.check import check_clearance
-from cellplan.collision.bodies import BodyPoses
-from cellplan.collision.distance import measure
-from cellplan.collision.overlap.containment import is_inside
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Capsule, Mesh
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell
-from cellplan.model.report import Check, ClearanceClass, ClearanceReport
+from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check, ClearanceClass, ClearanceReport
 from cellplan.model.settings.checks import ChecksEntry
+from cellplan.scene.collision.bodies import BodyPoses
+from cellplan.scene.collision.distance import measure
+from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.pairs import Rule, ScenePair
 from cellplan.scene.scene import Scene
 

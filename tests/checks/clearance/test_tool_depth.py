@@ -11,12 +11,12 @@ from cellplan.checks.clearance.tool_depth import check_depths, path_depth, tool_
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.report import Check, ToolDepth
+from cellplan.model.cell.cell import Cell, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check, ToolDepth
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.model.task import Frame, SampledPath, Task
+from cellplan.model.task.task import Frame, SampledPath, Task
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SHEET = Box((0.4, 0.4, 0.002))
 PEN = Tool(

@@ -10,11 +10,11 @@ from builders.planar_arm import LINK, RADIUS, START, circle_schedule, planar_arm
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.acceleration import AccelerationRule, LimitSource, MotionAccelerations
-from cellplan.model.cell import Cell, Grasp, LockedJoint
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Check
+from cellplan.model.cell.acceleration import AccelerationRule, LimitSource, MotionAccelerations
+from cellplan.model.cell.cell import Cell, Grasp, LockedJoint
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Check
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 STEPS = 1000  # of 1 ms
 

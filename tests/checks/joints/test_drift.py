@@ -7,7 +7,7 @@ import pytest
 from builders.scene_builders import joint, make_cell, no_tool, placed, schedule, work
 
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot.robot import RobotModel
 
 TIMES = np.linspace(0.0, 4.0, 401)
 

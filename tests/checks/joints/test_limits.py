@@ -7,9 +7,9 @@ import pytest
 from builders.scene_builders import arm_model, placed
 
 from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.controller import ControllerZero
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.controller import ControllerZero
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
 
 
 def one_joint_robot(**changes):

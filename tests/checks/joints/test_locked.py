@@ -8,11 +8,11 @@ from builders.planar_arm import START, circle_schedule, planar_arm_cell
 
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import LockedJoint
-from cellplan.model.robot import JointKind
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.robot.robot import JointKind
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 TIMES = np.linspace(0.0, 4.0, 4001)
 

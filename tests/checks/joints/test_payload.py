@@ -19,12 +19,12 @@ from builders.scene_builders import (
 from cellplan.checks.joints.payload import GRAVITY, check_payload, check_payload_at_rest, load_uses, point_accelerations
 from cellplan.geometry.shapes import Box, Cylinder, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Cell, Grasp, Robot, Tool
-from cellplan.model.payload import LoadUse
-from cellplan.model.robot import RobotModel
+from cellplan.model.cell.cell import Cell, Grasp, Robot, Tool
+from cellplan.model.robot.payload import LoadUse
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.robot import AxisLimitEntry, PayloadEntry
-from cellplan.report.record.payload import unjudged_loads
+from cellplan.report.record.sections.payload import unjudged_loads
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 TIMES = np.linspace(0.0, 1.0, 1001)
 STILL = np.zeros((1001, 1))

@@ -12,10 +12,10 @@ from cellplan.checks.tools.between_checks import check_between_rows, check_task_
 from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.between_rows import BetweenRows
-from cellplan.model.motion import Schedule
-from cellplan.model.report import Check
-from cellplan.model.robot import RobotModel
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.between_rows import BetweenRows
+from cellplan.model.report.report import Check
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.task import ToleranceEntry
 from cellplan.scene.scene import Scene
 

@@ -10,8 +10,8 @@ from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.tracking import part_poses
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Grasp, Part
+from cellplan.model.cell.cell import Grasp, Part
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 TIMES = np.array([0.0, 0.1, 0.2])
 

@@ -7,11 +7,11 @@ from builders.random_cells import carried, make_task, random_cell, sharing
 
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.tracking import part_poses
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 N = 5
 

@@ -7,7 +7,7 @@ import pytest
 from builders.moving_cells import cell_with_bodies, program
 from builders.scene_builders import work
 
-from cellplan.certify.free_motion import FreeMotion
+from cellplan.certify.free_clocks.free_motion import FreeMotion
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool
 from cellplan.checks.tools.tracking import errors_on_part

@@ -5,9 +5,9 @@ import pytest
 
 from cellplan.checks.tools.speeds import robot_speed
 from cellplan.geometry.transforms import pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 
 def two_joint_arm():

@@ -8,11 +8,11 @@ from builders.random_cells import make_task
 
 from cellplan.checks.tools.tracking import _turn_between, check_accuracy, task_accuracy
 from cellplan.geometry.transforms import pose_from, rotation_exp, rotation_vector, rpy_from_rotation
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Robot, Tool
-from cellplan.model.motion import Schedule, TaskSchedule
-from cellplan.model.robot import BASE, Joint, JointKind, RobotModel
+from cellplan.model.cell.cell import Robot, Tool
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel
 from cellplan.model.settings.task import ToleranceEntry
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 RNG = np.random.default_rng(3)
 

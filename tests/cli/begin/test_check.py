@@ -7,7 +7,7 @@ import pytest
 from builders.stored_cells import write_cell
 
 from cellplan.cli.main import run
-from cellplan.pipeline.check import check_lines
+from cellplan.jobs.check import check_lines
 
 
 def test_a_sound_cell_is_reported_with_postures_and_paths_and_nothing_is_written(

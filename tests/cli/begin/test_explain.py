@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.cli.main import run
-from cellplan.pipeline.explain_result import WIDTH, structure_lines
+from cellplan.jobs.explain.result import WIDTH, structure_lines
 
 SHIPPED = ["dual_arm", "four_robots", "four_robots_initial", "mesh_part_csv", "planar_pair", "rail", "turntable"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.cli.main import run
-from cellplan.io.templates import TEMPLATES
+from cellplan.files.templates import TEMPLATES
 
 
 @pytest.fixture(autouse=True)

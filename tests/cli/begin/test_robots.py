@@ -10,7 +10,7 @@ import pytest
 from builders.xacro_texts import write_arm
 
 from cellplan.cli.main import run
-from cellplan.io.yaml.writer import flow_text
+from cellplan.files.yaml.writer import flow_text
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from cellplan.cli.main import run
-from cellplan.io.robots import bundled
+from cellplan.files.robots import bundled
 
 
 def test_the_schema_is_one_json_object_with_the_keys_of_a_cell(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,11 +10,11 @@ import pytest
 
 from cellplan.cli.main import run
 from cellplan.cli.options import completion
-from cellplan.io.robots.bundled import bundled_names
-from cellplan.model.cell import Mode
-from cellplan.model.exported import Targets
+from cellplan.files.robots.bundled import bundled_names
+from cellplan.model.cell.cell import Mode
+from cellplan.model.report.exported import Targets
 from cellplan.model.solver import METHODS, Integrator
-from cellplan.pipeline.export.program import EXPORTERS
+from cellplan.programs.export.program import EXPORTERS
 from cellplan.search.programs.objective import CycleTiming, Objective
 
 

@@ -7,7 +7,7 @@ import typer
 
 from cellplan.cli.options import shared
 from cellplan.cli.solve.solve import SolveOptions
-from cellplan.model.cell import Mode
+from cellplan.model.cell.cell import Mode
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.solver import Integrator, MethodName
 

@@ -16,11 +16,10 @@ import pytest
 from builders.stored_cells import write_cell
 
 from cellplan.cli.terminal.output import Result
-from cellplan.cli.watch.files import InputsChangedError, WatchedFiles
 from cellplan.cli.watch.page import WatchPage
-from cellplan.cli.watch.watch import watch
+from cellplan.cli.watch.watch import InputsChangedError, WatchedFiles, watch
 from cellplan.errors import ExitStatus, InputError
-from cellplan.io.cell.load import load_cell
+from cellplan.files.cell.load import load_cell
 
 PROGRESS = re.compile(r"[\w -]+: \d+ %")
 LIMIT_S = 60.0  # [s] for a line to come on a slow machine
@@ -168,7 +167,7 @@ class Editor:
 @pytest.fixture
 def editor(pair: Path, monkeypatch: pytest.MonkeyPatch) -> Editor:
     editor = Editor(pair)
-    monkeypatch.setattr("cellplan.cli.watch.files.time", editor)
+    monkeypatch.setattr("cellplan.cli.watch.watch.time", editor)
     return editor
 
 
@@ -194,7 +193,7 @@ def test_a_file_that_was_emptied_and_got_its_old_content_was_not_saved(pair: Pat
 
 
 def test_a_file_that_stays_empty_is_taken_as_it_is(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cellplan.cli.watch.files.EMPTIED_S", 0.4)
+    monkeypatch.setattr("cellplan.cli.watch.watch.EMPTIED_S", 0.4)
     files = WatchedFiles(pair)
 
     pair.write_bytes(b"")
@@ -249,7 +248,7 @@ def test_a_file_that_a_broken_cell_lacks_is_noticed_when_it_comes(tmp_path: Path
 
 
 def test_work_on_a_cell_that_is_saved_meanwhile_begins_anew(pair: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cellplan.cli.watch.files.ASK_EVERY_S", 0.0)
+    monkeypatch.setattr("cellplan.cli.watch.watch.ASK_EVERY_S", 0.0)
     texts: list[str] = []
 
     def work(follow: Any, progress: Any) -> Result:

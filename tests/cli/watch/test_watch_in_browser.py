@@ -15,7 +15,7 @@ import pytest
 from builders.browser import Browser
 
 from cellplan.cli.main import run
-from cellplan.pipeline.view.write import ViewRequest, view, write_view
+from cellplan.jobs.view.write import ViewRequest, view, write_view
 
 pytestmark = pytest.mark.slow
 

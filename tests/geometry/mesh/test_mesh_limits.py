@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.geometry.mesh import stl_obj
+from cellplan.geometry.mesh.formats import stl_obj
 from cellplan.geometry.mesh.load import read_mesh
 
 PLY = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from cellplan.io.schema import CellDocument, RobotTableDocument
-from cellplan.io.schema.robot import SlidingSpeed, TurningJerk
+from cellplan.files.schema import CellDocument, RobotTableDocument
+from cellplan.files.schema.robot import SlidingSpeed, TurningJerk
 from cellplan.model.settings.entry import Coordinate, Entry
 from cellplan.model.settings.units import (
     Deg,

@@ -6,8 +6,8 @@ import numpy as np
 from builders.timed_cells import Case, case_of, shipped, slowly_clocked
 
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import LockedJoint
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.solver import Integrator
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
 from cellplan.planning.collocation.run import AccurateRun

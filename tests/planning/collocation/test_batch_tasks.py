@@ -8,12 +8,12 @@ import pytest
 from builders.batch_cells import CELLS, configurations, everyone, random_desired, relations, seen_poses
 
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Desired, Linearisation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 LANES = 3
 H = 1e-6  # [-] step of differences

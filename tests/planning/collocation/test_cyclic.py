@@ -10,15 +10,15 @@ from builders.planar_arms import planar_cell
 from builders.random_cells import make_task
 from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import LockedJoint
+from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.model.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
+from cellplan.model.task.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.cyclic import PERIODIC, closed_path
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath
 from cellplan.planning.collocation.run import STEADY, AccurateRun
 from cellplan.planning.euler.cycle_closing import CLOSED
 from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 CONSTANT = TimeLaw(kind=TimeLawKind.CONSTANT)
 MOVES = {"approach": StraightMove(distance=0.02, duration=0.5), "retract": StraightMove(distance=0.02, duration=0.5)}

@@ -9,8 +9,8 @@ from builders.batch_cells import CELLS
 from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell, LockedJoint
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.settings.solver import WeightingEntry
 from cellplan.model.solver import Integrator
 from cellplan.planning.collocation.batch_targets import sampled

@@ -11,8 +11,8 @@ from builders.timed_cells import Case, between_samples, case_of, largest_error, 
 
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Cylinder
-from cellplan.model.cell import Cell, LockedJoint, Mode
-from cellplan.model.task import StraightMove, TimeLaw, TimeLawKind
+from cellplan.model.cell.cell import Cell, LockedJoint, Mode
+from cellplan.model.task.task import StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.run import SETTLING_STEPS, AccurateRun
 from cellplan.planning.modes import plan_phases
 

@@ -9,13 +9,13 @@ from builders.timed_cells import Case, triangles
 from numpy.typing import NDArray
 
 from cellplan.geometry.transforms import Array, pose_from, rotation_exp
-from cellplan.kinematics.batched import Placement
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.collocation.batch_targets import desired_motion, in_windows
 from cellplan.planning.collocation.batch_tasks import BatchTasks
 from cellplan.planning.collocation.solver import Collocation, Precision, repeated
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.tracking.motion_task import closures
+from cellplan.scene.kinematics.batched import Placement
 
 ACCURACY = 1e-7
 CELL = triangles(CELLS["mixed"])

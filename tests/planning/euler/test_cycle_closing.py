@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Motion, Schedule
+from cellplan.files.cell.load import load_cell
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -82,7 +82,7 @@ def test_a_path_that_does_not_come_back_is_refused_by_name() -> None:
 def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:
     """Largest position error in [m], by the kinematics of the checks."""
     from cellplan.checks.tools.tracking import part_poses, task_accuracy
-    from cellplan.kinematics.screw_chain import ScrewChain
+    from cellplan.scene.kinematics.screw_chain import ScrewChain
 
     chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
     q = {robot.name: motion.q[:, cell.columns(robot.name)] for robot in cell.robots}

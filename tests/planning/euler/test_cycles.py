@@ -7,10 +7,10 @@ import pytest
 from builders.roller_paths import ON_ROLLER, RECTANGLE, RHOMBUS, ROLLER, circle, clocked, sampled, task_on
 
 from cellplan.errors import InputError
-from cellplan.model.motion import TaskSchedule
+from cellplan.model.motion.motion import TaskSchedule
 from cellplan.model.origin import Origin
-from cellplan.model.task import PolygonPath, SpacePolylinePath, Task, TimeLaw, TimeLawKind
-from cellplan.model.time_law import advance, reached_at
+from cellplan.model.task.task import PolygonPath, SpacePolylinePath, Task, TimeLaw, TimeLawKind
+from cellplan.model.task.time_law import advance, reached_at
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 

@@ -8,10 +8,10 @@ from builders.random_cells import random_cell
 
 from cellplan.errors import DivergedError, NoSolutionError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 DURATION = 0.5  # [s]
 

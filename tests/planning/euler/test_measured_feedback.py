@@ -4,7 +4,7 @@ import numpy as np
 from builders.random_cells import make_task
 
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp, rotation_vector
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.euler.measured_feedback import corrected_references, displaced
 
 ROUNDING = 1e-12  # [m], [-]

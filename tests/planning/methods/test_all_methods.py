@@ -9,11 +9,11 @@ from builders.ik_edge_cases import SITUATIONS, Situation, tool_on_part
 
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, NoSolutionError
-from cellplan.io.run.joint_tables import parse_table
+from cellplan.files.run.joint_tables import parse_table
 from cellplan.model.solver import MethodName
-from cellplan.pipeline.solve import render_program
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.runs.solve import render_program
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")

@@ -10,8 +10,8 @@ from builders.random_cells import random_cell
 from builders.vargas_cases import TRANSIENT, vargas_run
 
 from cellplan.errors import DivergedError
-from cellplan.model.cell import LockedJoint
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.settings.solver import FilteredInverseEntry, SolverEntry
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.motion_task import MotionTask

@@ -22,12 +22,12 @@ from builders.search_arms import (
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import LockedJoint
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 BIG = 2 * np.cos(np.pi / 6)  # [m] the published 1.7320: reach of the arm at its start
 BOTH = ["heuristic_search", "recursive_search"]

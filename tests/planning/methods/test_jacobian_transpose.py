@@ -8,7 +8,7 @@ from builders.planar_arms import planar_cell, tip_schedule, tips
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.model.cell import LockedJoint
+from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.jacobian_transpose import (

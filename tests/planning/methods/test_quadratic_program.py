@@ -11,15 +11,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import DivergedError, StartOutsideLimitsError
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import LockedJoint
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.quadratic_program import bounded_velocities
 from cellplan.planning.methods.support.speed_bounds import VelocityBounds
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.planning.tracking.problem import FirstOrder
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 RNG = np.random.default_rng(5)
 RHO = 1e8

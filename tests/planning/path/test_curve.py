@@ -19,8 +19,8 @@ from builders.roller_paths import (
 
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Box
-from cellplan.model.path_direction import run_direction
-from cellplan.model.task import PlaneName, PolygonPath, RunDirection, SpacePolylinePath
+from cellplan.model.task.path_direction import run_direction
+from cellplan.model.task.task import PlaneName, PolygonPath, RunDirection, SpacePolylinePath
 from cellplan.planning.path.build import build_toolpath
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from builders.transfer_cells import arm, retimer_of, scene_of
 
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.planning.recovery.lines import STEP, Lines
+from cellplan.planning.recovery.retract import STEP, Lines
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows, timed_rows
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 BENT = np.array([0.2, -1.2, 1.4, 0.3, 0.8, -0.4])
 

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell, Mode
-from cellplan.model.phase import Hold
+from cellplan.model.cell.cell import Cell, Mode
+from cellplan.model.motion.plan import Hold
 from cellplan.model.settings.program import MarkEntry, ProgramEntry
 from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.stages import program_stages

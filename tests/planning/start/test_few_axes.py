@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from builders.urdf_texts import joint, write_urdf
 
-from cellplan.io.cell.load import load_cell
-from cellplan.kinematics.screw_chain import ScrewChain
+from cellplan.files.cell.load import load_cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.planning.tracking.cooperation_jacobian import pose_errors
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 LIMIT = '<limit lower="-1.8" upper="1.8" velocity="2"/>'

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import inverse
-from cellplan.io.cell.load import load_cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths

@@ -7,10 +7,10 @@ import pytest
 from builders.scene_builders import arm_model, placed, slide_model, stick
 
 from cellplan.geometry.shapes import Box
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.robot import RobotModel
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.seeds import generator
 from cellplan.planning.start.home_candidates import displacements, home_candidates
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 START = np.array([0.3, -0.4, 0.6, 0.2, 0.7, 2.95])
 

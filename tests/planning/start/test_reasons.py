@@ -7,9 +7,13 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.errors import StartNotFoundError
+from cellplan.geometry.transforms import pose
 from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.inverse_kinematics import random_configurations
+from cellplan.planning.start.reasons import nearest_reach
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 ONE_ARM = """
@@ -157,3 +161,32 @@ def test_a_second_given_start_that_no_configuration_of_the_positioner_suits_says
         choose_start(Scene.from_cell(cell), clock_paths(cell, toolpaths.values()))
     assert "from the start of task 'line', allowed are" in str(e.value)
     assert not np.isinf(float(str(e.value).split("at best ")[1].split(" mm")[0]))
+
+
+@pytest.fixture(scope="module")
+def arm(cells):
+    """The right planar arm of the cell with its task, whose longest link is stretched out at zero."""
+    cell = load_cell(cells / "planar_pair.yaml")
+    return cell.robot("right"), cell.task("circle")
+
+
+def tip_left(robot, task, goal):
+    seeds = random_configurations(robot.model, 12, np.random.default_rng(0))
+    return nearest_reach(robot, task, goal, X_WP=np.eye(4), seeds=seeds, tip_only=True)[0]
+
+
+def test_a_goal_beyond_the_stretched_arm_is_as_far_as_it_is_beyond(arm):
+    robot, task = arm
+    base = robot.X_WB[:3, 3]
+    stretched = ScrewChain(robot).tool_poses(np.zeros((1, 3)))[0, :3, 3]
+    length = float(np.linalg.norm((stretched - base)[:2]))
+    direction = np.array([np.cos(2.0), np.sin(2.0), 0.0])
+    for beyond in (0.05, 0.7, 5.0):
+        goal = pose(base + (length + beyond) * direction)
+        assert tip_left(robot, task, goal) == pytest.approx(beyond, abs=1e-4)
+
+
+def test_a_goal_within_reach_leaves_nothing(arm):
+    robot, task = arm
+    goal = ScrewChain(robot).tool_poses(np.array([[0.3, 0.9, -0.5]]))[0]
+    assert tip_left(robot, task, goal) < 1e-6

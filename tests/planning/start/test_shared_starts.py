@@ -9,9 +9,9 @@ from builders.timed_cells import solved_start
 from cellplan import load_cell, solve
 from cellplan.errors import StartNotFoundError, StartOffGraspError, StartOffTaskError
 from cellplan.geometry.transforms import inverse, pose
-from cellplan.kinematics.screw_chain import ScrewChain
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")

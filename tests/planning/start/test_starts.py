@@ -11,8 +11,7 @@ from cellplan import load_cell
 from cellplan.errors import InvalidFileError, StartNotFoundError, StartOffTaskError, StartOutsideLimitsError
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import inverse, pose
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Obstacle
+from cellplan.model.cell.cell import Obstacle
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import examine_given_starts
@@ -25,6 +24,7 @@ from cellplan.planning.start.inverse_kinematics import (
 from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene
 
 

@@ -8,13 +8,13 @@ import pytest
 from cellplan import load_cell, solve
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell import Obstacle
-from cellplan.model.name_order import NameOrder
-from cellplan.pipeline.overrides import with_overrides
+from cellplan.model.cell.cell import Obstacle
+from cellplan.model.cell.name_order import NameOrder
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.near_ties import best_first
 from cellplan.planning.start.trial_motion import StartTrials
 from cellplan.planning.timing.schedule import clock_paths
+from cellplan.runs.overrides import with_overrides
 from cellplan.scene.scene import Scene
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import inverse
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
-from cellplan.model.motion import TaskSchedule
-from cellplan.model.task import StraightMove
-from cellplan.pipeline.solve import solve
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import TaskSchedule
+from cellplan.model.task.task import StraightMove
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
+from cellplan.runs.solve import solve
 
 CELLS = Path(__file__).parents[3] / "cells"
 APPROACH = StraightMove(distance=0.05, duration=0.5)

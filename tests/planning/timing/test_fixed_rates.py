@@ -7,9 +7,9 @@ import pytest
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
-from cellplan.model.task import TimeLaw, TimeLawKind
-from cellplan.model.time_law import advance, reached_at
+from cellplan.model.motion.joint_path import JointPath
+from cellplan.model.task.task import TimeLaw, TimeLawKind
+from cellplan.model.task.time_law import advance, reached_at
 from cellplan.planning.timing.fixed_rates import AtFixedRate, FixedRate
 from cellplan.planning.timing.path_length import stretches
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer

@@ -8,10 +8,9 @@ import pytest
 
 from cellplan.geometry.curves.chebyshev import chebyshev
 from cellplan.geometry.transforms import Array
-from cellplan.model.joint_path import JointPath
+from cellplan.model.motion.joint_path import JointPath
 from cellplan.planning.timing.path_length import stretches
-from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
-from cellplan.planning.timing.retimed_path import RetimedPath
+from cellplan.planning.timing.retime import JointLimitsInTime, RetimedPath, Retimer
 
 JOINTS, WAVES, DEGREE = 24, 5, 8
 

@@ -8,10 +8,9 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.errors import InputError
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.timing.sample_memory import MOST_VALUES, require_memory
-from cellplan.planning.timing.schedule import clock_paths
+from cellplan.planning.timing.schedule import MOST_VALUES, clock_paths, require_memory
 
 SHIPPED = Path(__file__).parents[3] / "cells" / "planar_pair.yaml"  # two arms of three joints, 12 s
 

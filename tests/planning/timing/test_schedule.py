@@ -10,10 +10,10 @@ from builders.roller_paths import clocked
 from cellplan.errors import InputError
 from cellplan.geometry.shapes import Cylinder
 from cellplan.geometry.transforms import pose, rotation_exp
-from cellplan.model.cell import Part
-from cellplan.model.motion import Schedule
+from cellplan.model.cell.cell import Part
+from cellplan.model.motion.motion import Schedule
 from cellplan.model.origin import Origin
-from cellplan.model.task import (
+from cellplan.model.task.task import (
     CirclePath,
     PathSpec,
     PlaneName,

@@ -8,9 +8,9 @@ from builders.roller_paths import ROLLER, clocked, sampled, task_on
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_exp, rotation_vector
-from cellplan.model.motion import TaskSchedule
+from cellplan.model.motion.motion import TaskSchedule
 from cellplan.model.origin import Origin
-from cellplan.model.task import Task, TimedPath
+from cellplan.model.task.task import Task, TimedPath
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths, schedule_tasks
 

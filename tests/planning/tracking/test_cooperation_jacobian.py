@@ -7,11 +7,11 @@ import pytest
 from builders.random_cells import make_task, moved, random_cell
 
 from cellplan.geometry.transforms import inverse, pose, pose_from, rotation_about, rotation_exp, rotation_vector
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.robot import JointKind
+from cellplan.model.robot.robot import JointKind
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SOME_POSE = pose([1.0, -2.0, 0.5], [0.3, -0.8, 2.0])
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10

@@ -7,12 +7,12 @@ import pytest
 from builders.planar_arm import START, circle_schedule, largest_error, planar_arm_cell
 from builders.random_cells import random_cell
 
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.cell import Grasp, Part
+from cellplan.model.cell.cell import Grasp, Part
 from cellplan.model.settings.solver import WeightingEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.joint_weights import LARGEST_FACTOR, JointWeights, limit_slope
 from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 LOWER, UPPER = np.array([-2.0, 0.1, -np.inf]), np.array([1.0, 3.1, np.inf])
 

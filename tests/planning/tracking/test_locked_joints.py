@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from builders.random_cells import random_cell
 
-from cellplan.model.cell import LockedJoint
+from cellplan.model.cell.cell import LockedJoint
 from cellplan.planning.tracking.locked_joints import locked_since
 
 

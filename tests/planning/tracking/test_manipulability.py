@@ -7,11 +7,11 @@ import pytest
 from builders.random_cells import random_cell
 
 from cellplan.geometry.transforms import pose_from, rotation_exp
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.task import Frame
+from cellplan.model.task.task import Frame
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
-from cellplan.planning.tracking.manipulability import ManipulabilityGradient
+from cellplan.planning.tracking.secondary_goals import ManipulabilityGradient
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 H = 1e-5  # [rad] or [m]: central differences leave H^2 and eps / H times the condition, both below 1e-7
 

@@ -9,13 +9,13 @@ from builders.random_cells import carried, moved, random_cell, random_pose, shar
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, rotation_vector
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.cell import Grasp, Mode
-from cellplan.model.motion import Schedule
-from cellplan.model.task import Frame
+from cellplan.model.cell.cell import Grasp, Mode
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.task.task import Frame
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.tracking.motion_task import MotionTask, closures
 from cellplan.planning.tracking.problem import TrackingProblem
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 DERIVATIVE_TOL = 1e-6  # relative; central differences with h = 1e-5 leave h^2 and eps / h, both near 1e-10
 H = 1e-5

@@ -19,13 +19,13 @@ from builders.scene_builders import (
     work,
 )
 
-from cellplan.collision.distance import measure
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.shapes import Capsule, Sphere
 from cellplan.geometry.transforms import pose
-from cellplan.io.cell.load import load_cell
-from cellplan.model.report import ClearanceClass
-from cellplan.model.robot import BASE, FollowerJoint, JointKind
+from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import BASE, FollowerJoint, JointKind
 from cellplan.planning.tracking.obstacle_distances import ClosestPairs
+from cellplan.scene.collision.distance import measure
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 

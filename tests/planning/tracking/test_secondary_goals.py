@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from builders.random_cells import random_cell
 
-from cellplan.io.cell.load import load_cell
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.cell import Cell, LockedJoint
-from cellplan.model.motion import Motion, Schedule, TaskSchedule
-from cellplan.model.robot import start_keys
+from cellplan.files.cell.load import load_cell
+from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.motion.motion import Motion, Schedule, TaskSchedule
+from cellplan.model.robot.robot import start_keys
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -21,6 +20,7 @@ from cellplan.planning.tracking.obstacle_distances import ClosestPairs
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.secondary_goals import share_within
 from cellplan.planning.tracking.weighted_inverse import WeightedInverse
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 from cellplan.scene.scene import Scene
 
 FOLDER = Path(__file__).parents[3] / "cells"

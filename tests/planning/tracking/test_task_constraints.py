@@ -5,9 +5,9 @@ import pytest
 from builders.batch_cells import CELLS, everyone, relations
 from builders.random_cells import make_task, random_pose
 
-from cellplan.kinematics.pinocchio_model import CombinedModel
-from cellplan.model.task import Frame
+from cellplan.model.task.task import Frame
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constrained_components, constraint_rows
+from cellplan.scene.kinematics.pinocchio_model import CombinedModel
 
 
 @pytest.mark.parametrize("name", CELLS)

@@ -18,9 +18,8 @@ from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.rung import Rung
 from cellplan.planning.transfer.best_try import Try, best_try, blocked_try
-from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
+from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
 from cellplan.scene.scene import Scene
 
 RADIUS, CLEARANCE = 0.1, 0.005  # [m]

@@ -11,9 +11,8 @@ from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.rung import Rung
 from cellplan.planning.timing.retime import JointLimitsInTime
-from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
+from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
 from cellplan.planning.transfer.straight_time import box_widths, shares
 from cellplan.scene.scene import Scene
 

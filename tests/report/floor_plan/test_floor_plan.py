@@ -15,12 +15,12 @@ from ezdxf.audit import Auditor
 from cellplan import load_cell
 from cellplan.geometry.shapes import HalfSpace
 from cellplan.geometry.transforms import pose
-from cellplan.kinematics.reach import arm_reach
-from cellplan.model.cell import Cell, Obstacle
-from cellplan.pipeline.floor_plan import floor_plan
+from cellplan.model.cell.cell import Cell, Obstacle
 from cellplan.report.floor_plan.dxf import floor_plan_dxf
 from cellplan.report.floor_plan.plan import FloorPlan
 from cellplan.report.floor_plan.sheet import UNIT, floor_plan_svg, laid_out
+from cellplan.runs.drawings.floor_plan import floor_plan
+from cellplan.scene.kinematics.reach import arm_reach
 
 NS = "{http://www.w3.org/2000/svg}"
 

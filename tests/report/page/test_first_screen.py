@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from cellplan.model.check_kinds import CHECK_KINDS
-from cellplan.model.report import Check
+from cellplan.model.report.check_kinds import CHECK_KINDS
+from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.report.page.checks import MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cellplan.model.motion import Motion, Resolution
+from cellplan.model.motion.motion import Motion, Resolution
 from cellplan.model.solver import Integrator
 from cellplan.report.record.common import as_json
 from cellplan.report.record.run import run_record

@@ -11,7 +11,7 @@ import pytest
 
 from cellplan.cli.main import run
 from cellplan.report.page.links import file_links
-from cellplan.report.page.scripts import page_scripts
+from cellplan.report.page.render import page_scripts
 
 
 class Parts(HTMLParser):

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from cellplan.model.phase import Carry, Hold, Phase, Transfer, Work
+from cellplan.model.motion.plan import Carry, Hold, Phase, Transfer, Work
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task import StraightMove
+from cellplan.model.task.task import StraightMove
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.record.run import run_record
 

@@ -11,7 +11,7 @@ from builders.browser import Browser
 from builders.view_pages import body_poses, data_of, rows_of
 
 from cellplan import load_cell
-from cellplan.pipeline.view.write import ViewRequest, view, write_view
+from cellplan.jobs.view.write import ViewRequest, view, write_view
 
 pytestmark = pytest.mark.slow
 

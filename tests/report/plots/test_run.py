@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cellplan.errors import InputError
-from cellplan.model.report import Conditioning
+from cellplan.model.report.report import Conditioning
 from cellplan.report.plots.figure import PlotAxis
 from cellplan.report.plots.placing import nice_ticks
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
-from cellplan.report.plots.thinning import peak_samples, straightened
+from cellplan.report.plots.svg import peak_samples, straightened
 
 
 def draw_plots(report: Any, *, cell: Any, formats: Any = ()) -> dict[str, bytes]:

@@ -1,7 +1,7 @@
 """What a report says of pairs that were not judged in full."""
 
-from cellplan.model.left_out import LeftOut, LeftOutKind
-from cellplan.report.record.clearance import left_out_record
+from cellplan.model.report.left_out import LeftOut, LeftOutKind
+from cellplan.report.record.sections.clearance import left_out_record
 from cellplan.report.text.notes import grip_notes, left_out_notes
 
 

@@ -6,16 +6,18 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from builders.random_cells import random_cell
 
-from cellplan.model.acceleration import MotionAccelerations, PointAcceleration
-from cellplan.model.phase import Phase
-from cellplan.model.report import Report
+from cellplan.model.cell.acceleration import MotionAccelerations, PointAcceleration
+from cellplan.model.motion.plan import Phase
+from cellplan.model.report.report import Report
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.first_screen import worst_instant
 from cellplan.report.page.render import overview_page
 from cellplan.report.record.common import as_json
-from cellplan.report.record.phases import phase_key
+from cellplan.report.record.phases import clock_from, phase_key
 from cellplan.report.record.summary import summary_record
+from cellplan.report.text.notes import clock_note
 from cellplan.report.text.run import figure_lines
 
 PHASES = (
@@ -117,3 +119,25 @@ def test_a_run_by_itself_needs_no_phases(passed_run: Any) -> None:
 
     assert "phase" not in record["clearance"]["whole"]
     assert not any("s of " in line for line in figure_lines(record, "the report") if " at " in line)
+
+
+@pytest.mark.parametrize(
+    ("duration", "step", "origin"),
+    [
+        (4.0, 0.001, "motion.duration_s"),
+        (0.3, 0.1, "motion.duration_s"),  # 0.3 / 0.1 is 2.9999999999999996
+        (4.0, 4.0, "motion.duration_s"),
+        (4.0, 0.03, "step after motion.duration_s"),
+        (4.0005, 0.001, "step after motion.duration_s"),
+        (None, 0.03, "tasks"),
+    ],
+)
+def test_the_record_says_what_the_clock_follows(duration: float | None, step: float, origin: str) -> None:
+    cell = random_cell(0, operators=1)
+    assert clock_from(replace(cell, motion=replace(cell.motion, duration=duration, step=step))) == origin
+
+
+def test_only_a_clock_as_long_as_the_cell_says_needs_no_words() -> None:
+    assert clock_note({"clock_from": "tasks"}).endswith("the clock ends with the last task")
+    assert clock_note({"clock_from": "step after motion.duration_s"}).endswith("the clock ends with the step after it")
+    assert not clock_note({"clock_from": "motion.duration_s"})

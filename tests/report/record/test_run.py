@@ -11,14 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.io.run.folder import RunFolder
-from cellplan.model.cell import LockedJoint
-from cellplan.model.repeatability import JointDrift, Repeatability
-from cellplan.model.report import ClearanceClass, ClosureAccuracy
+from cellplan.files.run.folder import RunFolder
+from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.report.report import ClearanceClass, ClosureAccuracy
+from cellplan.model.robot.repeatability import JointDrift, Repeatability
 from cellplan.report.record.common import as_json, number
-from cellplan.report.record.merging import worst_of
 from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
+from cellplan.report.record.summary import summary_record, worst_of
 
 
 def refuse(constant: str) -> Any:

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cellplan.cli.main import run as run_cli
-from cellplan.model.motion import Motion, NearestSingular, Resolution
+from cellplan.model.motion.motion import Motion, NearestSingular, Resolution
 from cellplan.model.solver import Integrator
 from cellplan.report.record.common import as_json
 from cellplan.report.record.run import run_record

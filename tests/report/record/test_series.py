@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from cellplan.model.motion import Motion
+from cellplan.model.motion.motion import Motion
 from cellplan.report.record import series as module
 from cellplan.report.record.common import as_json
 from cellplan.report.record.run import run_record

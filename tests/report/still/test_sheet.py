@@ -11,8 +11,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.report.still.camera import Camera, view_axes
 from cellplan.report.still.painter import Painter
 from cellplan.report.still.picture import Colour, ShownName, ShownSolid, StillPicture
-from cellplan.report.still.sheet import still_svg
-from cellplan.report.still.view import best_axes
+from cellplan.report.still.sheet import best_axes, still_svg
 
 GREY = {"grey": Colour(light="#808080", dark="#808080"), "red": Colour(light="#ff0000", dark="#ff0000")}
 NS = "{http://www.w3.org/2000/svg}"

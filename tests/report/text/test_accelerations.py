@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from cellplan.report.text.accelerations import acceleration_rows, not_judged_lines
+from cellplan.report.text.run import acceleration_rows, not_judged_lines
 
 
 def use(ratio: float | None, source: str = "assumed", *, peak: float = 100.0, jerk: float = 500.0) -> dict[str, Any]:

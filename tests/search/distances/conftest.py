@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.shapes import Capsule
 from cellplan.geometry.transforms import Array, pose, rotation_exp
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell, Part, Tool
+from cellplan.model.cell.cell import Cell, Part, Tool
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.moving_bodies import NeighbourCells
 

@@ -11,10 +11,10 @@ from cellplan.certify.certify import certify
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.geometry.shapes import Box, Shape
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell import Cell, Part, Robot
-from cellplan.model.layout import KeepOut, LayoutSettings
-from cellplan.model.mounting import Pedestal
-from cellplan.model.robot import BASE
+from cellplan.model.cell.cell import Cell, Part, Robot
+from cellplan.model.cell.layout import KeepOut, LayoutSettings
+from cellplan.model.cell.mounting import Pedestal
+from cellplan.model.robot.robot import BASE
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.distances.moving_bodies import NeighbourCells

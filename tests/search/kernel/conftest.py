@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import rotation_about
-from cellplan.io.cell.load import load_cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.search.kernel.job import Job, Layouts

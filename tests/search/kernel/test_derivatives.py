@@ -7,7 +7,7 @@ import pytest
 from builders.batch_cells import CELLS, configurations, everyone, relations, seen_poses
 
 from cellplan.geometry.transforms import Array, rotation_exp
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.collocation.batch_tasks import BatchTasks, Linearisation
 from cellplan.planning.tracking.task_constraints import TaskConstraints
 from cellplan.search.kernel.derivatives import differentiate, equations

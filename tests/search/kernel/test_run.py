@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cellplan.io.cell.load import load_cell
+from cellplan.files.cell.load import load_cell
 from cellplan.planning.layout_screening import Candidates, screen_layouts
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks

@@ -7,8 +7,8 @@ from search.kernel.test_derivatives import displaced, one_node
 
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.geometry.arrays import Array
-from cellplan.kinematics.screw_chain import ScrewChain
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.search.kernel.job import Job, Layouts
 from cellplan.search.kernel.screws import Directions
 from cellplan.search.kernel.singular_values import SingularValues, arms

@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 
 from cellplan import load_cell, solve
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.trials.prepared import PreparedSearch
+from cellplan.jobs.layout.trials.searched import searched_cell
 from cellplan.model.settings.layout import MisplacementEntry
-from cellplan.pipeline.layout.prepared import PreparedSearch
-from cellplan.pipeline.layout.request import LayoutRequest
-from cellplan.pipeline.layout.searched import searched_cell
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.misplacement.corners import judged
 from cellplan.search.misplacement.displacements import BaseDisplacements
 from cellplan.search.misplacement.guarded import GuardedProblem
-from cellplan.search.misplacement.robust import RobustSearch, robust_layout, seeded_signs
-from cellplan.search.misplacement.scenarios import ScenarioProblem
+from cellplan.search.misplacement.robust import RobustSearch, ScenarioProblem, robust_layout, seeded_signs
 from cellplan.search.misplacement.tolerance import tolerances
 from cellplan.search.misplacement.worst import worst
 from cellplan.search.programs.measures import Measures

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cellplan.errors import InputError
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
-from cellplan.model.motion import Schedule
+from cellplan.files.cell.load import load_cell
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import Schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths

@@ -10,11 +10,10 @@ from cellplan.model.seeds import generator
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective
-from cellplan.search.starts import pools
+from cellplan.search.starts import generator as pools
 from cellplan.search.starts.combined import judged
-from cellplan.search.starts.contacts import Contacts
 from cellplan.search.starts.generator import StartGenerator, StartOrigin
-from cellplan.search.starts.problem import StartProblem
+from cellplan.search.starts.problem import Contacts, StartProblem
 from cellplan.search.variables.variables import Variables
 from tests.search.starts.conftest import CELLS, DRAWS, prepared
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
+from cellplan.files.cell.load import load_cell
+from cellplan.model.cell.cell import Cell
 from cellplan.search.variables.variables import Variables
 
 CELLS = Path(__file__).resolve().parents[3] / "cells"

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import Array, rotation_about
-from cellplan.io.cell.load import load_cell
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.search.kernel.job import Job, Layouts

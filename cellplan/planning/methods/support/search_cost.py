@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array, rotation_about, skew
-from cellplan.model.cell import Cell, Grasp, Relation, Robot
+from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.planning.tracking.problem import TrackingProblem
 
 PARALLEL: Final = 1e-9  # sine of the angle below which two axes count as parallel: rounding of axis tables

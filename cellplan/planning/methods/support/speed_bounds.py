@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.errors import StartOutsideLimitsError
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell import Cell
+from cellplan.model.cell.cell import Cell
 
 READ_BACK: Final = 2e-14  # [rad] or [m] by which a position may change when it is written and read back
 ROUNDING_MARGIN: Final = 1e-12  # [rad] or [m] kept from position limits: what many steps add up to in rounding

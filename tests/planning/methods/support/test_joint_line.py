@@ -8,7 +8,7 @@ from builders.random_cells import make_task, random_cell
 from builders.search_arms import FOUR_LINKS, arm_cell, dh_arm
 
 from cellplan.geometry.transforms import pose_from, rotation_exp
-from cellplan.model.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.methods.support.joint_line import joint_lines
 from cellplan.planning.methods.support.search_cost import SearchCost
 from cellplan.planning.tracking.motion_task import MotionTask

@@ -1,0 +1,1 @@
+"""Distances of robots whose clocks are independent."""

@@ -1,1 +1,0 @@
-"""Checks of a rehearsed cell: true errors, execution, figures of ISO 9283."""

@@ -1,1 +1,0 @@
-"""One wide table of all robots: writer and columns."""

@@ -1,0 +1,1 @@
+"""Entries of a cell file become the model."""

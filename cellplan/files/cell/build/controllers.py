@@ -1,0 +1,175 @@
+"""Controllers of a cell file: what becomes of their entries, and what contradicts robots or other controllers."""
+
+from collections.abc import Iterator, Mapping
+from typing import Final
+
+from cellplan.files.input.findings import Finding, KeyPath, key_text, listed, unknown_name
+from cellplan.files.schema.partial import ValidEntries
+from cellplan.files.schema.robot import RobotEntry
+from cellplan.files.yaml.reader import YamlDocument
+from cellplan.model.robot.robot import RobotModel
+from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
+from cellplan.model.settings.units import si_or_none
+
+ARM: Final = 6  # axes of an arm, the last ones of a robot with as many joints or more
+EXTERNAL: Final = 6  # external axes that a row of these programs holds
+OF_SIX_AXES: Final = frozenset({"abb", "kuka", "staubli"})
+SIGNALS: Final = {"kuka": (1, 4096), "ur": (0, 7)}  # first and last number, by kinds whose signals are numbers
+FRAMES: Final = {"kuka": 128}  # largest number of a tool or base, by kind
+WITH_GROUPS: Final = ("fanuc", "yaskawa")
+Uses = dict[tuple[str, str, str], str]  # controller, what, name in lower case -> key path of the first use
+
+
+def control_findings(
+    valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument
+) -> Iterator[Finding]:
+    """Everything about controllers that contradicts a robot, or that two robots claim."""
+    uses: Uses = {}
+    for name, robot in valid.robots.items():
+        path: KeyPath = ("robots", name, "controller")
+        yield from _cycle(path, robot, document)
+        control = robot.controller
+        if control is None:
+            continue
+        yield from _handshake((*path, "handshake"), name, control, valid, document)
+        yield from _used_twice(path, control, uses, document)
+        if control.id not in valid.names["controllers"]:
+            yield document.finding(
+                (*path, "id"), unknown_name("a controller of this cell", control.id, valid.names["controllers"])
+            )
+        elif control.id in valid.controllers:
+            entry = valid.controllers[control.id]
+            yield from _of_kind(path, control, entry, document)
+            yield from _signals((*path, "handshake"), control, entry, document)
+            yield from _frames(path, control, entry, document)
+            if name in models:
+                yield from _joints((*path, "id"), entry, models[name], document)
+    yield from _without_robots(valid, document)
+    yield from _stop(valid, document)
+
+
+def _cycle(path: KeyPath, robot: RobotEntry, document: YamlDocument) -> Iterator[Finding]:
+    """The cycle of a controller is stated once, or twice alike."""
+    stated, cycle = robot.controller_cycle_ms, robot.controller.cycle_ms if robot.controller is not None else None
+    if stated is not None and cycle is not None and stated.si != cycle.si:
+        text = f"expected {stated:g}, as controller_cycle_ms says, got {cycle:g}; remove one of them"
+        yield document.finding((*path, "cycle_ms"), text)
+
+
+def _of_kind(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Keys that the kind of the controller has, and a task that it has."""
+    if control.task is not None and entry.kind != "abb":
+        text = f"unexpected key, it applies to kind abb only, and '{control.id}' is of kind {entry.kind}"
+        yield document.key_finding((*path, "task"), text)
+    elif control.task is not None and control.task not in entry.tasks:
+        text = unknown_name(f"a task of controllers.{control.id}.tasks", control.task, entry.tasks)
+        yield document.finding((*path, "task"), text)
+    if control.group is not None and entry.kind not in WITH_GROUPS:
+        text = (
+            f"unexpected key, it applies to the kinds {' and '.join(WITH_GROUPS)} only, and '{control.id}' is of kind "
+            f"{entry.kind}"
+        )
+        yield document.key_finding((*path, "group"), text)
+
+
+def _joints(path: KeyPath, entry: ControllerEntry, model: RobotModel, document: YamlDocument) -> Iterator[Finding]:
+    """Joints that a controller of this kind can move: an arm of six axes after some external ones."""
+    count, turning = len(model.joints), sum(joint.is_revolute for joint in model.joints)
+    if entry.kind == "ur" and not count == turning == ARM:
+        text = f"expected a controller for {count} joints, {turning} of them revolute, got one of kind ur, which moves "
+        yield document.finding(path, f"{text}exactly {ARM} revolute joints")
+    if entry.kind in OF_SIX_AXES and count > ARM + EXTERNAL:
+        text = f"expected a controller for {count} joints, got one of kind {entry.kind}, which moves at most "
+        yield document.finding(path, f"{text}{ARM} axes of an arm and {EXTERNAL} external axes")
+
+
+def _handshake(
+    path: KeyPath, name: str, control: RobotControlEntry, valid: ValidEntries, document: YamlDocument
+) -> Iterator[Finding]:
+    """Inputs are set by other robots of the cell."""
+    others = [robot for robot in valid.names["robots"] if robot != name]
+    for robot in control.handshake.inputs if control.handshake is not None else ():
+        if robot not in others:
+            text = unknown_name("another robot of this cell", robot, others)
+            yield document.key_finding((*path, "inputs", robot), text)
+
+
+def _signals(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Signals are numbered, or named, as controllers of the kind do."""
+    if control.handshake is None:
+        return
+    stated: list[tuple[KeyPath, str | int]] = [((*path, "output"), control.handshake.output)]
+    stated += [((*path, "inputs", robot), signal) for robot, signal in control.handshake.inputs.items()]
+    for place, signal in stated:
+        if entry.kind in SIGNALS:
+            first, last = SIGNALS[entry.kind]
+            if not isinstance(signal, int) or not first <= signal <= last:
+                text = f"expected a whole number from {first} to {last}, as controllers of kind {entry.kind} number "
+                yield document.finding(place, f"{text}their signals, got {signal!r}")
+        elif entry.kind == "abb" and isinstance(signal, int):
+            text = f"expected a name, as controllers of kind abb name their signals, got {signal}"
+            yield document.finding(place, text)
+
+
+def _frames(
+    path: KeyPath, control: RobotControlEntry, entry: ControllerEntry, document: YamlDocument
+) -> Iterator[Finding]:
+    """Numbers of tools and bases that a controller of the kind has."""
+    last = FRAMES.get(entry.kind)
+    for key, number in (("tool_number", control.tool_number), ("base_number", control.base_number)):
+        if last is not None and number is not None and number > last:
+            text = f"expected at most {last}, as many as controllers of kind {entry.kind} have, got {number}"
+            yield document.finding((*path, key), text)
+
+
+def _used_twice(path: KeyPath, control: RobotControlEntry, uses: Uses, document: YamlDocument) -> Iterator[Finding]:
+    """A task, a group, an output or an input of one controller belongs to one robot; an input to one sender."""
+    claims: list[tuple[str, KeyPath, str]] = []
+    if control.task is not None:
+        claims.append(("task", ("task",), control.task))
+    if control.group is not None:
+        claims.append(("group", ("group",), str(control.group)))
+    if control.handshake is not None:
+        claims.append(("output", ("handshake", "output"), str(control.handshake.output)))
+        for robot, signal in control.handshake.inputs.items():
+            claims.append(("input", ("handshake", "inputs", robot), str(signal)))
+    for what, below, word in claims:
+        place = key_text((*path, *below))
+        first = uses.setdefault((control.id, what, word.lower()), place)
+        if first != place:
+            text = f"expected {_article(what)} that nothing else on '{control.id}' uses, got '{word}', as {first} does"
+            yield document.finding((*path, *below), text)
+
+
+def _article(noun: str) -> str:
+    """A noun with its article."""
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def _without_robots(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """A controller moves at least one robot; known only where all robots name one that exists."""
+    used = {robot.controller.id for robot in valid.robots.values() if robot.controller is not None}
+    if set(valid.robots) != set(valid.names["robots"]) or not used <= set(valid.names["controllers"]):
+        return
+    for name in valid.names["controllers"]:
+        if name not in used:
+            text = f"expected a robot with controller: {{id: {name}}} ({listed(valid.names['robots'])}), got none"
+            yield document.key_finding(("controllers", name), text)
+
+
+def _stop(valid: ValidEntries, document: YamlDocument) -> Iterator[Finding]:
+    """What is demanded of stops depends on how other robots go on; known only where all entries are valid."""
+    is_whole = set(valid.robots) == set(valid.names["robots"]) and set(valid.controllers) == set(
+        valid.names["controllers"]
+    )
+    if valid.checks is None or valid.checks.stop is None or not is_whole:
+        return
+    used = {robot.controller.id for robot in valid.robots.values() if robot.controller is not None}
+    entries = [valid.controllers[name] for name in used if name in valid.controllers]
+    if not any(si_or_none(entry.reaction_ms) or entry.brake_s for entry in entries):
+        text = "expected controllers of robots that state reaction_ms or brake_s above 0, of which it is worked out, "
+        yield document.key_finding(("checks", "stop"), f"{text}got none")

@@ -1,0 +1,1 @@
+"""The section ``layout`` of a cell file: addresses, ranges and ties."""

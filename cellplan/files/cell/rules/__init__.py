@@ -1,0 +1,1 @@
+"""Rules between the entries of a cell file."""

@@ -1,0 +1,323 @@
+"""Mismatches between a file and its format: pydantic's findings as data, located in the file."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from types import NoneType, UnionType
+from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, Tag, ValidationError
+
+from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, listed, shown
+from cellplan.files.yaml.reader import YamlDocument
+from cellplan.model.settings.entry import NAME_WORDS, Entry
+from cellplan.model.settings.units import Quantity
+
+UNITS: Final[Mapping[str, str]] = {
+    "_deg_s3": "degrees per second³",
+    "_deg_s2": "degrees per second²",
+    "_deg_s": "degrees per second",
+    "_mm_s3": "millimetres per second³",
+    "_mm_s2": "millimetres per second²",
+    "_mm_s": "millimetres per second",
+    "_deg": "degrees",
+    "_mm": "millimetres",
+    "_s": "seconds",
+}  # by the ending of the key, longest first
+FINDING_LIMIT: Final = 1000  # findings that are reported; a file with more is not corrected line by line
+TAG: Final = re.compile(r"<.*>")
+COUNTS: Final = frozenset({"too_short", "too_long"})
+BOUNDS: Final = frozenset({"greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number"})
+AnyEntry = TypeVar("AnyEntry", bound=Entry)
+
+
+def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Finding]]:
+    """Read a whole file.
+
+    Returns:
+        The entry, or None when there are findings; and the findings that the YAML reader has not made already.
+    """
+    try:
+        return model.model_validate(document.root), []
+    except ValidationError as error:
+        findings = error.errors(include_url=False, include_context=True, include_input=False)
+    mismatches = [_MessageReader(model, document, dict(finding)).mismatch() for finding in findings[:FINDING_LIMIT]]
+    located = [_located(mismatch, document) for mismatch in mismatches if mismatch is not None]
+    return None, list(dict.fromkeys(located))
+
+
+def valid_entry(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
+    """One entry of a file; None when it is invalid."""
+    try:
+        return model.model_validate(value_at(document.root, path))
+    except ValidationError:
+        return None
+
+
+def value_at(root: Any, path: KeyPath) -> Any:
+    """Value at a key path; None when there is none."""
+    for key in path:
+        try:
+            root = root[key]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return root
+
+
+class MismatchKind(StrEnum):
+    """What is wrong with a value of a file."""
+
+    UNKNOWN_KEY = "unknown key"
+    MISSING = "missing"
+    NAME = "name"  # of an entry
+    TYPE = "type"
+    CHOICE = "choice"  # none of the words that are allowed
+    BOUND = "bound"  # of a number
+    COUNT = "count"  # of entries
+    RULE = "rule"  # between several keys; brings its own text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mismatch:
+    """A value that the format does not allow, as data; `mismatch_text` renders it."""
+
+    kind: MismatchKind  # what is wrong
+    path: KeyPath  # key path of the value
+    expected: str = ""  # what may stand there, as a phrase; the whole text of a rule
+    allowed: tuple[str, ...] = ()  # words or keys that may stand there
+    at_least: float | None = None  # lower bound of a number or of a count; None without one
+    at_most: float | None = None  # upper bound; None without one
+    is_positive: bool = False  # whether the lower bound reads as "positive"
+    unit: str = ""  # unit of a number, as in "of millimetres"; empty without one
+    got: Any = None  # the value that was found
+
+    @property
+    def is_at_key(self) -> bool:
+        """Whether the key is wrong rather than its value."""
+        unexpected = self.kind is MismatchKind.RULE and self.expected.startswith("unexpected key")
+        return (
+            unexpected
+            or self.kind is MismatchKind.UNKNOWN_KEY
+            or (self.kind is MismatchKind.NAME and self.got is self.path[-1])
+        )
+
+
+def _located(mismatch: Mismatch, document: YamlDocument) -> Finding:
+    """A mismatch as a line of the file: at its key when the key is wrong, else at its value."""
+    text = mismatch_text(mismatch)
+    if mismatch.is_at_key:
+        return document.key_finding(mismatch.path, text)
+    return document.finding(mismatch.path, text)
+
+
+class _MessageReader:
+    """Reads one finding of pydantic, with its place in the file and in the format."""
+
+    def __init__(self, model: type[Entry], document: YamlDocument, finding: Mapping[str, Any]) -> None:
+        """Split the finding into its place and its kind."""
+        location = tuple(finding["loc"])
+        self.model = model
+        self.document = document
+        self.is_key = location[-1:] == ("[key]",)
+        self.location: KeyPath = location[:-1] if self.is_key else location
+        self.path: KeyPath = tuple(key for key in self.location if not TAG.fullmatch(str(key)))
+        self.type: str = finding["type"]
+        self.text: str = finding["msg"]
+        self.context: dict[str, Any] = finding.get("ctx", {})
+
+    @property
+    def value(self) -> Any:
+        """The value at the place of the finding."""
+        return value_at(self.document.root, self.path)
+
+    def mismatch(self) -> Mismatch | None:
+        """The finding as data; None when another one about the same value says more."""
+        if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
+            return None
+        if self.is_key and self.type != "rule":
+            return Mismatch(kind=MismatchKind.NAME, path=self.path, got=self.path[-1])
+        if self.type == "extra_forbidden":
+            allowed = fields_of(annotation_at(self.model, self.location[:-1]))
+            return Mismatch(kind=MismatchKind.UNKNOWN_KEY, path=self.path, allowed=tuple(allowed))
+        if self.type == "rule":
+            below = re.findall(r"[^.\[\]]+", self.context["key"])
+            path = (*self.path, *(int(key) if key.isdigit() else key for key in below))
+            return Mismatch(kind=MismatchKind.RULE, path=path, expected=self.context["text"])
+        if self.type == "too_short" and len(self.value) >= self.context["min_length"]:
+            return None  # short only of entries that are wrong themselves
+        return self._missing() if self.type == "missing" else self._about_value()
+
+    def _missing(self) -> Mismatch:
+        """A key or an element of a list of fixed length that is absent."""
+        if isinstance(self.path[-1], int):
+            got = value_at(self.document.root, self.path[:-1])
+            return Mismatch(
+                kind=MismatchKind.TYPE, path=self.path[:-1], expected=self._type(self.location[:-1]), got=got
+            )
+        fields = fields_of(annotation_at(self.model, self.location[:-1]))
+        words = (fields[str(self.location[-1])].description or "a value").rstrip(".")
+        expected = words if words[:2].isupper() else words[:1].lower() + words[1:]
+        return Mismatch(kind=MismatchKind.MISSING, path=self.path, expected=expected)
+
+    def _about_value(self) -> Mismatch:
+        """A value that is not allowed."""
+        about = partial(Mismatch, path=self.path, got=self.value)
+        branch = str(self.location[-1]) if self.location else ""
+        if self.type == "choice":
+            return about(kind=MismatchKind.TYPE, expected=self.text)
+        if TAG.fullmatch(branch) and self.type in {"literal_error", "string_type"}:
+            kind = MismatchKind.CHOICE if self.type == "literal_error" else MismatchKind.TYPE
+            return about(kind=kind, expected=branch[1:-1], allowed=tuple(_words(branch[1:-1])))
+        if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
+            return about(kind=MismatchKind.COUNT, at_least=self.context.get("min_length"), at_most=self._most_entries())
+        if self.type == "string_pattern_mismatch":
+            return about(kind=MismatchKind.NAME)
+        if self.type in BOUNDS:
+            return self._bound()
+        expected = self._type(self.location)
+        is_literal = self.type == "literal_error"
+        return about(
+            kind=MismatchKind.CHOICE if is_literal else MismatchKind.TYPE,
+            expected=expected,
+            allowed=tuple(_words(expected)) if is_literal else (),
+        )
+
+    def _most_entries(self) -> int | None:
+        """Largest number of entries, where there are too many."""
+        return self.context["max_length"] if self.type == "too_long" else None
+
+    def _bound(self) -> Mismatch:
+        """A number beyond its bound, or one that is not finite."""
+        lower = self.context.get("gt", self.context.get("ge"))
+        is_positive = lower is not None and lower >= 0.0 >= self.value and not (lower == 0.0 and "ge" in self.context)
+        return Mismatch(
+            kind=MismatchKind.BOUND,
+            path=self.path,
+            at_least=lower,
+            at_most=self.context.get("le", self.context.get("lt")),
+            is_positive=is_positive,
+            unit=self._unit(),
+            got=self.value,
+        )
+
+    def _unit(self) -> str:
+        """`` of millimetres``, from the ending of the nearest key."""
+        key = next((key for key in reversed(self.path) if isinstance(key, str)), "")
+        unit = next((unit for ending, unit in UNITS.items() if key.endswith(ending)), None)
+        return " per second" if key.endswith("_per_s") else f" of {unit}" if unit else ""
+
+    def _type(self, location: KeyPath) -> str:
+        """The type of value that the format has at a place."""
+        annotation = annotation_at(self.model, location)
+        return f"a number{self._unit()}" if annotation is float else _phrase(annotation)
+
+
+def _words(expected: str) -> list[str]:
+    """Single words named in a phrase, for "did you mean"; what follows "or a" or "or {" is not a word."""
+    return re.split(", | or ", re.split(" or a | or [{]", expected)[0])
+
+
+def fields_of(annotation: Any) -> Mapping[str, Any]:
+    """Fields of an entry; none of anything else."""
+    return annotation.model_fields if isinstance(annotation, type) and issubclass(annotation, BaseModel) else {}
+
+
+def _bare(annotation: Any) -> Any:
+    """Annotation without metadata, without "or nothing" and without the unit of a number."""
+    while True:
+        if get_origin(annotation) is Annotated:
+            annotation = get_args(annotation)[0]
+            continue
+        arms = [arm for arm in _arms(annotation) if arm is not NoneType]
+        if len(arms) != 1 or arms[0] is annotation:
+            return float if isinstance(annotation, type) and issubclass(annotation, Quantity) else annotation
+        annotation = arms[0]
+
+
+def _arms(annotation: Any) -> tuple[Any, ...]:
+    """Members of a union; the annotation itself when it is none."""
+    return get_args(annotation) if get_origin(annotation) in {Union, UnionType} else (annotation,)
+
+
+def _tagged_arms(annotation: Any) -> dict[str, Any]:
+    """Branches of a tagged choice by tag, through nested unions."""
+    branches: dict[str, Any] = {}
+    if get_origin(annotation) is Annotated:
+        inner, *metadata = get_args(annotation)
+        tag = next((item.tag for item in metadata if isinstance(item, Tag)), None)
+        return {tag: inner} if tag is not None else _tagged_arms(inner)
+    for arm in _arms(annotation):
+        if arm is not annotation:
+            branches.update(_tagged_arms(arm))
+    return branches
+
+
+def annotation_at(annotation: Any, location: KeyPath) -> Any:
+    """What the format says about a place."""
+    for key in location:
+        if TAG.fullmatch(str(key)):
+            annotation = _tagged_arms(annotation).get(str(key))
+            continue
+        annotation = _bare(annotation)
+        if fields := fields_of(annotation):
+            annotation = fields[str(key)].annotation if str(key) in fields else None
+        elif get_origin(annotation) is dict:
+            annotation = get_args(annotation)[1]
+        elif get_origin(annotation) is tuple:
+            arms = get_args(annotation)
+            annotation = arms[0] if arms[-1] is Ellipsis else arms[min(int(key), len(arms) - 1)]
+    return _bare(annotation)
+
+
+def _is_fixed_list(annotation: Any) -> bool:
+    """Whether a list has a fixed number of items."""
+    return get_origin(annotation) is tuple and get_args(annotation)[-1] is not Ellipsis
+
+
+def _phrase(annotation: Any) -> str:
+    """The kinds of value allowed at a place, as a phrase."""
+    if get_origin(annotation) is Literal:
+        words = [str(word) for word in get_args(annotation)]
+        return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+    if get_origin(annotation) is tuple:
+        arms = get_args(annotation)
+        items = {float: "numbers", str: "texts"}.get(_bare(arms[0]), "entries")
+        return f"a list of {items}" if arms[-1] is Ellipsis else f"a list of {len(arms)} {items}"
+    if fields := fields_of(annotation):
+        return f"a mapping with keys out of {', '.join(fields)}"
+    kinds = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
+    return kinds.get(annotation, "a mapping")
+
+
+def mismatch_text(mismatch: Mismatch) -> str:
+    """A mismatch as text: what is expected, what was found, and the nearest allowed word."""
+    if mismatch.kind is MismatchKind.RULE:
+        return mismatch.expected
+    if mismatch.kind is MismatchKind.MISSING:
+        return f"missing, expected {mismatch.expected}"
+    if mismatch.kind is MismatchKind.UNKNOWN_KEY:
+        hint = did_you_mean(str(mismatch.path[-1]), mismatch.allowed)
+        return f"unknown key{hint}; allowed: {listed(mismatch.allowed)}"
+    counted = mismatch.kind is MismatchKind.COUNT and isinstance(mismatch.got, dict | tuple)
+    got = str(len(mismatch.got)) if counted else shown(mismatch.got)
+    is_word = mismatch.kind is MismatchKind.CHOICE and isinstance(mismatch.got, str)
+    hint = did_you_mean(mismatch.got, mismatch.allowed) if is_word else ""
+    return f"expected {_expected_text(mismatch)}, got {got}{hint}"
+
+
+def _expected_text(mismatch: Mismatch) -> str:
+    """The values allowed at the place of a mismatch, as a phrase."""
+    if mismatch.kind is MismatchKind.NAME:
+        return NAME_WORDS
+    bound = mismatch.at_most if mismatch.at_least is None else mismatch.at_least
+    side = "most" if mismatch.at_least is None else "least"
+    if mismatch.kind is MismatchKind.COUNT:
+        return f"at {side} {bound} {'entry' if bound == 1 else 'entries'}"
+    if mismatch.kind is not MismatchKind.BOUND:
+        return mismatch.expected
+    number = f"number{mismatch.unit}"
+    if mismatch.is_positive:
+        return f"a positive {number}"
+    return f"a finite {number}" if bound is None else f"a {number} of at {side} {shown(bound)}"

@@ -1,0 +1,103 @@
+"""What robots stand on or hang from, and attachments of their links, as written in a cell file."""
+
+from typing import ClassVar, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from cellplan.files.schema.shapes import (
+    MESH_FILE,
+    MESH_UNIT,
+    OPEN_MESH,
+    SOLID_SHAPES,
+    BoxEntry,
+    CapsuleEntry,
+    CylinderEntry,
+    MeshUnit,
+    OneShape,
+    SphereEntry,
+    ToolBodyEntry,
+)
+from cellplan.model.settings.entry import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
+
+PEDESTAL_SHAPES = ("cylinder", "box")
+
+
+class PedestalColumnEntry(Entry):
+    """A round column."""
+
+    radius_mm: Size = Field(description="Radius.")
+
+
+class PedestalBoxEntry(Entry):
+    """A box seen from above."""
+
+    size_mm: tuple[Size, Size] = Field(description="Edge lengths along the x and y of the base.")
+
+
+class ColumnEntry(Entry):
+    """A column between a robot's base and what carries it: exactly one of cylinder and box."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PEDESTAL_SHAPES))
+
+    cylinder: PedestalColumnEntry | None = Field(default=None, description="Round column through the base's origin.")
+    box: PedestalBoxEntry | None = Field(default=None, description="Box round the base's origin, turned as it is.")
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape."""
+        require_one(self, PEDESTAL_SHAPES)
+        return self
+
+
+class PedestalEntry(ColumnEntry):
+    """What a robot stands on, upright from the floor to the origin of its base; a tilted base cuts off its top."""
+
+    floor_z_mm: Coordinate | None = Field(
+        default=None,
+        description="Height of the floor that it stands on; when absent the highest plane of the environment that is "
+        "not above the base.",
+    )
+
+
+class HangingEntry(ColumnEntry):
+    """What a robot hangs from upside down, upright from the origin of its base to the ceiling."""
+
+    ceiling_z_mm: Coordinate = Field(description="Height of the ceiling.")
+
+
+class WallEntry(ColumnEntry):
+    """What a robot is fixed to sideways, along the -z axis of its base."""
+
+    length_mm: Size = Field(description="Length from the base to the wall.")
+
+
+class RailBodyEntry(ToolBodyEntry):
+    """A solid of a rail: exactly one shape."""
+
+    at: PoseEntry = Field(
+        default=PoseEntry(), description="Pose of the solid in the base frame while the rail reads zero."
+    )
+
+
+class AttachmentEntry(OneShape):
+    """A solid mounted on a link of a robot, such as a hose, a feeder or a valve block: exactly one shape."""
+
+    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    link: Text = Field(description="Link that carries it: the word base or a joint of a robot table, a link of a URDF.")
+    name: Name | None = Field(
+        default=None, description="Name in reports, as ROBOT/NAME; attachment, attachment_2, … when absent."
+    )
+    box: BoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
+    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
+    sphere: SphereEntry | None = Field(default=None, description="Ball.")
+    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
+    open: bool | None = Field(default=None, description=OPEN_MESH)
+    at: PoseEntry = Field(
+        default=PoseEntry(),
+        description="Pose of the solid while all joints read zero: in the base frame for a robot table, as the bodies "
+        "of the table are given; in the frame of the link for a URDF.",
+    )

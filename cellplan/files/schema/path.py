@@ -1,0 +1,128 @@
+"""Paths of tools as written in a cell file."""
+
+from typing import Annotated, ClassVar, Final, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
+from cellplan.model.settings.entry import (
+    Coordinate,
+    Direction,
+    Entry,
+    Text,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.model.settings.units import Mm, Within
+
+PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
+SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
+CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
+MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
+
+
+class PolylineEntry(Entry):
+    """Points joined by straight sides in the order they are listed: two coordinates each in a plane, or three."""
+
+    points_mm: tuple[tuple[Coordinate, ...], ...] = Field(
+        min_length=2, description="Points, all [u, v] on the plane's axes or all [x, y, z] in the part frame."
+    )
+    plane: PlaneWord | None = Field(
+        default=None, description="Plane of the part frame; required with [u, v], not with [x, y, z]."
+    )
+    closed: bool = Field(default=False, description="Whether the last point is joined to the first.")
+
+    @model_validator(mode="after")
+    def _is_drawable(self) -> Self:
+        """Points of one dimension, a plane where one is needed, no side without length."""
+        sizes = [len(point) for point in self.points_mm]
+        for index, size in enumerate(sizes):
+            if size not in {2, 3} or size != sizes[0]:
+                allowed = sizes[0] if sizes[0] in {2, 3} else "2 or 3"
+                raise rule(f"expected a list of {allowed} numbers, got {size}", f"points_mm[{index}]")
+        if sizes[0] == 2 and self.plane is None:
+            raise rule("missing, expected the plane of the points: xy, yz or xz", "plane")
+        if sizes[0] == 3 and self.plane is not None:
+            raise rule("unexpected key, points [x, y, z] need no plane", "plane")
+        if self.closed and len(sizes) < 3:
+            raise rule(f"expected at least 3 points for a closed path, got {len(sizes)}", "points_mm")
+        self._require_sides()
+        return self
+
+    def _require_sides(self) -> None:
+        """Refuse equal neighbours, and on a closed path a last point on the first."""
+        points = self.points_mm
+        pairs = list(zip(points, points[1:], range(1, len(points)), strict=False))
+        if self.closed:
+            pairs.append((points[0], points[-1], len(points) - 1))
+        for a, b, index in pairs:
+            if sum((u - v) ** 2 for u, v in zip(a, b, strict=True)) < SHORTEST_SIDE_MM**2:
+                other = "first" if self.closed and a is points[0] and index == len(points) - 1 else "point before"
+                raise rule(f"expected another point than the {other}, got the same", f"points_mm[{index}]")
+
+
+class CsvEntry(Entry):
+    """Tool targets from a CSV file."""
+
+    file: Text = Field(
+        description="File with the header x_mm,y_mm,z_mm and optionally i,j,k or qw,qx,qy,qz, and t_s for a trajectory "
+        "that brings its own clock."
+    )
+    smooth: bool = Field(
+        default=True, description="Whether the points are joined by a smooth curve instead of straight sides."
+    )
+    closed: bool = Field(
+        default=False,
+        description="Whether the last point is joined to the first; a closed trajectory ends with its first row again.",
+    )
+    join_mm: Annotated[Mm, Within(ge=0.0, le=MOST_JOINED_MM)] = Field(
+        default=Mm(0.0),
+        description="Points nearer to the point before than this are left out, and at the end of a closed path those "
+        "nearer to the first; not for a trajectory.",
+    )
+
+
+CsvChoice = Annotated[
+    Annotated[Text, Tag(f"<{CSV_WORDS}>")] | Annotated[CsvEntry, Tag("<mapping>")],
+    by_kind(CSV_WORDS, mapping=dict),
+]
+
+
+class PathEntry(Entry):
+    """Exactly one path, and its projection onto the part."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PATHS))
+
+    circle: CircleEntry | None = Field(default=None, description="Circle.")
+    rectangle: RectangleEntry | None = Field(default=None, description="Rectangle.")
+    rhombus: RhombusEntry | None = Field(default=None, description="Rhombus.")
+    polyline: PolylineEntry | None = Field(default=None, description="Points joined by straight sides.")
+    csv: CsvChoice | None = Field(default=None, description="Tool targets from a file.")
+    project: Direction | None = Field(
+        default=None,
+        description="Side of the part, as a direction in the part frame, from which the path is projected onto the "
+        "part; absent: not projected.",
+    )
+    offset_mm: Coordinate | None = Field(
+        default=None,
+        description="Shift of a planar path that is not projected along the plane's normal axis; 0 when absent.",
+    )
+
+    @model_validator(mode="after")
+    def _is_one_path(self) -> Self:
+        """Exactly one path; an offset goes with a planar path that is not projected."""
+        require_one(self, PATHS)
+        if self.offset_mm is not None and not self.is_planar:
+            raise rule("unexpected key, only a path in a plane has an offset", "offset_mm")
+        if self.offset_mm is not None and self.project is not None:
+            raise rule("unexpected key, a projected path lies on the surface", "offset_mm")
+        return self
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the path is drawn in a plane of the part frame."""
+        if self.polyline is not None:
+            return self.polyline.plane is not None
+        return self.csv is None

@@ -1,0 +1,207 @@
+"""A robot as a table of joint axes at its reference configuration, with the solids of its links."""
+
+from typing import Annotated, ClassVar, Final, Literal, Self
+
+from pydantic import ConfigDict, Field, Tag, model_validator
+
+from cellplan.files.schema.robot import (
+    AXIS_LIMIT,
+    SLIDING_LIMITS,
+    TURNING_LIMITS,
+    JointAngle,
+    SlidingAcceleration,
+    SlidingJerk,
+    TurningAcceleration,
+    TurningJerk,
+    TurningSpeed,
+)
+from cellplan.files.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
+from cellplan.model.settings.controller import ControllerZeroEntry
+from cellplan.model.settings.entry import (
+    NOT_TURNED,
+    ORIGIN,
+    Angles,
+    Coordinate,
+    Coordinates,
+    Entry,
+    Name,
+    PoseEntry,
+    Size,
+    SlidingSpeed,
+    Text,
+    Vector,
+    by_kind,
+    one_of_keys,
+    require_one,
+    rule,
+)
+from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
+
+BODY_LIMIT: Final = 200  # solids of one robot
+UNIT_TOL: Final = 1e-3  # [-] room for axes written with four digits
+
+
+class JointEntry(Entry):
+    """One joint: its axis in the base frame at the reference configuration, and its limits."""
+
+    type: Literal["revolute", "prismatic"] = Field(description="How the joint moves.")
+    axis: Vector = Field(description="Unit direction of the axis.")
+    point_mm: Coordinates = Field(default=ORIGIN, description="A point on the axis; required for a revolute joint.")
+    lower_deg: JointAngle | None = Field(default=None, description="Lowest angle of a revolute joint.")
+    upper_deg: JointAngle | None = Field(default=None, description="Highest angle of a revolute joint.")
+    velocity_deg_s: TurningSpeed | None = Field(default=None, description="Largest speed of a revolute joint.")
+    acceleration_deg_s2: TurningAcceleration | None = Field(
+        default=None, description="Largest acceleration of a revolute joint, if known."
+    )
+    jerk_deg_s3: TurningJerk | None = Field(default=None, description="Largest jerk of a revolute joint, if known.")
+    lower_mm: Coordinate | None = Field(default=None, description="Lowest position of a prismatic joint.")
+    upper_mm: Coordinate | None = Field(default=None, description="Highest position of a prismatic joint.")
+    velocity_mm_s: SlidingSpeed | None = Field(default=None, description="Largest speed of a prismatic joint.")
+    acceleration_mm_s2: SlidingAcceleration | None = Field(
+        default=None, description="Largest acceleration of a prismatic joint, if known."
+    )
+    jerk_mm_s3: SlidingJerk | None = Field(default=None, description="Largest jerk of a prismatic joint, if known.")
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """Keys of the joint's own unit, all of them, lower below upper."""
+        limits, other = (
+            (TURNING_LIMITS, SLIDING_LIMITS) if self.type == "revolute" else (SLIDING_LIMITS, TURNING_LIMITS)
+        )
+        for name in other:
+            if getattr(self, name) is not None:
+                raise rule(f"unexpected key, a {self.type} joint has {', '.join(limits)}", name)
+        for name in limits[:3]:
+            if getattr(self, name) is None:
+                raise rule(f"missing, a {self.type} joint needs {', '.join(limits[:3])}", name)
+        if self.type == "revolute" and "point_mm" not in self.model_fields_set:
+            raise rule("missing, expected a point on the axis", "point_mm")
+        lower, upper = getattr(self, limits[0]), getattr(self, limits[1])
+        if not lower < upper:
+            raise rule(f"expected a number above {limits[0]} = {lower:g}, got {upper:g}", limits[1])
+        length = sum(component * component for component in self.axis) ** 0.5
+        if abs(length - 1.0) > UNIT_TOL:
+            raise rule(f"expected a vector of length 1, got one of length {length:.6g}", "axis")
+        return self
+
+
+class SegmentEntry(Entry):
+    """A round solid along a segment in the base frame at the reference configuration."""
+
+    from_mm: Coordinates = Field(description="One end of the middle line.")
+    to_mm: Coordinates = Field(description="Other end of the middle line.")
+    radius_mm: Size = Field(description="Radius.")
+
+
+class PlacedBoxEntry(Entry):
+    """A cuboid in the base frame at the reference configuration."""
+
+    size_mm: tuple[Size, Size, Size] = Field(description="Edge lengths along its own x, y, z.")
+    center_mm: Coordinates = Field(description="Centre.")
+    rpy_deg: Angles = Field(default=NOT_TURNED, description="Roll, pitch and yaw about fixed axes.")
+
+
+class PlacedSphereEntry(SphereEntry):
+    """A ball in the base frame at the reference configuration."""
+
+    center_mm: Coordinates = Field(description="Centre.")
+
+
+class PlacedMeshEntry(Entry):
+    """A mesh in the base frame at the reference configuration."""
+
+    file: Text = Field(description=f"{MESH_FILE}, relative to the table.")
+    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
+    at: PoseEntry = Field(default=PoseEntry(), description="Pose of the drawing in the base frame.")
+
+    @model_validator(mode="after")
+    def _has_unit(self) -> Self:
+        """A unit, unless the file states it."""
+        require_unit_of(self.file, self.unit)
+        return self
+
+
+class LinkBodyEntry(Entry):
+    """A solid fixed to one link."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+
+    link: Text = Field(description="The word base, or the joint that carries the solid.")
+    name: Name | None = Field(default=None, description="Name in reports; the link's name, numbered, when absent.")
+    box: PlacedBoxEntry | None = Field(default=None, description="Cuboid.")
+    cylinder: SegmentEntry | None = Field(default=None, description="Cylinder with flat ends.")
+    capsule: SegmentEntry | None = Field(default=None, description="Cylinder with round ends beyond the segment.")
+    sphere: PlacedSphereEntry | None = Field(default=None, description="Ball.")
+    mesh: PlacedMeshEntry | None = Field(default=None, description="Mesh from a file.")
+    accuracy_mm: Accuracy | None = Field(
+        default=None,
+        description="How far the real link may stick out of this solid; when absent what is stated for all of them.",
+    )
+
+    @model_validator(mode="after")
+    def _is_one_shape(self) -> Self:
+        """Exactly one shape, and a cylinder with two ends."""
+        require_one(self, SOLID_SHAPES)
+        if self.cylinder is not None and self.cylinder.from_mm == self.cylinder.to_mm:
+            raise rule("expected another point than from_mm, got the same", "cylinder.to_mm")
+        return self
+
+
+class BodiesEntry(Entry):
+    """Solids of the links, with a statement on how good they are."""
+
+    accuracy_mm: Accuracy | None = Field(
+        default=None,
+        description="Largest distance by which the real arm sticks out of the solids; the report says so when absent.",
+    )
+    source: Text = Field(default="not stated", description="Where the accuracy comes from.")
+    solids: tuple[LinkBodyEntry, ...] = Field(
+        default=(),
+        max_length=BODY_LIMIT,
+        description="Solids of the links, in the base frame at the reference configuration.",
+    )
+
+
+BODIES_WORDS: Final = "a list of solids or a mapping (accuracy_mm, source, solids)"
+BodiesChoice = Annotated[
+    Annotated[BodiesEntry, Tag("<mapping>")]
+    | Annotated[tuple[LinkBodyEntry, ...], Field(max_length=BODY_LIMIT), Tag("<list>")],
+    by_kind(BODIES_WORDS, mapping=dict, list=tuple),
+]
+
+
+class RobotTableDocument(Entry):
+    """A whole robot file."""
+
+    robot: Name = Field(description="Name of the robot model.")
+    source: Text = Field(default="not stated", description="Where the figures come from.")
+    joints: dict[Name, JointEntry] = Field(
+        min_length=1, max_length=AXIS_LIMIT, description="Joints by name, from the base to the flange."
+    )
+    flange: PoseEntry = Field(
+        description="Flange (mechanical interface) in the base frame at zero joints, z out of the flange."
+    )
+    bodies: BodiesChoice = Field(
+        default=(),
+        description="Solids of the links, in the base frame at the reference configuration: a list of them, or a "
+        "mapping that also states their accuracy.",
+    )
+    payload: PayloadEntry | None = Field(
+        default=None, description="What the robot may carry; the report says so when absent."
+    )
+    reach: ReachEntry | None = Field(default=None, description="Reach as the maker publishes it, if known.")
+    controller: ControllerZeroEntry | None = Field(
+        default=None,
+        description="How its controller counts the joints; when absent the zero of the model is taken as the "
+        "controller's, and the report says so. Without keys: known to be the same.",
+    )
+
+    @property
+    def solids(self) -> tuple[LinkBodyEntry, ...]:
+        """Solids of the links, in whichever way they are written."""
+        return self.bodies.solids if isinstance(self.bodies, BodiesEntry) else self.bodies
+
+    @property
+    def solids_path(self) -> tuple[str, ...]:
+        """Key path of the solids in the file."""
+        return ("bodies", "solids") if isinstance(self.bodies, BodiesEntry) else ("bodies",)

@@ -1,0 +1,288 @@
+"""Tasks of a cell: what each operator does on the part, where and when."""
+
+from typing import Annotated, Final, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from cellplan.files.schema.path import PathEntry
+from cellplan.files.schema.robot import Configuration
+from cellplan.model.settings.checks import ToolDepth
+from cellplan.model.settings.entry import (
+    DIRECTION_WORDS,
+    Angle,
+    Direction,
+    Entry,
+    Name,
+    Size,
+    SlidingSpeed,
+    Vector,
+    by_kind,
+    require_unique,
+    rule,
+)
+from cellplan.model.settings.robot import JointPosition
+from cellplan.model.settings.task import (
+    FARTHEST_STAND_OFF_MM,
+    LONGEST_S,
+    MOST_CYCLES,
+    ProcessEntry,
+    ToleranceEntry,
+)
+from cellplan.model.settings.units import Deg, Mm, Within
+
+EXCLUDED_BY_PROCESS: Final = ("duration_s", "feed_mm_s", "time_law", "settle_s")
+
+Seconds = Annotated[float, Field(gt=0.0, le=LONGEST_S)]
+
+TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
+LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
+CORNER_WORDS: Final = "stop or {blend_mm: 2}"
+AFTER_WORDS: Final = "the name of a task or a list of names"
+POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
+
+
+ToolAxis = Annotated[
+    Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]
+    | Annotated[Vector, Tag("<list>")],
+    by_kind(TOOL_AXIS_WORDS, list=tuple),
+]
+
+
+class RampEntry(Entry):
+    """Settings of the trapezoid law."""
+
+    ramp: Annotated[float, Field(gt=0.0, le=0.5)] = Field(
+        default=0.25, description="Share of the time of each stretch spent speeding up, and the same slowing down."
+    )
+
+
+class TrapezoidEntry(Entry):
+    """The trapezoid law with its ramp."""
+
+    trapezoid: RampEntry = Field(description="Settings of the trapezoid law.")
+
+
+class BlendEntry(Entry):
+    """Rounded corners."""
+
+    blend_mm: Size = Field(description="Distance from a corner at which its rounding begins.")
+
+
+TimeLawChoice = Annotated[
+    Annotated[Literal["constant", "trapezoid", "quintic"], Tag(f"<{LAW_WORDS}>")]
+    | Annotated[TrapezoidEntry, Tag("<mapping>")],
+    by_kind(LAW_WORDS, mapping=dict),
+]
+CornerChoice = Annotated[
+    Annotated[Literal["stop"], Tag(f"<{CORNER_WORDS}>")] | Annotated[BlendEntry, Tag("<mapping>")],
+    by_kind(CORNER_WORDS, mapping=dict),
+]
+
+
+AfterChoice = Annotated[
+    Annotated[Name, Tag(f"<{AFTER_WORDS}>")] | Annotated[tuple[Name, ...], Tag("<list>")],
+    by_kind(AFTER_WORDS, list=tuple),
+]
+PositionChoice = Annotated[
+    Annotated[Literal["auto"], Tag(f"<{POSITION_WORDS}>")] | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    by_kind(POSITION_WORDS, mapping=dict),
+]
+
+
+StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
+TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
+
+
+class TaskEntry(Entry):
+    """One operator's work on the part."""
+
+    robot: Name = Field(description="Robot that does the task; without program a robot has at most one.")
+    relative_to: Literal["part", "world"] = Field(
+        default="part",
+        description="Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the "
+        "first under held_by) carries it along the path; any other moves its tool through the cell.",
+    )
+    after: AfterChoice | None = Field(
+        default=None,
+        description="Tasks, of any robots, that must be done before this one begins; only with program.",
+    )
+    start_deg: Configuration | None = Field(
+        default=None,
+        description="Start posture of its robot for this task, one angle per joint; auto finds one. When absent that "
+        "of the robot for its first task, and auto for later ones. Only with program.",
+    )
+    start: PositionChoice | None = Field(
+        default=None, description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes start_deg."
+    )
+    holder_deg: tuple[Angle, ...] | None = Field(
+        default=None,
+        description="Configuration of the first holder in which this task begins, and in which it is done in the "
+        "modes part_at_rest and semi_coordinated; the holder's start posture when absent. Only with program.",
+    )
+    holder: dict[str, JointPosition] | None = Field(
+        default=None,
+        min_length=1,
+        description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.",
+    )
+    path: PathEntry = Field(description="Path of the tool tip on the part.")
+    tool_axis: ToolAxis | None = Field(
+        default=None,
+        description="Direction of the tool's z axis in the part frame; normal, the default, points into the surface or "
+        "takes the file's orientations.",
+    )
+    tool_x: Direction = Field(
+        default="+x",
+        description="Direction in the part frame onto which the tool's x axis is aligned as closely as possible.",
+    )
+    spin_deg: Angle = Field(
+        default=Deg(0.0),
+        description="Angle by which the tool is turned about its own z axis, all along the path, from where tool_x "
+        "leads it.",
+    )
+    tool_turn_deg: Angle = Field(
+        default=Deg(0.0),
+        description="Angle by which the tool turns about its own z axis, evenly over the length of the path, "
+        "and on by as much in every further cycle.",
+    )
+    axes: tuple[TaskAxis, ...] = Field(
+        default=("x", "y", "z", "rx", "ry", "rz"),
+        min_length=1,
+        description="Components of the motion that are prescribed, in the part frame.",
+    )
+    free: tuple[Literal["spin"], ...] = Field(
+        default=(), description="[spin] leaves the rotation about the tool's z axis open."
+    )
+    tolerance: ToleranceEntry = Field(default=ToleranceEntry(), description="Largest allowed tool error.")
+    start_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] | None = Field(
+        default=None, description="Start of the path on the common clock; when absent 0, or the end of the approach."
+    )
+    duration_s: Seconds | None = Field(
+        default=None,
+        description="Time for the whole path, all cycles together; when absent what motion.duration_s leaves. Excludes "
+        "feed_mm_s.",
+    )
+    feed_mm_s: SlidingSpeed | None = Field(
+        default=None, description="Largest speed along the path on the surface; excludes duration_s."
+    )
+    process: ProcessEntry | None = Field(
+        default=None,
+        description="Process with a demanded feed; it is on from the start of the path, when an approach is over, to "
+        "its end. Excludes duration_s, feed_mm_s, time_law and settle_s.",
+    )
+    dwell_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0,
+        description="Time for which the tool rests at the end of its path, the process off, before it leaves.",
+    )
+    repeat: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
+        default=1, description="Number of cycles along the path; more than one only for a closed path."
+    )
+    approach_mm: StandOff = Field(
+        default=Mm(0.0),
+        description="Distance from which the tool approaches the start of its path, along its own axis. With program "
+        "the default is 30 for a task on the part.",
+    )
+    approach_s: Seconds = Field(default=0.5, description="Time for the approach, which ends when the path starts.")
+    retract_mm: StandOff = Field(
+        default=Mm(0.0),
+        description="Distance to which the tool retracts from the end of its path, along its own axis. With program "
+        "the default is 30 for a task on the part.",
+    )
+    retract_s: Seconds = Field(default=0.5, description="Time for the retraction.")
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
+        default=0.0,
+        description="Time after the start during which the tool may converge to its path: its error is reported "
+        "and not judged. Shorter than the task.",
+    )
+    tool_depth_mm: ToolDepth | None = Field(
+        default=None,
+        description="Largest depth of the tool in the part, for processes that cut; checks.tool_depth_mm when absent.",
+    )
+    standoff_mm: tuple[StandOff, StandOff] | None = Field(
+        default=None,
+        description="Smallest and largest distance of the tool tip from the part along the path, below the surface to "
+        "tool_depth_mm: along the tool's axis, or to the nearest point where the smallest is 0. When absent a tip with "
+        "a process is within 2 mm of the part.",
+    )
+    off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = Field(
+        default=(),
+        description="Stretches of the path on which the tip need not keep that distance: its begin, its end, and where "
+        "a cut leaves the part between them.",
+    )
+    time_law: TimeLawChoice | None = Field(
+        default=None, description="Law of each stretch between stops; the motion's when absent."
+    )
+    corners: CornerChoice | None = Field(
+        default=None, description="Stop at corners or round them; the motion's when absent."
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        """Duration or feed; each word once; only a path on the part can be projected onto its surface."""
+        if self.duration_s is not None and self.feed_mm_s is not None:
+            raise rule("expected either duration_s or feed_mm_s, got both", "feed_mm_s")
+        for key in EXCLUDED_BY_PROCESS if self.process else ():
+            if getattr(self, key):
+                raise rule("unexpected key, process decides how fast the tool moves along its path", key)
+        if self.relative_to == "world" and self.path.project is not None:
+            raise rule("unexpected key, a path in the world is not projected onto the part", "path.project")
+        if self.start_deg is not None and self.start is not None:
+            raise rule("expected either start_deg or start, got both", "start")
+        if self.holder_deg is not None and self.holder is not None:
+            raise rule("expected either holder_deg or holder, got both", "holder")
+        for name, words in (
+            ("axes", self.axes),
+            ("free", self.free),
+            ("off_part", self.off_part),
+            ("after", self.preceding),
+        ):
+            require_unique(words, name)
+        if self.spin_deg and self.free:
+            raise rule("unexpected key, the spin is free: leave out one of them", "spin_deg")
+        if self.start_s is not None and self.start_s < self.approaching_s:
+            raise rule(f"expected at least approach_s = {self.approach_s:g}, got {self.start_s:g}", "start_s")
+        if self.settle_s and self.approach_mm:
+            raise rule("expected no time to settle, as the tool comes to its path by an approach", "settle_s")
+        return self
+
+    @model_validator(mode="after")
+    def _agrees_with_part(self) -> Self:
+        """Only a tool on the part is deep in it or off it; the smallest distance comes first."""
+        for key in ("tool_depth_mm", "standoff_mm", "off_part") if self.relative_to == "world" else ():
+            if getattr(self, key) not in (None, ()):
+                raise rule("unexpected key, a tool in the world does not work on the part", key)
+        if self.standoff_mm is not None and self.standoff_mm[0] > self.standoff_mm[1]:
+            low, high = (f"{value:g}" for value in self.standoff_mm)
+            raise rule(f"expected [low, high], got [{low}, {high}]: the smaller distance comes first", "standoff_mm")
+        return self
+
+    @property
+    def preceding(self) -> tuple[str, ...]:
+        """Names of the tasks that come before it."""
+        return (self.after,) if isinstance(self.after, str) else self.after or ()
+
+    @property
+    def given_start(self) -> tuple[float, ...] | dict[str, float] | None:
+        """Start posture that was written down; None when it is to be found."""
+        given = self.start_deg if self.start_deg is not None else self.start
+        return None if given is None or isinstance(given, str) else given
+
+    @property
+    def given_holder(self) -> tuple[float, ...] | dict[str, float] | None:
+        """Configuration of the first holder that was written down; None for that holder's start posture."""
+        return self.holder_deg if self.holder_deg is not None else self.holder
+
+    @property
+    def approaching_s(self) -> float:
+        """Time before the path that an approach takes."""
+        return self.approach_s if self.approach_mm else 0.0
+
+    @property
+    def leaving_s(self) -> float:
+        """Time after the path that the delay of a process, the dwell and the retraction take."""
+        off_delay = self.process.off_delay_s if self.process else 0.0
+        return off_delay + self.dwell_s + (self.retract_s if self.retract_mm else 0.0)
+
+    @property
+    def begins_s(self) -> float:
+        """Start of the path on the common clock."""
+        return self.approaching_s if self.start_s is None else self.start_s

@@ -1,0 +1,1 @@
+"""Mesh files read into loose triangles: STL, OBJ, PLY and COLLADA."""

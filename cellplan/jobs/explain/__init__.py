@@ -1,0 +1,1 @@
+"""The structure of a cell explained: coupling graph, circuits, and the rank of its cooperation Jacobian."""

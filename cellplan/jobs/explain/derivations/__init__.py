@@ -1,0 +1,1 @@
+"""The cooperation Jacobian in three more derivations."""

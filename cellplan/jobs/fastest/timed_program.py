@@ -1,0 +1,204 @@
+"""A program at a cycle time of its own: how near its joints come to their limits, and what binds it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import Final, Self
+
+import numpy as np
+
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell.cell import Cell, joint_at
+from cellplan.model.progress import Progress
+from cellplan.model.report.report import TaskAccuracy
+from cellplan.report.record.figures import Figures, figures_of
+from cellplan.runs.early_clearance import EarlyClearance
+from cellplan.runs.plan.retiming import RowLimits, row_limits
+from cellplan.runs.solution import Run, Solution
+from cellplan.runs.solve import certified, solve_motion
+from cellplan.scene.scene import Scene
+
+BINDS: Final = 0.99  # [-] share of a limit from which on it binds
+TASK_LIMITS: Final = ("feed", "tolerance between rows")
+KINDS: Final = ("velocity", "acceleration", "jerk")
+ORDERS: Final = (1.0, 0.5, 1.0 / 3.0)  # how the time that a limit asks for grows with its share
+
+
+class Law(StrEnum):
+    """What decides when the joints are where on their path."""
+
+    AS_WRITTEN = "as_written"
+    TIME_LAWS = "time_laws"
+    COMMON_SPEED = "common_speed"
+    REDUCED_SPEED = "reduced_speed"
+
+
+RETIMED: Final = (Law.COMMON_SPEED, Law.REDUCED_SPEED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binding:
+    """The joint or tool and the limit that ask for most time in a phase.
+
+    Attributes:
+        phase: Name of the phase.
+        robot: Name of the robot.
+        joint: Name of the joint; that of the task for its feed and its tolerance between rows.
+        kind: Its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows.
+        share: What is reached of it, 0..1.
+        time_share: Share of the time of the phase that it asks for, 0..1.
+    """
+
+    phase: str
+    robot: str
+    joint: str
+    kind: str
+    share: float
+    time_share: float
+
+    @property
+    def text(self) -> str:
+        """One line of text."""
+        limit = self.kind if self.kind in TASK_LIMITS else f"{self.kind} limit"
+        name = self.robot if self.kind == "tool speed" else f"{self.robot} {self.joint}"
+        return f"{name} {'binds at' if self.binds else 'reaches'} {100.0 * self.share:.4g} % of its {limit}"
+
+    @property
+    def binds(self) -> bool:
+        """Whether the limit is reached, not only neared."""
+        return self.share >= BINDS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TimedProgram:
+    """A program at a cycle time of its own.
+
+    Attributes:
+        law: What decides when the joints are where on their path.
+        values: What was set in the cell for it, by address; see ``Cell.with_values``.
+        solution: The program, solved and verified at that time.
+        scene: The scene of the solved cell.
+        bindings: What binds each of its phases with tasks; transfer moves go as fast as they can anyway.
+        load: Share of its time in which the limits of joints, tools and part would allow the same motion.
+    """
+
+    law: Law
+    values: Mapping[str, object]
+    solution: Solution
+    scene: Scene = field(repr=False)
+    bindings: tuple[Binding, ...]
+    load: float
+
+    @classmethod
+    def solved(
+        cls,
+        cell: Cell,
+        law: Law,
+        values: Mapping[str, object],
+        *,
+        task: str | None,
+        progress: Progress,
+        early: EarlyClearance | None = None,
+    ) -> Self:
+        """The program of a cell with other values, verified but for its clearance.
+
+        Args:
+            cell: The cell.
+            law: What decides when the joints are where.
+            values: Values by address.
+            task: Name of the only task to work on.
+            progress: Called with the stage and the fraction done.
+            early: Begins with its clearance at once.
+        """
+        scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
+        scaled = [run for run in solution.runs if _is_scaled(run, cell)]
+        rows = [_rows(run.scene or scene, run) for run in scaled]
+        return cls(
+            law=law,
+            values=values,
+            solution=solution,
+            scene=scene,
+            bindings=tuple(_binding(run.scene or scene, run, is_retimed=law in RETIMED) for run in scaled),
+            load=max(_slower(scene, limits, q) for limits, q in rows),
+        )
+
+    def load_of(self, robot: str) -> float:
+        """Share of the time of the program in which the joints of one robot would allow their motion."""
+        loads, columns = [0.0], self.solution.cell.columns(robot)
+        for run in self.solution.runs:
+            limits, q = _rows(run.scene or self.scene, run)
+            shares = zip(limits.shares(run.schedule.times, q), ORDERS, strict=True)
+            loads += [float(share[columns].max(initial=0.0)) ** order for share, order in shares if run.phase.tasks]
+        return max(loads)
+
+    def certified(self, progress: Progress, early: EarlyClearance | None = None) -> Self:
+        """The same program with the clearance of every phase checked; ``early`` has it without curves."""
+        return replace(self, solution=certified(self.solution, self.scene, progress=progress, early=early))
+
+    @property
+    def figures(self) -> Figures:
+        """Its figures; the clearance is among them once it is certified."""
+        return figures_of([run.report for run in self.solution.runs], cycle=self.cycle, load=self.load)
+
+    @property
+    def cycle(self) -> float:
+        """Time from the first row to the last one in [s]."""
+        return float(self.solution.motion.times[-1])
+
+    @property
+    def phases(self) -> list[float]:
+        """Times in [s] that a demanded ``cycle_s`` stands for: of its phases, or of its cycles from home to home."""
+        program = self.solution.cell.program
+        if program is not None:
+            return [self.cycle / program.cycles] * program.cycles
+        return [run.report.cycle_time for run in self.solution.runs]
+
+
+SolvedAt = Callable[[Law, dict[str, object], str], TimedProgram]  # with values by address, and what is shown of it
+
+
+def _is_scaled(run: Run, cell: Cell) -> bool:
+    """Whether a phase has tasks of the cell, so that it takes longer where they do."""
+    tasks = {task.name for task in cell.tasks}
+    return bool(run.phase.tasks) and tasks.issuperset(run.phase.tasks)
+
+
+def _rows(scene: Scene, run: Run) -> tuple[RowLimits, Array]:
+    """Limits and written joint positions of a phase."""
+    names = [robot.name for robot in scene.cell.robots]
+    return row_limits(scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
+
+
+def _slower(scene: Scene, limits: RowLimits, q: Array) -> float:
+    """Factor of time that the limits of one phase ask for; feeds do not, they are scaled."""
+    return replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q)
+
+
+def _binding(scene: Scene, run: Run, *, is_retimed: bool) -> Binding:
+    """The limit that asks for most time in one phase; those of a task are limits of retimed programs."""
+    limits, q = _rows(scene, run)
+    shares = limits.shares(run.schedule.times, q)
+    required = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
+    kind, column = np.unravel_index(int(required.argmax()), required.shape)
+    robot, joint = joint_at(scene.cell, int(column))
+    candidates = [(float(required.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
+    for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if is_retimed else ():
+        candidates.append((feed, scene.cell.task(name).robot, name, "feed", feed))
+    for errors in run.report.accuracy if is_retimed else ():
+        share = _share_between(errors, scene.cell)
+        candidates.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
+    limit = scene.cell.checks.tool_speed_mm_s
+    if limit is not None:
+        for name, speed in run.report.speeds.items():
+            share = speed.tool_peak / limit.si
+            candidates.append((share, name, "", "tool speed", share))
+    most, robot, joint, name, share = max(candidates, key=lambda candidate: candidate[0])
+    return Binding(phase=run.phase.name, robot=robot, joint=joint, kind=name, share=share, time_share=most)
+
+
+def _share_between(errors: TaskAccuracy, cell: Cell) -> float:
+    """Largest error of a tool between rows as a share of its tolerance; it grows with the square of the speed."""
+    if errors.between is None:
+        return 0.0
+    position, orientation = cell.task(errors.task).tolerance.between
+    return max(errors.between.position.largest / position, errors.between.orientation.largest / orientation)

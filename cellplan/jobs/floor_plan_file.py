@@ -1,0 +1,160 @@
+"""Write the floor plan of a run, or of a cell that was not solved, as SVG or DXF."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.files.cell.load import load_cell
+from cellplan.files.run.stored import read_stored_run
+from cellplan.files.run.whole_file import refuse_foreign, replace_older
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.check import check
+from cellplan.jobs.view.cell_scene import standing
+from cellplan.jobs.view.describe import path_points
+from cellplan.jobs.view.run_scene import stored_series
+from cellplan.model.cell.cell import Cell
+from cellplan.model.progress import Progress, silent
+from cellplan.report.floor_plan.dxf import MARK, floor_plan_dxf, require_dxf
+from cellplan.report.floor_plan.plan import FloorPlan
+from cellplan.report.floor_plan.sheet import SVG_START, floor_plan_svg
+from cellplan.runs.drawings.floor_plan import floor_plan, swept_state
+from cellplan.runs.gate.stored_cell import load_stored_cell
+from cellplan.runs.overrides import with_overrides
+
+DRAWING: Final = "floor plan"  # in messages
+KNOWN_STARTS: Final = (MARK.encode(), SVG_START.encode())  # of files that may be replaced
+
+
+class PlanFormat(StrEnum):
+    """Formats of a floor plan."""
+
+    SVG = "svg"
+    DXF = "dxf"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FloorPlanRequest:
+    """What is to be drawn.
+
+    Attributes:
+        path: A run folder or a cell file.
+        output: The drawing; None for the usual place.
+        form: Its format.
+        cell: The cell file of a run that depends on further files; None where the folder is enough.
+        settings: Values of a cell file, as ``KEY=VALUE``.
+        allow_dirs: Folders, beside the cell's own, that the files it names may lie in.
+    """
+
+    path: Path
+    output: Path | None = None
+    form: PlanFormat = PlanFormat.SVG
+    cell: Path | None = None
+    settings: Sequence[str] = field(default=())
+    allow_dirs: Sequence[Path] = field(default=())
+
+
+def requested_floor_plan(request: FloorPlanRequest, *, progress: Progress = silent) -> FloorPlan:
+    """The floor plan of a run with what its motion sweeps, or of a cell file at its start.
+
+    A place that the drawing may not take is refused first, and a format whose package is missing.
+
+    Args:
+        request: Which run or cell.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The path is neither a run nor a cell, or does not fit the options.
+    """
+    if request.form is PlanFormat.DXF:
+        require_dxf()
+    if request.path.is_dir():
+        if request.settings:
+            raise InputError(f"--set: expected a cell file with it, got the folder '{request.path}'")
+        return _of_run(request)
+    if request.cell is not None:
+        raise InputError(f"--cell: expected a run with it, got '{request.path}'")
+    cell = with_overrides(load_cell(request.path, allow_dirs=request.allow_dirs), request.settings)
+    _refuse_place(request, cell.name)
+    return _of_cell(cell, progress)
+
+
+def target_of(request: FloorPlanRequest, cell: str) -> Path:
+    """Where the drawing of a cell of some name is written."""
+    return request.output or Path("outputs") / f"{cell}-floor-plan.{request.form}"
+
+
+def _refuse_place(request: FloorPlanRequest, cell: str) -> None:
+    """Refuse a place that the drawing may not take."""
+    refuse_foreign(target_of(request, cell), is_of_kind=_is_floor_plan, kind=DRAWING)
+
+
+def write_floor_plan(plan: FloorPlan, target: Path, form: PlanFormat | str = PlanFormat.SVG) -> int:
+    """Write a floor plan whole or not at all; gives the size of the file in bytes.
+
+    Args:
+        plan: What ``requested_floor_plan`` returned.
+        target: The file; an older floor plan there is replaced.
+        form: ``svg`` or ``dxf``.
+
+    Raises:
+        ValueError: There is no such format.
+        InputError: The place holds something else or cannot be written, or ``ezdxf`` is missing.
+    """
+    kind = PlanFormat(form)
+    content = (floor_plan_svg(plan) if kind is PlanFormat.SVG else floor_plan_dxf(plan)).encode()
+    replace_older(target, content, is_of_kind=_is_floor_plan, kind=DRAWING)
+    return len(content)
+
+
+def _is_floor_plan(path: Path) -> bool:
+    """Whether a file is a floor plan that cellplan wrote."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        start = file.read(max(map(len, KNOWN_STARTS)))
+    return start.startswith(KNOWN_STARTS)
+
+
+def _of_run(request: FloorPlanRequest) -> FloorPlan:
+    """The floor plan of a run on disk."""
+    stored = read_stored_run(request.path)
+    _refuse_place(request, stored.manifest.cell)
+    cell = load_stored_cell(stored, cell=request.cell, allow_dirs=request.allow_dirs).cell
+    read = [stored_series(stored, place, cell) for place in stored.records]
+    motions = [_by_robot(cell, q) for _, q in read]
+    start = {name: q[0] for name, q in motions[0].items()}
+    whole = sum(float(times[-1]) for times, _ in read)
+    return floor_plan(cell, start, motions, _task_points(cell), state=swept_state(whole))
+
+
+def _of_cell(cell: Cell, progress: Progress) -> FloorPlan:
+    """The floor plan of a cell that was not solved."""
+    try:
+        started, state = check(cell, progress=progress).cell, "Robots at the start"
+    except (InputError, NoSolutionError):
+        started, state = cell, "Robots where the cell puts them, as no start was found"
+    start = {robot.name: standing(robot) for robot in started.robots}
+    return floor_plan(started, start, [], _task_points(started), state=state)
+
+
+def _by_robot(cell: Cell, q: Array) -> Mapping[str, Array]:
+    """Stacked joint positions of shape (N, nq) by robot."""
+    return {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
+
+
+def _task_points(cell: Cell) -> dict[str, Array]:
+    """Points along the paths of all tasks; a path that cannot be built has none."""
+    of_tasks = {}
+    for task in cell.tasks:
+        try:
+            points = path_points(cell, task)
+        except InputError:
+            continue
+        if np.all(np.isfinite(points)):
+            of_tasks[task.name] = points
+    return of_tasks

@@ -1,0 +1,240 @@
+"""Layout search: trials in rounds, the best of them finished and certified, and all of it in one folder."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from cellplan.jobs.layout.finish.finish import CandidateResult, Finish, certified_cell
+from cellplan.jobs.layout.given_layout import Given, given_layout
+from cellplan.jobs.layout.record import LayoutRecord, layout_record
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.result import head_of, layout_files, verdict_line
+from cellplan.jobs.layout.result_file import file_records, result_files
+from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared
+from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, Proposals, is_candidate, proposals_of
+from cellplan.jobs.layout.trials.searched import read_attempts, searched_cell
+from cellplan.jobs.layout.trials.trial import evaluate
+from cellplan.jobs.layout.workers import layout_workers
+from cellplan.model.cell.cell import Cell
+from cellplan.model.presented import Presented
+from cellplan.model.progress import Progress, silent
+from cellplan.runs.write_run import versions
+from cellplan.search.programs.objective import Objective
+from cellplan.study.folder import write_results
+from cellplan.study.study import Finished, Stop, Study
+from cellplan.study.trial import StudyTrial
+from cellplan.study.workers import Limits, Workers
+
+BUDGET: Final = 60.0  # [s] of a search that does not say where to end
+CANDIDATES: Final = 4  # [-] layouts that are finished until one passes
+TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LayoutResult(Presented):
+    """What a layout search has come to.
+
+    Attributes:
+        record: The record of ``study.json``.
+        best: The best certified layout; None without one.
+    """
+
+    record: LayoutRecord
+    best: CandidateResult | None
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return (
+            f"<Layout search of '{self.record['cell']}', trials: {self.record['trials']}; {verdict_line(self.record)}>"
+        )
+
+
+@dataclass(slots=True, kw_only=True)
+class _Search:
+    """One search."""
+
+    request: LayoutRequest
+    folder: Path
+    ready: PreparedSearch
+    workers: int | Executor
+    stop: Stop
+    progress: Progress
+    finish: Finish
+    proposals: Proposals
+    given: Callable[[], Given] | None = None
+    tried: dict[int, CandidateResult] = field(default_factory=dict)
+
+    def run(self, *, resume: bool) -> tuple[Finished, CandidateResult | None]:
+        """Rounds and finish; a search for any conforming layout goes on where the first one is rejected."""
+        while True:
+            finished = self._study().run(
+                partial(evaluate, self.request.anywhere),
+                workers=self.workers,
+                stop=self.stop,
+                limits=Limits(seconds=TRIAL_LIMIT),
+                resume=resume or bool(self.tried),
+                progress=self.progress,
+            )
+            if isinstance(self.workers, Workers) and self.request.objective is Objective.CONFORMING:
+                self.workers.stop()  # trials after the one that is enough do not count
+            if self.given is None and isinstance(self.workers, Workers):
+                self.given = self.workers.begin(given_layout, self.request.anywhere)
+            best = self._best(finished)
+            if best is not None or self.request.objective is not Objective.CONFORMING or not self._goes_on(finished):
+                return finished, best
+
+    def _study(self) -> Study:
+        """The study, without the candidates that were rejected."""
+        rejected = frozenset(self.tried)
+        is_enough = partial(_is_enough, rejected) if self.request.objective is Objective.CONFORMING else None
+        study = _study(self.request, self.ready.cell, self.folder)
+        return replace(study, propose=self.proposals, enough=is_enough)
+
+    def _best(self, finished: Finished) -> CandidateResult | None:
+        """The first candidate that passes, best first."""
+        for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
+            if trial.number not in self.tried:
+                self.progress(f"certifying trial {trial.number}", 1.0)
+                self.tried[trial.number] = self.finish.certified(trial)
+            if self.tried[trial.number].passed:
+                return self.tried[trial.number]
+        return None
+
+    def candidates(self, finished: Finished) -> list[StudyTrial]:
+        """Trials that conform by the search, best first."""
+        best = BESTS[self.request.objective]
+        sign = -1.0 if best.is_largest else 1.0
+        listed = [trial for trial in finished.trials if is_candidate(trial)]
+        return sorted(listed, key=lambda trial: (sign * _value(trial, best.figure, sign), trial.number))
+
+    def _goes_on(self, finished: Finished) -> bool:
+        """Whether there is anything more to try."""
+        return bool(self.candidates(finished)) and finished.stopped_by == "enough"
+
+
+def search_layout(
+    request: LayoutRequest,
+    folder: Path,
+    *,
+    stop: Stop | None = None,
+    workers: int | Executor = 1,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> LayoutResult:
+    """Search for the best layout of a cell and write it, with what it was chosen from, into a folder.
+
+    The folder holds ``study.jsonl``, a line for each trial that grows while the search runs, and at the end
+    ``best.yaml``, the given cell file with the values of the best layout, ``study.json`` and ``study.html``. Only a
+    layout that passed every check of ``solve`` is written as the best one. For an equal number of trials the files are
+    the same, for any number of workers.
+
+    Args:
+        request: What is searched for.
+        folder: Folder of the study; an earlier one is replaced, or continued with ``resume``.
+        stop: Where it ends: a number of trials, or a budget of seconds; None for 60 s.
+        workers: Number of processes that search; or an executor, which stays open, such as ``layout_workers``.
+        resume: Whether trials that the folder holds already are not repeated.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be read or searched, or the folder cannot be used.
+        KeyboardInterrupt: It was interrupted; says how many trials are recorded.
+    """
+    with ExitStack() as opened:
+        pool = workers
+        if isinstance(workers, int):
+            refuse_search(request, folder, resume=resume)
+            pool = opened.enter_context(layout_workers(workers, request))
+        ready = prepared(request)
+        search = _Search(
+            request=request,
+            folder=folder,
+            ready=ready,
+            workers=pool,
+            stop=stop or Stop(seconds=BUDGET),
+            progress=progress,
+            finish=finish_of(ready, progress, workers=pool),
+            proposals=proposals_of(request, ready),
+        )
+        finished, best = search.run(resume=resume)
+        progress("writing the result", 1.0)
+        return _written(search, finished, best)
+
+
+def refuse_search(request: LayoutRequest, folder: Path, *, resume: bool = False) -> Cell:
+    """Refuse a search of which its files say already that it cannot be; call it before any process begins.
+
+    Args:
+        request: What is searched for.
+        folder: Folder of the study.
+        resume: Whether an earlier study is continued.
+
+    Returns:
+        The cell that is searched.
+
+    Raises:
+        InputError: A cell cannot be read or searched, or the folder cannot be used.
+    """
+    cell = searched_cell(request)
+    read_attempts(request, cell)
+    _study(request, cell, folder).refuse(resume=resume)
+    return cell
+
+
+def _study(request: LayoutRequest, cell: Cell, folder: Path) -> Study:
+    """The study of a search, which proposes nothing yet."""
+    header = {
+        "kind": "layout",
+        "cell": cell.name,
+        **request.record,
+        "inputs": dict(cell.inputs),
+        "versions": versions(),
+    }
+    best = BESTS[request.objective]
+    return Study(folder=folder, header=header, size=SIZE, propose=lambda _finished: (), best=best)
+
+
+def finish_of(ready: PreparedSearch, progress: Progress, *, workers: int | Executor) -> Finish:
+    """The finish of the layouts of a cell, with displaced bases where they are asked for.
+
+    Args:
+        ready: The cell.
+        progress: Called with the stage and the fraction done.
+        workers: Processes that help; see ``Finish``.
+    """
+    misplacement = ready.variables.settings.misplacement
+    if misplacement is None:
+        return Finish(ready=ready, progress=progress, workers=workers)
+    from cellplan.jobs.layout.finish.misplacement import MisplacedFinish
+
+    return MisplacedFinish(ready=ready, progress=progress, workers=workers, misplacement=misplacement)
+
+
+def _written(search: _Search, finished: Finished, best: CandidateResult | None) -> LayoutResult:
+    """The record and all files."""
+    given = given_layout(search.request) if search.given is None else search.given()
+    record = layout_record(search.ready, finished, given, tried=search.tried, best=best, solves=search.finish.solves)
+    if best is not None:
+        record["misplacement"] = search.finish.records.get(best.trial)
+    files: dict[str, bytes] = {}
+    if best is not None:
+        head = head_of(record, search.request)
+        files = result_files(certified_cell(best), search.request.cell, search.folder, head=head)
+        record["files"] = file_records(files)  # type: ignore[typeddict-item]
+    write_results(search.folder, {**layout_files(record), **files})
+    return LayoutResult(record=record, best=best)
+
+
+def _is_enough(rejected: frozenset[int], trial: StudyTrial) -> bool:
+    """Whether a trial ends the search for any conforming layout."""
+    return trial.passed and trial.number not in rejected
+
+
+def _value(trial: StudyTrial, figure: str, sign: float) -> float:
+    """The figure of a trial that is compared; without one it comes last."""
+    value = trial.figures.get(figure)
+    return float(value) if isinstance(value, int | float) else sign * float("inf")

@@ -1,0 +1,134 @@
+"""Joint paths of a positioner that may change: the same job without one, and what means nothing beside one."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.layout.trials.searched import short_key, written_vary
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_spline import JointSpline
+from cellplan.model.cell.layout import PathRange, VariableKind
+from cellplan.model.motion.motion import Schedule
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.spline_path.first import SAMPLES, first_path, with_count
+from cellplan.search.spline_path.nodes import PathNodes
+from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.spline_path.variables import PathVariables
+from cellplan.search.variables.variables import Variables
+from cellplan.search.variables.written import written_start
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathSearch:
+    """Joint paths of one search.
+
+    Attributes:
+        unled: What varies where the motion is that by the pseudo-inverse, the start posture of the positioner with it.
+    """
+
+    layout_variables: Variables  # what varies beside the path
+    unled: Variables
+    schedule: Schedule  # the tasks on the common clock
+    start: Array  # start posture of the given layout in [rad] or [m], shape (nq,)
+
+    @property
+    def settings(self) -> PathRange:
+        """The path that may change."""
+        return self.layout_variables.settings.paths[0]
+
+    @property
+    def is_given(self) -> bool:
+        """Whether the cell itself gives a path."""
+        return self.layout_variables.base.robot(self.settings.robot).path is not None
+
+    @cached_property
+    def given(self) -> JointSpline:
+        """The path of the cell, else that of its motion by the pseudo-inverse, else the positioner at its start."""
+        given = self.layout_variables.base.robot(self.settings.robot).path
+        if given is not None:
+            return self.resampled(given)
+        fitted = self.fitted(self.unled.given, self.start)
+        if fitted is not None:
+            return fitted[0]
+        still = self.start[self.layout_variables.base.columns(self.settings.robot)]
+        return JointSpline(coefficients=np.tile(still, (self.settings.coefficients, 1)), degree=self.settings.degree)
+
+    def resampled(self, path: JointSpline) -> JointSpline:
+        """A path with as many coefficients as are asked for."""
+        return with_count(path, self.settings.coefficients, self.settings.degree)
+
+    def fitted(self, x: Array, start: Array) -> tuple[JointSpline, Array] | None:
+        """The path nearest to a motion by the pseudo-inverse, and the start posture; None where a tool is lost.
+
+        Args:
+            x: Variables of the layout without the path, shape (n,).
+            start: Start posture near the right one in [rad] or [m], shape (nq,).
+        """
+        base, layouts, settings = self.unled.base, self.unled.layouts(x[None], start[None]), self.settings
+        return first_path(base, self.schedule, layouts, count=settings.coefficients, degree=settings.degree)
+
+    def variables(self, path: JointSpline, others: Array) -> Array:
+        """Variables of the path problem: coefficients, then what varies besides, shape (n,)."""
+        return np.concatenate([path.coefficients.ravel(), others])
+
+    def layout_values(self, x: Array) -> Array:
+        """What varies beside the path, as in a layout without one."""
+        place = {name: column for column, name in enumerate(self.unled.names)}
+        return np.array([x[place[name]] for name in self.layout_variables.names])
+
+    def departures(self, x: Array) -> Array:
+        """How far each joint leaves the given path at most in [rad] or [m], shape (n,), at variables of the problem."""
+        coefficients = x[: self.given.coefficients.size].reshape(self.given.coefficients.shape)
+        shares = np.linspace(0.0, 1.0, SAMPLES)
+        departure = replace(self.given, coefficients=coefficients).at(shares) - self.given.at(shares)
+        return np.asarray(np.abs(departure).max(axis=0))
+
+    def problem(self, nodes: int, *, bodies: CellDistances, acceleration: Array) -> PathProblem:
+        """The path problem at about so many nodes.
+
+        Args:
+            nodes: The number.
+            acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], shape (nq,).
+        """
+        base, settings = self.layout_variables.base, self.settings
+        count, degree = settings.coefficients, settings.degree
+        return PathProblem(
+            nodes=PathNodes.of(base, self.schedule, count=count, degree=degree, nodes=nodes),
+            path=PathVariables.of(base, settings.robot, self.given),
+            layout=self.layout_variables,
+            bodies=bodies,
+            acceleration=acceleration,
+        )
+
+
+def without_path(cell: Cell) -> Cell | None:
+    """The cell without the joint path, whose motions by the pseudo-inverse give first paths; None where none varies.
+
+    The start posture of the positioner may vary there, as its path decides it.
+    """
+    if cell.layout is None or not cell.layout.paths:
+        return None
+    name = cell.layout.paths[0].robot
+    robot, values = cell.robot(name), dict[str, object]()
+    vary = {short_key(key): value for key, value in written_vary(cell).items()}
+    del vary[f"{name}.path"]
+    if not {f"{name}.start", f"{name}.start_deg"} & vary.keys():
+        is_turning = all(joint.is_revolute for joint in robot.model.joints)
+        vary[f"{name}.start_deg" if is_turning else f"{name}.start"] = True
+    if robot.path is not None:
+        values |= {f"robots.{name}.path": None, **written_start(cell, robot, robot.path.start)}
+    return cell.with_values({**values, "layout.vary": vary})
+
+
+def resolving(cell: Cell) -> frozenset[str]:
+    """Addresses of what decides how redundancy is resolved, and so nothing beside a given joint path."""
+    if cell.layout is None:
+        return frozenset()
+    names = {path.robot for path in cell.layout.paths}
+    return frozenset(
+        variable.address
+        for variable in cell.layout.ranges
+        if variable.kind is VariableKind.WEIGHT or (variable.kind is VariableKind.START and variable.name in names)
+    )

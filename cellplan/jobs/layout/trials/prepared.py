@@ -1,0 +1,265 @@
+"""A cell made ready for a layout search: its variables, its bodies, and its job at as many nodes as are asked for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.trials.joint_path import PathSearch, resolving, without_path
+from cellplan.jobs.layout.trials.searched import searched_cell
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.layout import VariableKind
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.planning.layout_screening import Candidates, screen_layouts
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.start.inverse_kinematics import finite_limits
+from cellplan.planning.timing.schedule import clock_paths, schedule_paths
+from cellplan.runs.plan.start import chosen_start
+from cellplan.scene.scene import Scene
+from cellplan.search.base_map.verdicts import acceleration_limits
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.job import MOST, Job, enough_nodes
+from cellplan.search.kernel.singular_values import usual_values
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.objective import CycleTiming, Demands, Objective
+from cellplan.search.programs.problem import Point
+from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.starts.generator import StartGenerator
+from cellplan.search.starts.problem import StartProblem
+from cellplan.search.synchronous import refuse_other_jobs
+from cellplan.search.variables.variables import Variables
+
+NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
+ALONG_SPLINE: Final = {
+    CycleTiming.LAWS: 4,
+    CycleTiming.RETIMED: 2,
+}  # [-] times as many of a motion along a spline, no parabolas
+SINGULAR_SHARE: Final = 0.1  # [-] of usual singular values: a wrist a few degrees from straight
+NEARLY: Final = 0.99  # [-] of demanded singular values: kept
+SINGULAR_EVERYWHERE: Final = 1e-6  # usual singular value in [m] and [rad] below which it says nothing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PreparedSearch:
+    """A cell whose layout is searched.
+
+    Attributes:
+        unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
+            with; None where no path varies.
+        found_start: The start posture of the given layout where it was found before all else, shape (nq,).
+    """
+
+    request: LayoutRequest  # what is searched for
+    cell: Cell  # the cell, with what the request sets in it
+    variables: Variables  # what may change
+    scene: Scene  # the bodies of the cell
+    bodies: CellDistances  # their distances, wherever the layout puts them
+    schedule: Schedule  # the tasks on the common clock
+    moving: tuple[str, ...]  # names of the robots that move
+    unled: "PreparedSearch | None" = None
+    solved_start: Array | None = None
+
+    @classmethod
+    def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
+        """Make a cell ready.
+
+        Args:
+            request: What is searched for.
+            cell: The cell, as ``searched_cell`` gives it.
+
+        Raises:
+            InputError: The paths, bodies or variables of the cell are not usable.
+        """
+        unled = without_path(cell)
+        variables = Variables.of(cell, without=() if unled is None else resolving(cell))
+        scene = Scene.from_cell(variables.base)
+        paths = clock_paths(variables.base, [build_toolpath(task, cell.part) for task in cell.tasks])
+        phase = plan_phases(variables.base).program[0]
+        prepared = cls(
+            request=request,
+            cell=cell,
+            variables=variables,
+            scene=scene,
+            bodies=CellDistances.of(scene, variables),
+            schedule=schedule_paths(variables.base, [paths[name] for name in phase.tasks]),
+            moving=tuple(phase.moving),
+            unled=None if unled is None else cls.of(request, unled),
+        )
+        needs_start = any(
+            variable.kind is VariableKind.START and variable.given is None for variable in variables.tied.ranges
+        )
+        return _with_solved_start(prepared) if needs_start else prepared
+
+    def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
+        """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
+        variables, acceleration = self.variables, acceleration_limits(self.scene)
+        if self.unled is None:
+            enough = enough_nodes(self.schedule, nodes)
+            job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=enough)
+            return LayoutProblem(job=job, variables=variables, bodies=self.bodies, acceleration=acceleration)
+        nodes *= ALONG_SPLINE[self.request.timing]
+        return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
+
+    @cached_property
+    def coarse(self) -> LayoutProblem | PathProblem:
+        """The problem of the trials, at as many nodes as the given layout needs where ``solve`` follows its paths."""
+        problem, nodes = self.problem(), NODES
+        if not isinstance(problem, LayoutProblem) or isinstance(self._given_start, NoSolutionError):
+            return problem
+        while problem.evaluate(problem.given, self._given_start) is None and nodes < MOST and self._is_followed:
+            nodes = 2 * nodes - 1
+            problem = problem.finer(self.schedule, nodes=nodes)
+        return problem
+
+    @cached_property
+    def _is_followed(self) -> bool:
+        """Whether the tools follow their paths in the given layout, by the method of ``solve``."""
+        given = Candidates.of([self.variables.base], self.given_start[None])
+        return bool(screen_layouts(self.variables.base, self.schedule, given, moving=self.moving).is_followed[0])
+
+    @cached_property
+    def path_search(self) -> PathSearch:
+        """Joint paths of this search.
+
+        Raises:
+            ValueError: No joint path may change.
+        """
+        if self.unled is None:
+            raise ValueError("expected a cell whose joint path may change")
+        try:
+            start = self.given_start
+        except NoSolutionError:
+            start = np.concatenate([0.5 * np.add(*finite_limits(robot.model)) for robot in self.variables.base.robots])
+        return PathSearch(
+            layout_variables=self.variables, unled=self.unled.variables, schedule=self.schedule, start=start
+        )
+
+    @property
+    def given_start(self) -> Array:
+        """The start posture of the given layout in [rad] or [m], shape (nq,); found where the cell gives none.
+
+        Raises:
+            NoSolutionError: There is none.
+        """
+        start = self._given_start
+        if isinstance(start, NoSolutionError):
+            raise start
+        return start
+
+    @cached_property
+    def _given_start(self) -> Array | NoSolutionError:
+        """See ``given_start``; or why there is none."""
+        if self.solved_start is not None:
+            return self.solved_start
+        try:
+            return self.start_of(self.variables.base)
+        except NoSolutionError as error:
+            return error
+
+    def start_of(self, cell: Cell, progress: Progress = silent) -> Array:
+        """The start posture of a cell with this job; see ``given_start``."""
+        if all(robot.start is not None for robot in cell.robots):
+            return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
+        scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)
+        paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
+        return chosen_start(scene, paths, progress=progress).start
+
+    @cached_property
+    def starts(self) -> StartGenerator:
+        """Starts of the search: the given layout with other branches, then sampled ones."""
+        problem = StartProblem.of(self.variables.base, self.variables, margin=self.variables.margin)
+        return StartGenerator(problem, seed=self.request.seed)
+
+    @property
+    def duration(self) -> float:
+        """Duration of the job in [s], as the cell has it."""
+        return float(self.schedule.times[-1])
+
+    def demands(self, **changes: Any) -> Demands:
+        """What is demanded of a layout."""
+        objective = self.request.objective
+        values: dict[str, Any] = {
+            "objective": objective,
+            "margin": self.variables.margin,
+            "duration": None if objective is Objective.CYCLE else self.duration,
+            "timing": self.request.timing,
+            "singular": _singular(self),
+        }
+        return Demands(**(values | changes))
+
+
+def demands_near(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
+    """What is demanded of a layout near one that was improved.
+
+    The usual share of the singular values is demanded only where the point keeps it, one that the cell states always.
+    """
+    demands, layout = ready.demands(**changes), ready.cell.layout
+    if demands.singular is None or (layout is not None and layout.singular is not None):
+        return demands
+    is_met = bool(np.all(ready.coarse.arms(point).values >= NEARLY * demands.singular))
+    return demands if is_met else replace(demands, singular=None)
+
+
+def _singular(ready: PreparedSearch) -> Array | None:
+    """Least singular values that the arms are to keep, shape (A,); None where none are demanded."""
+    share = SINGULAR_SHARE if ready.request.objective is Objective.CYCLE else 0.0
+    if (layout := ready.cell.layout) is not None and layout.singular is not None:
+        share = layout.singular
+    if not share > 0.0:
+        return None
+    problem = ready.coarse
+    usual = _usual(problem.nodes.job if isinstance(problem, PathProblem) else problem.job)
+    return np.where(usual > SINGULAR_EVERYWHERE, share * usual, 0.0)
+
+
+@lru_cache(maxsize=8)
+def _usual(job: Job) -> Array:
+    """What is usual of the singular values of the arms."""
+    return usual_values(job)
+
+
+def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object]:
+    """What to write into the given cell file for a point of its problem: values by address, rounded.
+
+    Args:
+        ready: The cell.
+        x: The variables, shape (n,).
+        start: Start posture in [rad] or [m], shape (nq,).
+    """
+    problem = ready.coarse
+    return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
+
+
+def _with_solved_start(ready: PreparedSearch) -> PreparedSearch:
+    """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
+    try:
+        start = ready.given_start
+    except NoSolutionError:
+        return ready
+    base, variables = ready.variables.base, ready.variables
+    robots = [replace(robot, start=start[base.columns(robot.name)]) for robot in base.robots]
+    given = variables.read_from(replace(base, robots=tuple(robots)))
+    return replace(ready, variables=replace(variables, given=given), solved_start=start)
+
+
+def prepared(request: LayoutRequest, choice: Mapping[str, object] | None = None) -> PreparedSearch:
+    """The cell of a request, with the discrete choices of one trial; made once in each process."""
+    return _prepared(request, tuple(sorted((choice or {}).items())))
+
+
+@lru_cache(maxsize=8)
+def _prepared(request: LayoutRequest, choice: tuple[tuple[str, object], ...]) -> PreparedSearch:
+    """See ``prepared``."""
+    cell = searched_cell(request)
+    if choice:
+        cell = cell.with_values(dict(choice))
+        refuse_other_jobs(cell, "a layout search")
+    return PreparedSearch.of(request, cell)

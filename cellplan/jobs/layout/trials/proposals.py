@@ -1,0 +1,202 @@
+"""Where trials of a layout search begin: the given layout, those of the user, samples, and the best found so far."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cellplan.errors import NoSolutionError
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.trials.prepared import PreparedSearch
+from cellplan.search.programs.objective import Objective
+from cellplan.search.variables.choices import Choices
+from cellplan.study.status import Best
+from cellplan.study.trial import StudyTrial
+
+SIZE: Final = 4  # [-] trials of a round
+WIDE: Final = (1.0, 1.0, 1.5)  # [-] usual steps of perturbations of the given layout, in turn
+NARROW: Final = (0.7, 1.0, 0.4)  # [-] and of the best ones
+SLIGHT: Final = 0.2  # [-] and of the given one where the first layout that conforms ends the search
+GIVEN_UP: Final = 1.25  # [-] cycle as a multiple of the best one above which a trial is given up on its way
+ADDED: Final = (0.010, 0.025, 0.005, 0.050)  # [m] clearance beyond the demand of trials for the front, in turn
+SAME: Final = 5e-3  # [-] share by which the objectives of two layouts differ that are not one
+BESTS: Final[Mapping[Objective, Best]] = {
+    Objective.CONFORMING: Best("violation"),
+    Objective.CYCLE: Best("cycle_s"),
+    Objective.CLEARANCE: Best("apart_mm", is_largest=True),
+    Objective.CHANGE: Best("change"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposals:
+    """What each round tries; the same for the same finished rounds.
+
+    Attributes:
+        choices: Combinations of discrete choices, values by address, the present one first; tried in turn.
+        branches: Other start postures of the given layout, each with its variables: the keys ``x`` and ``start``.
+    """
+
+    request: LayoutRequest  # what is searched for
+    choices: Sequence[Mapping[str, object]] = ({},)
+    branches: Sequence[Mapping[str, Any]] = ()
+    rejected: frozenset[int] = frozenset()  # trials that are no candidates any more
+
+    def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:
+        """Values of the trials of the next round."""
+        first = self._first()[len(finished) : len(finished) + SIZE]
+        if first:
+            return first
+        number, following = len(finished) // SIZE, [*self._leading(finished)]
+        known = [trial for trial in finished if "x" in trial.outcome.figures]
+        nearest = min(known, key=lambda trial: trial.outcome.figures["violation"], default=None)  # type: ignore[arg-type,return-value]
+        best = following[0] if following else nearest
+        second = following[number % min(3, len(following))] if following else best
+        size, wide = NARROW[number % len(NARROW)], WIDE[number % len(WIDE)]
+        proposed = [
+            self._perturbed(best, size, number),
+            self._perturbed(None, wide, number),
+            self._perturbed(second, NARROW[(number + 1) % len(NARROW)], number),
+            self._fourth(best, number, is_conforming=bool(following)),
+        ]
+        lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
+        for place, trial in enumerate(proposed):
+            is_far = trial["kind"] == "sampled" or (trial["kind"] == "perturbed" and trial["of"] is None)
+            if is_far and trial["choice"] in lost:
+                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": trial["choice"]}
+        if not following or self.request.objective is not Objective.CYCLE:
+            return proposed
+        limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
+        return [values if "clearance_m" in values else values | {"give_up_above_s": limit} for values in proposed]
+
+    def _first(self) -> list[dict[str, Any]]:
+        """The given layout and those of the user with all choices, then perturbations of the given one and samples."""
+        listed: list[dict[str, Any]] = [
+            {"kind": "given"},
+            *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
+        ]
+        if self.request.seed and self.request.objective is Objective.CONFORMING:
+            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
+        options: list[dict[str, Any]] = [{**options, "choice": choice} for choice in self.choices for options in listed]
+        options += [{"kind": "branch", **branch, "choice": self.choices[0]} for branch in self.branches]
+        options += [self._sampled(0, number) for number in range(1, len(self.choices))]
+        rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
+        return [*options, *rest[: -len(options) % SIZE]]
+
+    def _leading(self, finished: Sequence[StudyTrial]) -> Iterator[StudyTrial]:
+        """Trials that conform, best first, of equal ones the first."""
+        best = BESTS[self.request.objective]
+        sign = -1.0 if best.is_largest else 1.0
+        ranked = [
+            (sign * value, trial)
+            for trial in finished
+            if (value := best.value(trial)) is not None and trial.variant.number not in self.rejected
+        ]
+        last: float | None = None
+        for value, trial in sorted(ranked, key=lambda entry: (entry[0], entry[1].variant.number)):
+            if last is None or abs(value - last) > SAME * abs(last):
+                last = value
+                yield trial
+
+    def _perturbed(self, trial: StudyTrial | None, spread: float, number: int) -> dict[str, Any]:
+        """A trial near the end of another one; None for the given layout."""
+        if trial is None:
+            choices = self.choices
+            return {"kind": "perturbed", "of": None, "spread": spread, "choice": choices[number % len(choices)]}
+        figures, values = trial.outcome.figures, trial.variant.values
+        return {
+            "kind": "perturbed",
+            "of": trial.variant.number,
+            "spread": spread,
+            "x": figures["x"],
+            "start": figures["start"],
+            "choice": values.get("choice", {}),
+            **({"unled": figures["unled"]} if "unled" in figures else {}),
+        }
+
+    def _sampled(self, index: int, number: int) -> dict[str, Any]:
+        """A trial anywhere within the bounds."""
+        return {"kind": "sampled", "index": index, "choice": self.choices[number % len(self.choices)]}
+
+    def _fourth(self, best: StudyTrial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
+        """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
+
+        While nothing conforms, a sample in every round.
+        """
+        turn = number % 4
+        if turn == 0 or not is_conforming:
+            return self._sampled(number, number)
+        if turn != 2 or best is None or self.request.objective is not Objective.CYCLE:
+            return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
+        more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
+        return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
+
+
+def proposals_of(request: LayoutRequest, ready: PreparedSearch) -> "Proposals":
+    """What the rounds of a search of a cell try."""
+    choices = tuple(Choices.of(ready.cell).values())
+    return Proposals(request=request, choices=choices, branches=_branches(ready.unled or ready))
+
+
+def _branches(ready: PreparedSearch) -> list[dict[str, list[float]]]:
+    """Other start postures of the given layout from which all tools follow their paths, with their variables.
+
+    Those of the robots whose branch may change; none where the given layout has no start.
+    """
+    robots = frozenset(Choices.of(ready.variables.base).branches)
+    if not robots:
+        return []
+    try:
+        x, start = ready.starts.branches(robots, ready.given_start)
+    except NoSolutionError:
+        return []
+    return [{"x": values.tolist(), "start": q.tolist()} for values, q in zip(x, start, strict=True)]
+
+
+def _leads_nowhere(trial: StudyTrial) -> bool:
+    """Whether a trial is the given layout and no motion begins there."""
+    figures = trial.outcome.figures
+    return trial.variant.values["kind"] == "given" and ("x" not in figures or "sampled" in figures)
+
+
+def choice_of(trial: StudyTrial) -> Mapping[str, object]:
+    """The discrete choices of a trial; empty for those of the cell."""
+    choice: Any = trial.variant.values.get("choice")
+    return choice or {}
+
+
+def is_candidate(trial: StudyTrial) -> bool:
+    """Whether a trial conforms to what is demanded; one that asks for more clearance only leads to others."""
+    return trial.passed and not trial.variant.values.get("clearance_m")
+
+
+def origin_text(values: Mapping[str, Any], *, is_sampled: bool = False) -> str:
+    """Where a trial began, in words.
+
+    Args:
+        values: The values of the trial.
+        is_sampled: Whether no motion begins at the given layout and a sample took its place.
+    """
+    match values["kind"]:
+        case _ if is_sampled:
+            text = "a sample in place of the given layout"
+        case "given":
+            text = "the given layout"
+        case "attempt":
+            text = f"layout {values['index'] + 1} of --try"
+        case "branch":
+            text = "the given layout, another branch"
+        case "sampled":
+            text = f"sample {values['index']}"
+        case "improved":
+            text = f"trial {values['of']}, {1000.0 * values['clearance_m']:g} mm more clearance"
+        case _:
+            of = "the given layout" if values["of"] is None else f"trial {values['of']}"
+            text = f"{of}, perturbed"
+    chosen = choice_text(values.get("choice") or {})
+    return f"{text} ({chosen})" if chosen else text
+
+
+def choice_text(choice: Mapping[str, object]) -> str:
+    """A combination of discrete choices in words; starts that are to be found anew go without saying."""
+    return ", ".join(f"{address} = {value}" for address, value in choice.items() if value != "auto")

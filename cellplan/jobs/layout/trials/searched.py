@@ -1,0 +1,226 @@
+"""The cell that a layout search is asked for, with all that its request sets in it."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+from cellplan.errors import InputError
+from cellplan.files.cell.changes import read_setting
+from cellplan.files.cell.load import load_cell
+from cellplan.files.input.findings import did_you_mean, listed, shown
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.model.cell.cell import Cell
+from cellplan.model.units import DEG, MM
+from cellplan.runs.overrides import with_overrides
+from cellplan.search.programs.objective import CycleTiming, Objective
+from cellplan.search.synchronous import refuse_other_jobs
+
+COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg", "length_mm", "tilt_deg")
+PREFIX: Final = "robots."
+FREE: Final = ("start", "weights", "path", "spin")
+
+
+def searched_cell(request: LayoutRequest) -> Cell:
+    """The cell with all that the request sets in it.
+
+    Raises:
+        InputError: The cell cannot be read, an address does not exist, or its job is not one that can be searched.
+    """
+    if request.duration is not None and request.objective is Objective.CYCLE:
+        raise InputError(
+            "--duration: expected no duration where the shortest cycle is sought; add --objective conforming, "
+            "clearance or change"
+        )
+    cell = load_cell(request.cell, allow_dirs=request.allow_dirs)
+    cell = with_overrides(cell, request.settings, duration=request.duration, clearance_mm=request.clearance)
+    values: dict[str, object] = {}
+    if request.margin is not None:
+        values["layout.margin_deg"] = request.margin
+    if request.misplacement is not None:
+        position, orientation = request.misplacement
+        values["layout.misplacement"] = {"position_mm": position, "orientation_deg": orientation}
+    if request.free:
+        margins = {key: value for key, value in _written_layout(cell).items() if key.startswith("margin_")}
+        values = {"layout": {**margins, "vary": freed(cell, request.free)}, **values}
+    elif request.vary or request.fixed:
+        values["layout.vary"] = _varied(cell, request)
+    changed = cell.with_values(values) if values else cell
+    paths = () if changed.layout is None else [path.robot for path in changed.layout.paths]
+    refuse_other_jobs(changed, "a layout search", paths=paths)
+    if paths:
+        _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
+    _refuse_margins(changed)
+    _refuse_misplacement(request, changed)
+    return changed
+
+
+def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse misplaced bases where the motions of all corners are not those of one time law.
+
+    Raises:
+        InputError: The motion is retimed, or the positioner's joint path is given.
+    """
+    if cell.layout is None or cell.layout.misplacement is None:
+        return
+    key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
+    if request.timing is CycleTiming.RETIMED:
+        raise InputError(f"{key}: expected a motion by the time laws, got --timing retimed: leave one of them out")
+    if cell.layout.paths or any(robot.path is not None for robot in cell.robots):
+        raise InputError(f"{key}: expected no joint path of a positioner (robots.ROBOT.path): leave one of them out")
+
+
+def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
+    """Refuse tasks that leave their robot a choice where a joint path of the positioner is searched.
+
+    Raises:
+        InputError: A task leaves a component open, or its robot has a joint too many or too few for six.
+    """
+    for task in cell.tasks:
+        robot = cell.robot(task.robot)
+        why = f"for {purpose}: the joints of '{robot.name}' would not follow from the path of the positioner"
+        if task.is_spin_free:
+            raise InputError(f"{task.where('free')}: expected no free spin {why}, got [spin]; leave free or path out")
+        if len(task.axes) < 6:
+            raise InputError(
+                f"{task.where('axes')}: expected all six components {why}, got {len(task.axes)}; leave axes or path out"
+            )
+        if len(robot.model.joints) != 6:
+            raise InputError(
+                f"{cell.origin.at(f'robots.{robot.name}')}: expected six joints {why}, got "
+                f"{len(robot.model.joints)}; leave path out"
+            )
+
+
+def _refuse_margins(cell: Cell) -> None:
+    """Refuse demanded margins that leave a joint no room.
+
+    Raises:
+        InputError: A joint cannot keep so far from both of its limits.
+    """
+    if cell.layout is None:
+        return
+    for robot in cell.robots:
+        for joint in robot.model.joints:
+            margin = cell.layout.margin if joint.is_revolute else cell.layout.margin_sliding
+            half = 0.5 * (joint.upper - joint.lower)
+            if margin >= half > 0.0:
+                key, scale = ("margin_deg", DEG) if joint.is_revolute else ("margin_mm", MM)
+                raise InputError(
+                    f"{cell.origin.at(f'layout.{key}')}: expected less than {scale * half:.6g}, half of the range of "
+                    f"{joint.name} of '{robot.name}', got {scale * margin:.6g}"
+                )
+
+
+def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
+    """The cells whose layouts are tried too.
+
+    Raises:
+        InputError: One cannot be read or has other robots.
+    """
+    names = [robot.name for robot in cell.robots]
+    layouts = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
+    for path, other in zip(request.attempts, layouts, strict=True):
+        robot_names = [robot.name for robot in other.robots]
+        if robot_names != names or other.joint_count != cell.joint_count:
+            raise InputError(
+                f"--try {path}: expected the robots of the cell ({listed(names)}), got {listed(robot_names)}"
+            )
+    return layouts
+
+
+def _varied(cell: Cell, request: LayoutRequest) -> dict[str, Any]:
+    """What may change: as the cell says, or as it is by default, with the options of the request."""
+    written = written_vary(cell) or (_by_default(cell) if request.fixed and not request.vary else {})
+    vary = {short_key(key): _plain(value) for key, value in written.items()}
+    for text in request.vary:
+        key, sign, ranges = text.partition("=")
+        vary[short_key(key.strip())] = read_setting(f"{key.strip()}={ranges}", option="--vary")[1] if sign else True
+    for key in map(short_key, request.fixed):
+        entry, _, component = key.rpartition(".")
+        if key in vary:
+            del vary[key]
+        elif component in COMPONENTS and isinstance(vary.get(entry), dict) and component in vary[entry]:
+            del vary[entry][component]
+            if not vary[entry]:
+                del vary[entry]
+        else:
+            known = sorted(_keys(vary))
+            raise InputError(
+                f"--fix: expected a key that may change ({listed(known)}), got {shown(key)}{did_you_mean(key, known)}"
+            )
+    if not vary:
+        raise InputError("--fix: expected at least one key that may still change, got none")
+    return vary
+
+
+def written_vary(cell: Cell) -> Mapping[str, Any]:
+    """What the cell file says may change; empty where it says nothing."""
+    return dict(_written_layout(cell).get("vary") or {})
+
+
+def _written_layout(cell: Cell) -> Mapping[str, Any]:
+    """The section ``layout`` of the cell file; empty where there is none."""
+    written = cell.origin.source.written if cell.origin.source is not None else {}
+    return written.get("layout") or {}
+
+
+def _by_default(cell: Cell) -> Mapping[str, Any]:
+    """What may change of a cell that says nothing of it, as the file would say it."""
+    vary: dict[str, Any] = {}
+    for variable in () if cell.layout is None else cell.layout.ranges:
+        entry, _, component = variable.address.rpartition(".")
+        if component in COMPONENTS:
+            scale = DEG if variable.is_angle else MM
+            vary.setdefault(entry, {})[component] = [round(scale * variable.lower, 9), round(scale * variable.upper, 9)]
+        else:
+            vary[variable.address.partition("[")[0]] = True
+    return vary
+
+
+def _keys(vary: Mapping[str, Any]) -> Iterable[str]:
+    """Keys that can be fixed: entries, and the components of those with ranges."""
+    for key, value in vary.items():
+        yield key
+        if isinstance(value, dict):
+            yield from (f"{key}.{component}" for component in value)
+
+
+def short_key(key: str) -> str:
+    """A key without ``robots.``, which may be left out."""
+    return key.removeprefix(PREFIX)
+
+
+def _plain(value: Any) -> Any:
+    """A value that can be changed."""
+    return dict(value) if isinstance(value, Mapping) else value
+
+
+def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
+    """Keys of ``layout.vary``, without ``robots.``, for what is named.
+
+    Args:
+        words: ``start``: the start posture of the positioner; ``weights``: of all joints; ``path``: the joint path
+            of the positioner; ``spin``: how the tools are turned about their own axes.
+
+    Raises:
+        InputError: A word is none of these, or the cell has no positioner where one is needed.
+    """
+    vary = dict[str, object]()
+    for word in words:
+        match word:
+            case "start" | "path" if cell.carrier is None:
+                where = cell.origin.at("part.held_by")
+                raise InputError(f"{where}: expected a robot that holds the part, for --free {word}")
+            case "start":
+                robot = cell.robot(cell.positioners[0])
+                is_turning = all(joint.is_revolute for joint in robot.model.joints)
+                vary[f"{robot.name}.start_deg" if is_turning else f"{robot.name}.start"] = True
+            case "weights":
+                vary |= {f"{robot.name}.weights": True for robot in cell.robots}
+            case "path":
+                vary[f"{cell.positioners[0]}.path"] = True
+            case "spin":
+                vary |= {f"tasks.{task.name}.spin_deg": True for task in cell.tasks}
+            case _:
+                hint = did_you_mean(word, FREE)
+                raise InputError(f"--free: expected some of {listed(FREE)}, got {shown(word)}{hint}")
+    return vary

@@ -1,0 +1,224 @@
+"""Rehearse a cell with errors: solve it, execute the program on real cells, and correct it from measurements."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.real_cell import RealCell, check_true_errors, path_figures, pose_figures
+from cellplan.checks.verify import verify_motion, with_clearance
+from cellplan.errors import InputError
+from cellplan.files.run.joint_tables import parse_table
+from cellplan.jobs.rehearsal.correct import Pass, correct_from_pass_to_pass, correct_within_the_pass
+from cellplan.model.cell.cell import Cell, stacked_positions
+from cellplan.model.cell.cell_errors import CellErrors
+from cellplan.model.motion.motion import Motion, Schedule
+from cellplan.model.motion.plan import Phase
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report.check_kinds import TOOL_ERRORS
+from cellplan.model.report.rehearsal import CorrectedProgram, IsoFigures, Rehearsal, RunRehearsal, Trial
+from cellplan.model.report.report import Check, Report, TaskAccuracy
+from cellplan.planning.modes import plan_phases
+from cellplan.planning.path.build import build_toolpath
+from cellplan.runs.plan.program import ProgramClock
+from cellplan.runs.solution import Run
+from cellplan.runs.solve import render_program, solve, with_verdict
+from cellplan.scene.kinematics.perturbed_cell import draw_errors, perturbed_cell
+from cellplan.scene.scene import Scene
+
+MEASUREMENT_STREAM: Final = 1  # stream of random numbers of the measurements of a trial; its cell has stream 0
+IN_PASS_STREAM: Final = 2
+MAX_ERRORS: Final = 4_000_000  # trials times samples times tasks that are kept: 200 MB, twice with feedback
+DEFAULT_ROUNDS: Final = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Options:
+    """What is to be done on every real cell."""
+
+    feedback: bool
+    in_pass: bool
+    rounds: int
+
+
+def rehearse(
+    cell: Cell,
+    errors: CellErrors,
+    *,
+    feedback: bool = False,
+    in_pass: bool = False,
+    rounds: int = DEFAULT_ROUNDS,
+    progress: Progress = silent,
+) -> Rehearsal:
+    """Solve a cell, execute its program on perturbed cells, and compute the actual errors of the tools.
+
+    With feedback the program is repeated on each real cell: the tools are measured on the part, the references are
+    corrected, and the written cell is planned again, until the error converges. For a single real cell the corrected
+    program is rendered and verified on the written cell.
+
+    Args:
+        cell: The cell, as ``load_cell`` gives it.
+        errors: How real cells differ from it, as ``load_errors`` gives them.
+        feedback: Correct from pass to pass.
+        in_pass: Also execute with the error measured at each sample fed back at the next.
+        rounds: Maximum number of corrections from pass to pass.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: The cell cannot be worked with, several robots hold the part, or there are more trials than can be
+            kept.
+        NoSolutionError: The cell has no solution.
+    """
+    if rounds < 1:
+        raise InputError(f"--rounds: expected a whole number of at least 1, got {rounds}")
+    if cell.closures:
+        raise InputError(
+            f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
+            "the pose of a part between several holders depends on their stiffness, which a cell does not state"
+        )
+    if cell.program is not None:
+        raise InputError(
+            f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
+            "measured errors of transfer moves; rehearse its tasks without this key"
+        )
+    trials = errors.trials if errors.is_random else 1
+    _refuse_too_many(ProgramClock.from_cell(cell, plan_phases(cell)).schedules, trials, errors)
+    solution = solve(cell, is_reported=False, progress=progress)
+    _refuse_too_many([run.schedule for run in solution.runs], trials, errors)  # again: a retimed one has other samples
+    options = _Options(feedback=feedback, in_pass=in_pass, rounds=rounds)
+    runs = tuple(
+        _rehearse_run(solution.cell, run, errors, trials=trials, options=options, progress=progress)
+        for run in solution.runs
+    )
+    return Rehearsal(
+        cell=solution.cell,
+        errors=errors,
+        runs=runs,
+        checks=tuple(
+            check for run, made in zip(solution.runs, runs, strict=True) for check in _checks(solution.cell, run, made)
+        ),
+        has_feedback=feedback,
+        has_in_pass=in_pass,
+    )
+
+
+def _checks(cell: Cell, run: Run, made: RunRehearsal) -> tuple[Check, ...]:
+    """The true errors, and what the program that counts fails of limits and clearance on the written cell."""
+    report = _without_tool_errors(run.report) if made.corrected is None else made.corrected.report
+    return (*check_true_errors(cell, made), *(check for check in report.checks if not check.passed))
+
+
+def _without_tool_errors(report: Report) -> Report:
+    """A report that leaves tool errors to the real cell: on the written one they say nothing of it."""
+    return replace(report, checks=tuple(check for check in report.checks if check.name not in TOOL_ERRORS))
+
+
+def _refuse_too_many(schedules: Sequence[Schedule], trials: int, errors: CellErrors) -> None:
+    """Refuse more trials than fit into memory."""
+    samples = sum(len(schedule.times) * len(schedule.tasks) for schedule in schedules)
+    most = MAX_ERRORS // samples
+    if trials > max(most, 1):
+        raise InputError(
+            f"{errors.file}: trials: expected at most {max(most, 1)} for this cell ({samples} samples of its tasks), "
+            f"got {trials}; reduce trials or increase motion.step_s"
+        )
+
+
+def _rehearse_run(
+    cell: Cell, run: Run, errors: CellErrors, *, trials: int, options: _Options, progress: Progress
+) -> RunRehearsal:
+    """Execute one run on every real cell."""
+    job = Pass(
+        cell=cell,
+        schedule=run.schedule,
+        moving=run.moving,
+        judged_from=_judged_from(run.schedule),
+        q=stacked_positions(cell, run.report.q),
+    )
+    made = []
+    for number in range(trials):
+        progress("rehearsing", number / trials)
+        made.append(_try(job, errors, number, options=options, progress=_within(progress, number, trials)))
+    corrected = _corrected(job, made[0], run.phase, progress) if trials == 1 and options.feedback else None
+    return RunRehearsal(
+        name=run.name,
+        times=run.schedule.times,
+        judged_from=job.judged_from,
+        trials=tuple(made),
+        before=_iso_figures(job, [trial.before for trial in made]),
+        after=_iso_figures(job, [trial.final for trial in made]) if options.feedback else None,
+        corrected=corrected,
+    )
+
+
+def _within(progress: Progress, number: int, trials: int) -> Progress:
+    """Progress of one trial among many."""
+    return lambda stage, share: progress(stage, (number + share) / trials)
+
+
+def _try(job: Pass, errors: CellErrors, number: int, *, options: _Options, progress: Progress) -> Trial:
+    """One real cell."""
+    draw = draw_errors(job.cell, errors, number)
+    real = RealCell(perturbed_cell(job.cell, draw))
+    system = errors.measurement
+    before = real.accuracy(job.schedule, job.q)
+    correction, in_pass = None, None
+    if options.feedback:
+        correction = correct_from_pass_to_pass(
+            job,
+            real,
+            system,
+            rng=np.random.default_rng([errors.seed, number, MEASUREMENT_STREAM]),
+            rounds=options.rounds,
+            on_round=lambda made: progress(f"correction, round {made}", made / (options.rounds + 1)),
+        )
+    if options.in_pass:
+        progress("correction within the pass", 1.0)
+        rng = np.random.default_rng([errors.seed, number, IN_PASS_STREAM])
+        in_pass = correct_within_the_pass(job, real, system, rng=rng)
+    return Trial(draw=draw, before=before, correction=correction, in_pass=in_pass)
+
+
+def _corrected(job: Pass, trial: Trial, phase: Phase, progress: Progress) -> CorrectedProgram | None:
+    """The corrected joint tables, verified on the written cell against the corrected references."""
+    if trial.correction is None:
+        return None
+    cell, references = job.cell, trial.correction.references
+    program = render_program(cell, Motion(times=references.times, q=trial.correction.q))
+    tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
+    scene = Scene.from_cell(cell)
+    report = verify_motion(scene, references, tables, moving=job.moving, progress=progress)
+    report = _without_tool_errors(with_clearance(report, scene, references, is_reported=False, progress=progress))
+    best_round = trial.correction.best
+    remark = f"corrected for measured errors, round {best_round}: right for the measured cell, not for the written one"
+    alone = replace(phase, begin=0.0, end=float(references.times[-1]))  # a program of its own
+    return CorrectedProgram(program=with_verdict(cell, program, [alone], [report], remark=remark), report=report)
+
+
+def _judged_from(schedule: Schedule) -> dict[str, int]:
+    """First sample of each task that is judged: the first one after it has settled."""
+    first = {}
+    for scheduled in schedule.tasks:
+        task = scheduled.task
+        settled = int(np.searchsorted(schedule.times, task.start + task.settle)) if task.settle > 0.0 else 0
+        first[task.name] = min(settled, len(schedule.times) - 1)
+    return first
+
+
+def _iso_figures(job: Pass, trials: Sequence[tuple[TaskAccuracy, ...]]) -> dict[str, IsoFigures]:
+    """Figures of ISO 9283 of every task over all trials."""
+    figures = {}
+    times = job.schedule.times
+    for place, scheduled in enumerate(job.schedule.tasks):
+        name, first = scheduled.task.name, job.judged_from[scheduled.task.name]
+        errors = np.stack(
+            [np.concatenate([made[place].position_error, made[place].orientation_error], axis=1) for made in trials]
+        )
+        behind = build_toolpath(scheduled.task, job.cell.part).behind
+        stops = [max(int(np.argmin(np.abs(scheduled.travelled - length))), first) for length in behind]
+        figures[name] = IsoFigures(
+            poses=tuple(pose_figures(errors[:, k], float(times[k])) for k in dict.fromkeys(stops)),
+            path=path_figures(errors[:, first:], times[first:]),
+        )
+    return figures

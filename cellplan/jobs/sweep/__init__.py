@@ -1,0 +1,1 @@
+"""Sweeps: a cell solved with every combination of some values."""

@@ -1,1 +1,0 @@
-"""The cooperation Jacobian derived in three ways that share no formula: Denavit-Hartenberg, screws, Davies' method."""

@@ -1,0 +1,1 @@
+"""Cells: robots, what surrounds them, and what is demanded of them."""

@@ -1,0 +1,1 @@
+"""Motions: joint positions over time, phases and plans of a program."""

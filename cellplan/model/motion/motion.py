@@ -1,0 +1,266 @@
+"""Schedule, motion and program: desired tool poses, joint positions of all robots, and the tables as text."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.frozen import derive
+from cellplan.geometry.transforms import Array
+from cellplan.model.motion.clock import Clock
+from cellplan.model.motion.joint_path import JointPath
+from cellplan.model.motion.plan import Phase, Plan, rows_of
+from cellplan.model.solver import Integrator
+from cellplan.model.task.clocked_path import ClockedPath, distinct
+from cellplan.model.task.task import TIME_TOLERANCE, Task
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TaskSchedule:
+    """One task on the common clock of N samples.
+
+    Attributes:
+        task: The task.
+        X_PT: Reference tool tip in P at each sample, shape (N, 4, 4); held still before the start and after the end.
+        V_PT_P: Reference twist of the tool relative to the part in P, linear first, shape (N, 6).
+        travelled: Length of path behind the tool in [m], shape (N,); it grows from cycle to cycle.
+        length: Length of the path on the surface in [m], of one cycle.
+        end: Time in [s] at which the path is done.
+        cycle_ends: Times in [s] at which the tool has come back to the pose of its start, all constrained
+            components together, one per cycle; none when it does not come back.
+        stops: Times in [s] at which a stretch of the path with its own start and stop of the time law begins or ends.
+        demanded: Stretches of time in [s] in which the feed of a process is demanded, as (from, to).
+        bulge: Largest distance in [m] of a smooth path from the straight lines between its points, else None.
+    """
+
+    task: Task
+    X_PT: Array
+    V_PT_P: Array
+    travelled: Array
+    length: float
+    end: float
+    cycle_ends: tuple[float, ...] = ()
+    stops: tuple[float, ...] = ()
+    demanded: tuple[tuple[float, float], ...] = ()
+    bulge: float | None = None
+
+    @property
+    def begin(self) -> float:
+        """Time in [s] at which the tool starts along its path."""
+        return self.stops[0] if self.stops else self.task.start
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Schedule:
+    """All tasks on one clock.
+
+    Attributes:
+        times: Times of the samples in [s], evenly spaced from 0, shape (N,).
+        tasks: The tasks that are worked on, at the samples.
+        paths: The same tasks at any time; empty where they are known at the samples only.
+        extra_breaks: Further times in [s] that count as jumps: ends of panels where errors were too large, shape (K,).
+        clock: Nominal times of the samples, which are the times of the paths; None where these are the times.
+    """
+
+    times: Array
+    tasks: tuple[TaskSchedule, ...]
+    paths: tuple[ClockedPath, ...] = ()
+    extra_breaks: Array = field(default_factory=lambda: np.zeros(0))
+    clock: Clock | None = None
+
+    @property
+    def step(self) -> float:
+        """Time between two samples in [s]."""
+        return float(self.times[-1] / (len(self.times) - 1))
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the desired poses are known between the samples too."""
+        return len(self.paths) == len(self.tasks)
+
+    @property
+    def breaks(self) -> Array:
+        """Times in [s], from zero to the end of the clock, between which the motion of all tools is smooth."""
+        return self._within_clock([path.breaks for path in self.paths])
+
+    @property
+    def jumps(self) -> Array:
+        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
+        return self._within_clock([path.jumps for path in self.paths])
+
+    def poses(self, times: Array) -> tuple[Array, ...]:
+        """Reference poses X_PT of all tasks at times in [s], shape (M,), shape (M, 4, 4) each.
+
+        Between two samples the nominal time is linear in time.
+        """
+        nominal = times if self.clock is None else self.clock.at(times)
+        return tuple(path.poses(nominal) for path in self.paths)
+
+    def _within_clock(self, nominal_times: Sequence[Array]) -> Array:
+        """Times of all paths within the clock, and its ends."""
+        end = float(self.times[-1])
+        nominal = np.concatenate([np.zeros(0), *nominal_times])
+        times = nominal if self.clock is None else self.clock.reached_at(nominal)
+        every = np.concatenate([self.extra_breaks, times])
+        inner = distinct(every[(every > TIME_TOLERANCE) & (every < end - TIME_TOLERANCE)])
+        return np.concatenate([[0.0], inner, [end]])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NearestSingular:
+    """The robot that is nearest to a singular configuration.
+
+    Attributes:
+        robot: Its name.
+        task: Name of its task or grasp.
+        smallest: Smallest singular value of its own Jacobian in the rows that the task constrains.
+        stack: Smallest singular value of the Jacobian of all robots and tasks together.
+    """
+
+    robot: str
+    task: str
+    smallest: float
+    stack: float
+
+    @property
+    def words(self) -> str:
+        """The values as text."""
+        return (
+            f"closest to a singularity: robot '{self.robot}' on task '{self.task}': smallest singular value "
+            f"{self.smallest:.2g}, of all robots together {self.stack:.2g}"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Resolution:
+    """Nodes and effort of a motion of the accurate mode.
+
+    Attributes:
+        integrator: What integrated the joints from the start on; ``euler_from`` is where the accurate one failed.
+        panels: Intervals of time on each of which all joints are one polynomial.
+        nodes: Times at which the joints were solved for.
+        sweeps: Passes over all nodes of a panel, added up.
+        solves: Systems of equations that were solved.
+        error_between: Bound of the tool error at the nodes and between them, in [m] or [rad]; None when it is unknown,
+            as with Euler's steps.
+        euler_from: Time in [s] from which on Euler's steps had to be taken; None when they never had to.
+        lost: The robot that is nearest to a singular configuration at that time; None when none is.
+    """
+
+    integrator: Integrator
+    panels: int
+    nodes: int
+    sweeps: int
+    solves: int
+    error_between: float | None = None
+    euler_from: float | None = None
+    lost: NearestSingular | None = None
+
+    def __post_init__(self) -> None:
+        """Check that every figure is one."""
+        counts = (self.panels, self.nodes, self.sweeps, self.solves)
+        if min(counts) < 0:
+            raise ValueError(f"resolution: expected counts of at least 0, got {counts}")
+        for figure in (self.error_between, self.euler_from):
+            if figure is not None and not 0.0 <= figure < math.inf:  # also what is not a number
+                raise ValueError(f"resolution: expected a finite number of at least 0, got {figure}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Motion:
+    """Joint positions of all robots in the rows of a program, or of one phase of it.
+
+    Attributes:
+        times: Times of the rows in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq), in the order of ``Cell.robots``.
+        sigma: Nominal time of each row in [s], shape (N,); the time itself where it is not given.
+        plan: The phases of the program on its nominal time; without phases for the motion of a single one.
+        iterations: Iterations of the method in each step, shape (N - 1,); None when they were not counted.
+        slack: Norm of the twist residual that each step accepts (mixed units: m/s and rad/s), shape (N - 1,); None when
+            it was not measured.
+        resolution: Nodes and effort of the accurate mode; None when not recorded.
+        path: The motion between the rows too, over the nominal time; None where only the rows are known.
+    """
+
+    times: Array
+    q: Array
+    sigma: Array = field(default_factory=lambda: np.empty(0))
+    plan: Plan = field(default_factory=Plan)
+    iterations: Array | None = None
+    slack: Array | None = None
+    resolution: Resolution | None = None
+    path: JointPath | None = None
+
+    def __post_init__(self) -> None:
+        """Check that nothing is missing or not finite."""
+        if self.q.shape[:1] != self.times.shape:
+            raise ValueError(f"motion: {len(self.q)} rows for {len(self.times)} times")
+        if not np.all(np.isfinite(self.q)):
+            raise ValueError("motion: a joint position is not finite")
+        if not len(self.sigma):
+            derive(self, sigma=self.times)
+        if self.sigma.shape != self.times.shape:
+            raise ValueError(f"motion: {len(self.sigma)} nominal times for {len(self.times)} times")
+
+    @property
+    def gaps(self) -> dict[int, str]:
+        """Names of interruptions of the program, by the first row after each."""
+        return self.plan.gaps(self.sigma)
+
+    def rows(self, phase: Phase) -> slice:
+        """The rows of a phase, both ends included."""
+        return rows_of(phase, self.sigma)
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        return f"<Motion of {self.q.shape[1]} joints, {len(self.times)} samples, {float(self.times[-1]):g} s>"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointTable:
+    """The joint positions of one robot: the content of its written table, read back.
+
+    Attributes:
+        robot: Name of the robot.
+        joints: Joint names in the order of the columns.
+        times: Times of the rows in [s], shape (N,).
+        q: Joint positions in [rad] or [m], shape (N, n).
+        gaps: Name of what is not part of the program, by the first row after it.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    times: Array
+    q: Array
+    gaps: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClockTable:
+    """What happens at each row of a program: the content of its written clock.
+
+    Attributes:
+        gaps: Name of what is not part of the program, by the first row after it.
+    """
+
+    times: Array  # times of the rows in [s], shape (N,)
+    sigma: Array  # nominal time of each row in [s], shape (N,)
+    phases: tuple[str, ...]  # name of the phase of each row
+    lengths: Mapping[str, Array]  # length of path in [m] behind the tool of each task, shape (N,), by task
+    process: Mapping[str, NDArray[np.bool_]]  # whether the tool of each task is on its path, shape (N,), by task
+    gaps: Mapping[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Program:
+    """A program as text.
+
+    Attributes:
+        tables: The joint table of every robot, by robot name.
+        clock: What happens at each row of these; empty where it is not written.
+    """
+
+    tables: dict[str, str]
+    clock: str = ""

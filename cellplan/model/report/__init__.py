@@ -1,0 +1,1 @@
+"""Results: verified statements, and runs that were verified."""

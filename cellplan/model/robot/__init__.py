@@ -1,0 +1,1 @@
+"""Robots: joints, bodies, controllers and loads."""

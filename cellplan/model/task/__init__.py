@@ -1,0 +1,1 @@
+"""Tasks: what tools do on the part, and when."""

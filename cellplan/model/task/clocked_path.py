@@ -1,0 +1,196 @@
+"""Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.curves.arc_length import QuickParameters
+from cellplan.geometry.curves.curve import Interval
+from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.task.process_times import fixed_rests, leaves_at, ramp_shares
+from cellplan.model.task.task import TIME_TOLERANCE, Task, TimeLawKind
+from cellplan.model.task.time_law import advance, reached_at, stand_off
+from cellplan.model.task.toolpath import TOOL_Z, Toolpath
+
+SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
+MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ClockedPath:
+    """Toolpath of one task on the common clock.
+
+    Attributes:
+        task: The task.
+        toolpath: Where its tool must be.
+        corners: Times in [s] at which the stretches begin, and the one at which the last ends: each takes its own
+            start and stop of the time law. The cycles of a trajectory are its stretches.
+        behind: Length in [m] behind each stop of one cycle, shape (pieces + 1,).
+        quick: Way from lengths to parameters of the path for a few times at a time.
+    """
+
+    task: Task
+    toolpath: Toolpath
+    corners: Array
+    behind: Array
+    quick: QuickParameters
+
+    @property
+    def start(self) -> float:
+        """Time in [s] at which the tool starts along its path; an approach and the delay of a process are over."""
+        return float(self.corners[0])
+
+    @property
+    def end(self) -> float:
+        """Time in [s] at which the path is done."""
+        return float(self.corners[-1])
+
+    @property
+    def over(self) -> float:
+        """Time in [s] from which on the tool rests: it is out of the way."""
+        return self.end + self.task.leaving
+
+    @property
+    def breaks(self) -> Array:
+        """Times in [s], increasing, at which the desired pose or one of its derivatives may jump, shape (B,).
+
+        These are the ends of an approach, of the stretches, of the cycles, of the ramps of a trapezoid and of a
+        retreat, and all knots of the tip's curve and of the orientation. Between two neighbours the motion is
+        analytic: circles, sides, roundings, splines and their image on a box, a cylinder or a sphere are, between
+        their knots. A path on a mesh is the cubic through its rays: each ray is a knot.
+
+        Raises:
+            InputError: There are more than two million.
+        """
+        knots = self.toolpath.knots
+        if self.task.repeat * len(knots) > MOST_BREAKS:
+            raise InputError(
+                f"{self.task.where('path')}: expected at most {MOST_BREAKS} knots of the path in all cycles, got "
+                f"{len(knots)} in each of {self.task.repeat}; repeat it less often, or write solver.integrator: euler"
+            )
+        return distinct(np.concatenate([self.jumps, self._instants(knots)]))
+
+    @property
+    def jumps(self) -> Array:
+        """The breaks that do not come from knots of the path, in [s], increasing, shape (J,)."""
+        breaks = [self.corners, np.array([self.over]), np.array(fixed_rests(self.task, self.corners)).ravel()]
+        if self.task.approach is not None:
+            breaks.append(np.array([self.task.start - self.task.approach.duration]))
+        if self.task.time_law.kind in {TimeLawKind.TRAPEZOID, TimeLawKind.STEADY} and not self.toolpath.is_timed:
+            ramp = ramp_shares(self.task, self.corners) * np.diff(self.corners)
+            breaks += [self.corners[:-1] + ramp, self.corners[1:] - ramp]
+        return distinct(np.concatenate(breaks))
+
+    def at(self, times: Array, within: Interval) -> tuple[Array, Array]:
+        """Reference poses and twists at times of a smooth stretch of time, its ends seen from inside.
+
+        Args:
+            times: Times in [s], shape (N,).
+            within: Two neighbours of the `breaks`, of this path or of all, between which the times lie, ends
+                included: one pair for all, or arrays of shape (N,) with a pair for each sample. At its ends the
+                twist is the one inside: that of a moving tool where a constant law starts or passes a corner.
+
+        Returns:
+            Poses X_PT, shape (N, 4, 4), and twists V_PT_P, linear first, shape (N, 6), in [m/s] and [rad/s].
+        """
+        low, high = within
+        inside = np.clip(times, low, high)
+        middle = np.broadcast_to(np.asarray(0.5 * (low + high)), inside.shape)
+        if self.toolpath.is_timed:
+            X_PT, V_PT_P = self.toolpath.at(self._times_in_cycle(inside, self.toolpath.duration)[1])
+        else:
+            X_PT, V_PT_P, _ = self._by_time_law(inside, self._stretches(middle), quick=self.quick)
+        V_PT_P[(middle < self.corners[0]) | (middle > self.corners[-1])] = 0.0
+        stand_off(inside, self.task, X_PT, V_PT_P=V_PT_P, end=leaves_at(self.task, self.corners))
+        return X_PT, V_PT_P
+
+    def poses(self, times: Array) -> Array:
+        """Reference poses X_PT with approach and retreat at times in [s], shape (M,), shape (M, 4, 4)."""
+        X_PT, V_PT_P, _ = self.targets(times)
+        stand_off(times, self.task, X_PT, V_PT_P=V_PT_P, end=leaves_at(self.task, self.corners))
+        return X_PT
+
+    def targets(self, times: Array) -> tuple[Array, Array, Array]:
+        """Poses, twists and lengths behind the tool while it follows its path, without approach and retreat.
+
+        Args:
+            times: Times in [s], shape (N,); before and after the path its nearer end is taken, at a corner the later
+                side.
+
+        Returns:
+            Poses X_PT, shape (N, 4, 4), twists V_PT_P, shape (N, 6), and lengths in [m] that grow from cycle to cycle,
+            shape (N,).
+        """
+        path = self.toolpath
+        if path.is_timed:
+            cycle, t = self._times_in_cycle(times, path.duration)
+            return *path.at(t), cycle * path.length + path.arc.lengths(t)
+        return self._by_time_law(times, self._stretches(times + TIME_TOLERANCE))
+
+    def _stretches(self, times: Array) -> NDArray[np.intp]:
+        """Number of the stretch that times in [s] fall into, shape (N,); the nearest before and after all."""
+        stretch = np.searchsorted(self.corners, times, side="right") - 1
+        return np.clip(stretch, 0, len(self.corners) - 2)
+
+    def _times_in_cycle(self, times: Array, period: float) -> tuple[Array, Array]:
+        """Cycles of a trajectory and times within them, shape (N,); it passes from one to the next smoothly."""
+        starts = self.corners
+        elapsed = np.clip(times - starts[0], 0.0, starts[-1] - starts[0])
+        cycle = np.minimum(elapsed // period, len(starts) - 2)
+        return cycle, np.clip(elapsed - cycle * period, 0.0, period)
+
+    def _by_time_law(
+        self, times: Array, stretch: NDArray[np.intp], *, quick: QuickParameters | None = None
+    ) -> tuple[Array, Array, Array]:
+        """See `targets`; the stretch says which side counts at a corner."""
+        task, toolpath, behind = self.task, self.toolpath, self.behind
+        begin, duration = self.corners[stretch], self.corners[stretch + 1] - self.corners[stretch]
+        elapsed = np.clip(times - begin, 0.0, duration)
+        elapsed = np.where(
+            elapsed <= TIME_TOLERANCE, 0.0, np.where(duration - elapsed <= TIME_TOLERANCE, duration, elapsed)
+        )
+        law = advance(task.time_law, elapsed / duration, ramp_shares(task, self.corners)[stretch])
+        if toolpath.runs_on:
+            length = np.full(len(times), task.repeat * behind[-1])
+            cycle = np.clip((law.share * length) // behind[-1], 0, task.repeat - 1)
+            piece = np.zeros(len(times), dtype=np.intp)
+            s = law.share * length - cycle * behind[-1]
+        else:
+            cycle, piece = np.divmod(stretch, len(behind) - 1)
+            length = np.diff(behind)[piece]
+            s = behind[piece] + law.share * length
+        X_PT, twists = toolpath.targets(piece, s, quick=quick)
+        if task.repeat > 1 and toolpath.turn:
+            X_PT[:, :3, :3] = X_PT[:, :3, :3] @ rotation_about(TOOL_Z, cycle * toolpath.turn)
+        return X_PT, twists * (law.rate * length / duration)[:, None], cycle * behind[-1] + s
+
+    def _instants(self, knots: Array) -> Array:
+        """Times in [s] at which the path passes its knots, of all cycles, shape (N,)."""
+        path, law, ramps = self.toolpath, self.task.time_law, ramp_shares(self.task, self.corners)
+        cycles = np.arange(self.task.repeat)[:, None]
+        if path.is_timed:
+            return (self.corners[:-1, None] + knots).ravel()
+        pieces = len(self.behind) - 1
+        s = path.arc.lengths(knots)
+        piece = np.clip(np.searchsorted(self.behind, s, side="right") - 1, 0, pieces - 1)
+        tolerance = SAME_PLACE * self.behind[-1]
+        is_inside = (s > self.behind[piece] + tolerance) & (
+            s < self.behind[piece + 1] - tolerance
+        )  # the stops are corners
+        s, piece = s[is_inside], piece[is_inside]
+        if path.runs_on:
+            share = (cycles + np.append(0.0, s / self.behind[-1])).ravel() / self.task.repeat
+            return self.start + (self.end - self.start) * reached_at(law, share, float(ramps[0]))
+        stretch = cycles * pieces + piece
+        done = np.broadcast_to((s - self.behind[piece]) / np.diff(self.behind)[piece], stretch.shape)
+        tau = reached_at(law, done, ramps[stretch])
+        return (self.corners[stretch] + np.diff(self.corners)[stretch] * tau).ravel()
+
+
+def distinct(times: Array) -> Array:
+    """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
+    ordered = np.sort(times)
+    return ordered[np.diff(ordered, prepend=-np.inf) > TIME_TOLERANCE]

@@ -1,1 +1,0 @@
-"""Whole jobs: solve, verify, rehearse, export, each as a sequence of stages."""

@@ -1,1 +1,0 @@
-"""Export: from a verified run to programs for controllers, judged once more as they are written."""

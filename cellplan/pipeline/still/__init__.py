@@ -1,1 +1,0 @@
-"""The picture of the instant that decides the verdict of a run."""

@@ -1,0 +1,1 @@
+"""Programs for controllers: made from a verified run, and judged once more as they are written."""

@@ -1,0 +1,1 @@
+"""Elements of all program formats: numbers, names, clocks, corners and handshakes."""

@@ -1,0 +1,92 @@
+"""Corners: the rows that a target may round, of all robots of a program, and within which share of their segments."""
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
+from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.timed_rows import are_near
+
+LARGEST_SHARE: Final = 0.5  # [-] controllers cut zones to half of a segment
+SAME_TIME: Final = 1e-7  # [s] rows nearer than this are at one instant
+AT_REST: Final = 1e-9  # [rad] or [m] a robot that moves no joint by more stands still
+
+
+def may_round(program: ProgramRows, promise: Promise) -> dict[str, Flags]:
+    """Rows that targets may round, by robot, shape (N,).
+
+    These are all rows but the first and the last one, marks, rows at which the process of any robot of the program goes
+    on or off, and rows at which a robot rests or its tool has to stop. Robots that move in step round the same rows:
+    those that none of the moving ones must not round.
+    """
+    switch_times = _switch_times(program)
+    flags = {}
+    for name, rows in program.robots.items():
+        free = np.ones(len(rows), dtype=bool)
+        free[[0, -1, *rows.marks, *rows.stops]] = False
+        is_switch = switches(rows) if rows.times is None else are_near(rows.times, switch_times, SAME_TIME)
+        flags[name] = free & ~is_switch
+    if promise is Promise.SYNCHRONISED:
+        moving = {name: moves(rows) for name, rows in program.robots.items()}
+        allowed = [
+            flags[name] & (~np.any(moving[name], axis=0) | _runs(rows, moving[name]))
+            for name, rows in program.robots.items()
+        ]
+        shared: Flags = np.logical_and.reduce(allowed) & np.logical_or.reduce(
+            [np.any(m, axis=0) for m in moving.values()]
+        )
+        return dict.fromkeys(flags, shared)
+    return {name: flags[name] & _runs(rows, moves(rows)) for name, rows in program.robots.items()}
+
+
+def row_shares(job: ExportJob, program: ProgramRows) -> Mapping[str, Array]:
+    """Share of the shorter neighbouring segment within which each row of a job may be rounded, by robot, shape (N,).
+
+    It is what the rows state, or else that of the job for all rows that may be rounded.
+
+    What a zone does to a unit without a tool is known too little: it counts as rounded within half of its segments,
+    beyond which no controller goes.
+    """
+    chosen = {name: chosen_shares(job, rows) for name, rows in program.robots.items()}
+    if not any(np.any(shares > 0.0) for shares in chosen.values()):
+        return chosen
+    free = may_round(program, job.frame.promise)
+    has_arm = {name: bool(Axes.of(job.frame.robot(name)).arm) for name in free}
+    return {
+        name: np.where(free[name] & (share > 0.0), share if has_arm[name] else LARGEST_SHARE, 0.0)
+        for name, share in chosen.items()
+    }
+
+
+def chosen_shares(job: ExportJob, rows: RobotRows) -> Array:
+    """Share of its segments that is chosen for each row of a robot, whether it may be rounded or not, shape (N,)."""
+    return np.full(len(rows), job.blend) if rows.rounding is None else rows.rounding
+
+
+def moves(rows: RobotRows) -> Flags:
+    """Whether a robot moves to each row, and from each row on, shape (2, N)."""
+    moved = np.any(np.abs(np.diff(rows.q, axis=0)) > AT_REST, axis=1)
+    return np.stack([np.append([False], moved), np.append(moved, [False])])
+
+
+def _runs(rows: RobotRows, moving: Flags) -> Flags:
+    """Rows that a robot passes without coming to rest, shape (N,)."""
+    runs: Flags = np.all(moving, axis=0)
+    return runs if rows.qd is None else runs & np.any(rows.qd != 0.0, axis=1)
+
+
+def switches(rows: RobotRows) -> Flags:
+    """Rows at which the process of a robot goes on or off, shape (N,)."""
+    flags = np.zeros(len(rows), dtype=bool)
+    if rows.process is not None:
+        flags[1:] = rows.process[1:] != rows.process[:-1]
+    return flags
+
+
+def _switch_times(program: ProgramRows) -> Array:
+    """Times in [s] at which the process of any robot goes on or off, increasing."""
+    times = [rows.times[switches(rows)] for rows in program.robots.values() if rows.times is not None]
+    return np.unique(np.concatenate([np.zeros(0), *times]))

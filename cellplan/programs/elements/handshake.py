@@ -1,0 +1,101 @@
+"""Handshakes at marks: signals by which robots wait for one another, without a clock.
+
+The first robot of a cell leads. Each other one raises its output and waits until the leader has raised its own; then it
+lowers its output and waits until the leader has lowered its own. The leader waits until all outputs are raised, raises
+its own, waits until all are lowered, and lowers its own. Whatever the order in which the controllers read their
+inputs, none misses a state of another, and none leaves a mark before all have come to it.
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+from cellplan.errors import InputError, raise_findings, refusals
+from cellplan.model.report.exported import ExportFrame
+from cellplan.model.settings.controllers import HandshakeEntry
+
+
+class HandshakeStep(NamedTuple):
+    """One instruction of a handshake."""
+
+    waits: bool  # whether it waits for an input, or else sets the output
+    signal: str  # the input or output as the controller names it
+    is_on: bool  # the state to wait for, or to set
+
+
+def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]:
+    """Instructions of a robot at a mark; none in a cell of one robot.
+
+    Args:
+        frame: The robots that are exported; all robots of the cell take part in the handshake.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
+    """
+    leader, *others = [robot.name for robot in frame.cell.robots]
+    if not others:
+        return ()
+    signals, leads = _signals(frame, robot), robot == leader
+    inputs = [_input(signals, robot, other) for other in (others if leads else [leader])]
+    steps: list[HandshakeStep] = []
+    for is_on in (True, False):
+        waits = [HandshakeStep(True, signal, is_on) for signal in inputs]
+        change = HandshakeStep(False, str(signals.output), is_on)
+        steps += [*waits, change] if leads else [change, *waits]
+    return tuple(steps)
+
+
+def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:
+    """The instruction before the first motion of a program with marks: the output of the robot is lowered.
+
+    A program that was aborted at a mark may have left it raised, which would release others at the next start.
+
+    Args:
+        frame: The robots that are exported, of a cell of several robots.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
+    """
+    return next(step for step in reversed(handshake_steps(frame, robot)) if not step.waits)
+
+
+def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
+    """Stated signals of a robot by their keys in the cell file, its output first; none where none is stated."""
+    control = frame.robot(robot).control
+    if control is None or control.handshake is None:
+        return {}
+    key = f"robots.{robot}.controller.handshake"
+    inputs = {f"{key}.inputs.{other}": str(signal) for other, signal in control.handshake.inputs.items()}
+    return {f"{key}.output": str(control.handshake.output)} | inputs
+
+
+def require_signals(frame: ExportFrame, robot: str) -> None:
+    """Require every signal of a robot.
+
+    Raises:
+        InputError: Signals are not stated in the cell: all of these.
+    """
+    names = [robot.name for robot in frame.cell.robots]
+    others = names[1:] if robot == names[0] else names[:1]
+    if others:
+        stated = _signals(frame, robot)
+        raise_findings(refusals(*(partial(_input, stated, robot, other) for other in others)))
+
+
+def _signals(frame: ExportFrame, robot: str) -> HandshakeEntry:
+    """The signals of a robot."""
+    control = frame.robot(robot).control
+    if control is None or control.handshake is None:
+        raise InputError(
+            f"robots.{robot}.controller.handshake: expected its signals, as its program waits for other robots, "
+            f"got none"
+        )
+    return control.handshake
+
+
+def _input(handshake: HandshakeEntry, robot: str, other: str) -> str:
+    """The input at which a robot reads the output of another one."""
+    if other not in handshake.inputs:
+        raise InputError(
+            f"robots.{robot}.controller.handshake.inputs: expected the input that '{other}' sets, got none"
+        )
+    return str(handshake.inputs[other])

@@ -1,0 +1,148 @@
+"""Text that every controller reads: plain decimals, safe names, printable ASCII."""
+
+import re
+import unicodedata
+from collections.abc import Collection, Iterable, Mapping
+from typing import Final, NamedTuple
+
+from cellplan.errors import InputError
+
+MADE_OF: Final = {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"}  # as they are spelled
+LINE: Final = 78  # characters of a comment; the shortest limit of all dialects is above 80
+
+
+def fixed(value: float, decimals: int) -> str:
+    """A number with fixed decimals: no exponent, no ``-0.000``, a point whatever the locale."""
+    text = f"{value:.{decimals}f}"
+    return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+def ascii_text(text: str) -> str:
+    """Printable ASCII nearest to a text: letters without accents, everything else unknown as a question mark."""
+    spelled = "".join(MADE_OF.get(letter, letter) for letter in unicodedata.normalize("NFC", text))
+    plain = unicodedata.normalize("NFKD", spelled)
+    letters = (letter for letter in plain if not unicodedata.combining(letter))
+    return "".join(letter if " " <= letter <= "~" else "?" for letter in letters)
+
+
+def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
+    """Comment lines of a note, each with the sign of a comment before it.
+
+    Args:
+        sign: What begins a comment: ``;`` or ``!``.
+        forbidden: Characters that may not stand in one, which become question marks.
+    """
+    words = [re.sub(f"[{re.escape(forbidden)}]", "?", word) if forbidden else word for word in ascii_text(note).split()]
+    lines = [""]
+    for word in words:
+        if lines[-1] and len(lines[-1]) + 1 + len(word) > LINE:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return [f"{sign} {line[:LINE]}".rstrip() for line in lines]
+
+
+def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] = ()) -> dict[str, str]:
+    """Names that a controller takes, by the name in the cell: letters, digits and underscores, unique without case.
+
+    Args:
+        names: Names in the cell, in their order: the same names always give the same result.
+        reserved: Words of the language, in any case.
+    """
+    taken = {word.lower() for word in reserved}
+    chosen: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", ascii_text(name)).strip("_") or "x"
+        plain = plain if plain[0].isalpha() else f"p_{plain}"
+        safe_name, number = plain[:longest], 1
+        while safe_name.lower() in taken:
+            number += 1
+            ending = f"_{number}"
+            safe_name = plain[: longest - len(ending)] + ending
+        taken.add(safe_name.lower())
+        chosen[name] = safe_name
+    return chosen
+
+
+def joined(lines: Iterable[str], *, line_end: str = "\n") -> str:
+    """Lines as a text whose last line is ended too."""
+    return "".join(line + line_end for line in lines)
+
+
+class Statement(NamedTuple):
+    """A statement of a program."""
+
+    file: str
+    line: int  # its line, from 1
+    text: str  # what it says; never empty
+    kind: str = ""  # which pattern of its language it follows
+    words: tuple[str | None, ...] = ()  # what that pattern found
+
+    def error(self, expected: str, got: str | None = None) -> InputError:
+        """The error that something else is expected here."""
+        return line_error(self.file, self.line, expected, self.text if got is None else got)
+
+    def read_by(self, patterns: Mapping[str, re.Pattern[str]]) -> "Statement":
+        """The same with its kind and words.
+
+        Raises:
+            InputError: It follows none of the patterns.
+        """
+        for kind, pattern in patterns.items():
+            if match := pattern.fullmatch(self.text):
+                return self._replace(kind=kind, words=match.groups())
+        raise self.error("a statement that these programs have")
+
+
+def split_lines(text: str, file: str) -> list[str]:
+    """Lines without their ends, which are all like the first one; what follows the last one comes last.
+
+    Raises:
+        InputError: With file and line, where a line ends otherwise.
+    """
+    parts = text.split("\n")
+    crossed = [part.endswith("\r") for part in parts[:-1]]
+    for number, (part, is_crossed) in enumerate(zip(parts[:-1], crossed, strict=True), start=1):
+        if is_crossed != crossed[0] or "\r" in part.removesuffix("\r"):
+            raise InputError(f"{file}:{number}: expected one kind of line end, got two")
+    if "\r" in parts[-1]:
+        raise InputError(f"{file}:{len(parts)}: expected one kind of line end, got two")
+    return [*(part.removesuffix("\r") for part in parts[:-1]), parts[-1]]
+
+
+def line_error(file: str, line: int, expected: str, got: str) -> InputError:
+    """The error that a line of a file holds something else.
+
+    Args:
+        got: What stands there, of which the first characters are shown.
+    """
+    return mismatch_error(file, line, expected, repr(got[:60]))
+
+
+def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputError:
+    """The error that something else was found at a line of a file.
+
+    Args:
+        actual: What is there, in words.
+    """
+    return InputError(f"{file}:{line}: expected {expected}, got {actual}")
+
+
+def truncated_error(file: str, line: int, expected: str) -> InputError:
+    """The error that a file ends too early."""
+    return mismatch_error(file, line, expected, "the end of the file; it is truncated")
+
+
+def lines_of(text: str, file: str) -> list[str]:
+    """Lines of a text of printable ASCII characters whose last line is ended, with one kind of line end.
+
+    Raises:
+        InputError: With file and line, when it is no such text.
+    """
+    if not text.endswith("\n"):
+        raise truncated_error(file, 1 + text.count("\n"), "an ended last line")
+    end = "\r\n" if text.endswith("\r\n") else "\n"
+    lines = text.split(end)[:-1]
+    for number, line in enumerate(lines, start=1):
+        if not (line.isascii() and line.replace("\t", " ").isprintable()):
+            raise line_error(file, number, "printable ASCII characters and one kind of line end", line)
+    return lines

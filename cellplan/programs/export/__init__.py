@@ -1,0 +1,1 @@
+"""Export of verified runs: chosen, prepared, written, recorded, and verified on disk."""

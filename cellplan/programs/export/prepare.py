@@ -1,0 +1,213 @@
+"""Prepared: all that a format is to write of a run, promised and shaped, before any text."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+from cellplan.errors import InputError, InvalidFileError, NotVerifiedError, raise_findings, refusals
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report.exported import ExportFrame, ExportJob, ProgramRows, Promise, Targets
+from cellplan.model.report.verified_run import ReadRun, VerifiedRun
+from cellplan.model.units import DEG, MM
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.handshake import require_signals
+from cellplan.programs.elements.timed_rows import cycle_of
+from cellplan.programs.export.choice import THIN_DEG, THIN_MM, Choice, exported_robots
+from cellplan.programs.judgement.round_rows import stops_left, with_rounding
+from cellplan.programs.promises.orders import Orders
+from cellplan.programs.promises.promises import Promised, choose_promise, controllers_of
+from cellplan.programs.promises.run_programs import run_programs
+from cellplan.programs.promises.skew import RunSkew, run_skew
+from cellplan.programs.rows.part_targets import with_part_poses
+from cellplan.programs.rows.resample import lead_time, resampled
+from cellplan.programs.rows.rows import essential_rows, full_rows
+from cellplan.programs.rows.thin import ThinningLimits, thinned
+from cellplan.programs.shared import Shared
+
+FINER: Final = 0.3  # [-] of the usual thinning, where no rounding keeps the demands with that: it adds rows, not stops
+FEW_STOPS: Final = 0.1  # [-] of the rows that may be rounded: where more of them stay stops, more rows are tried
+BOTH: tuple[Promise, ...] = (Promise.TIMED, Promise.SYNCHRONISED)  # promises that keep the rows of robots together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PreparedExport:
+    """What a format is to write.
+
+    Attributes:
+        skew: What the start skew may be; None where there is one controller only, or the promise does not depend on it.
+        orders: Marks and what was certified between them, of each program; empty unless robots wait at marks.
+        thinning: How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out.
+    """
+
+    dialect: Dialect  # the format
+    job: ExportJob  # frame and rows, without notes
+    promised: Promised  # what is promised
+    requested: Promise | None  # the promise that was asked for; None where the best one was
+    skew: RunSkew | None
+    orders: tuple[Orders, ...]
+    thinning: tuple[float, float] | None
+    lead: float  # time in [s] by which the rows are later than those of the run
+    shared: Shared  # what exports of the run share
+
+
+def prepare(
+    run: VerifiedRun, dialect: Dialect, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
+) -> PreparedExport:
+    """Choose promise, marks and rows of an export.
+
+    Args:
+        shared: What exports of the run share; None for this one only.
+
+    Raises:
+        InputError: The format cannot write this, or something is not stated in the cell.
+        NotVerifiedError: No promise of the format can be kept with this motion.
+    """
+    choice.refuse_for(dialect)
+    shared = shared or Shared(run)
+    robots = exported_robots(run.cell, dialect, choice.robots)
+    skew = run_skew(run) if Promise.TIMED in dialect.promises else None
+    promised = choose_promise(run, dialect, robots, skew=skew, requested=choice.promise)
+    frame = frame_of(run, robots, promised.promise, choice)
+    raise_findings(unmet_demands(run, dialect, frame, choice))
+    has_waits = promised.promise is Promise.SEQUENCE_ONLY and len(run.cell.robots) > 1
+    orders = shared.orders(progress) if has_waits else ()
+    job, lead = _job(shared, dialect, choice, frame=frame, orders=orders)
+    is_rounded = dialect.is_rounded and not is_at_cycle(dialect, frame.promise)
+    stops, count = stops_left(job) if is_rounded else (0, 0)
+    if stops > FEW_STOPS * count and not choice.is_thinned:
+        finer = replace(choice, thin_mm=FINER * THIN_MM, thin_deg=FINER * THIN_DEG)
+        other, _ = _job(shared, dialect, finer, frame=frame, orders=orders)
+        job, choice = (other, finer) if stops_left(other)[0] < stops else (job, choice)
+    return PreparedExport(
+        dialect=dialect,
+        job=job,
+        promised=promised,
+        requested=choice.promise,
+        skew=skew if promised.promise is Promise.TIMED else None,
+        orders=orders,
+        thinning=thinning_of(dialect, promised.promise, choice),
+        lead=lead,
+        shared=shared,
+    )
+
+
+def _job(
+    shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
+) -> tuple[ExportJob, float]:
+    """The rows of an export, rounded as far as the cell allows it; and by how much they are later."""
+    programs, lead = _shaped(shared, dialect, choice, frame=frame, orders=orders)
+    if frame.targets is Targets.PART:
+        programs = with_part_poses(frame, programs)
+    job = ExportJob(frame=frame, programs=programs)
+    if dialect.is_rounded and not is_at_cycle(dialect, frame.promise):
+        read = None if frame.targets is Targets.PART else dialect.read(frame, dialect.render(job))
+        job = with_rounding(dialect, job, shared=shared, read=read, orders=orders, lead=lead)
+    return job, lead
+
+
+def frame_of(run: VerifiedRun | ReadRun, robots: Sequence[str], promise: Promise, choice: Choice) -> ExportFrame:
+    """What a reader may know of an export of a run."""
+    return ExportFrame(
+        cell=run.cell,
+        robots=tuple(robots),
+        programs=tuple(program.name for program in run_programs(run)),
+        promise=promise,
+        targets=choice.targets,
+        split=choice.split,
+    )
+
+
+def refuse_unfit(run: ReadRun, dialect: Dialect, choice: Choice) -> None:
+    """Refuse an export of which the files of a run say already that it cannot be, before anything is verified.
+
+    Raises:
+        InputError: All that is not stated in the cell, or does not fit.
+        NotVerifiedError: No promise of the format can be kept with this motion.
+    """
+    choice.refuse_for(dialect)
+    robots = exported_robots(run.cell, dialect, choice.robots)
+    try:
+        promise = choose_promise(run, dialect, robots, requested=choice.promise).promise
+    except InputError as error:
+        unstated = error.findings if isinstance(error, InvalidFileError) else [error]
+        promise = choice.promise or dialect.promises[0]
+    except NotVerifiedError as error:
+        frame = frame_of(run, robots, choice.promise or dialect.promises[-1], choice)
+        needed = {f"  needed too: {finding}": None for finding in unmet_demands(run, dialect, frame, choice)}
+        raise NotVerifiedError([*error.findings, *needed]) from None
+    else:
+        unstated = []
+    raise_findings([*unstated, *unmet_demands(run, dialect, frame_of(run, robots, promise, choice), choice)])
+
+
+def unmet_demands(
+    run: VerifiedRun | ReadRun, dialect: Dialect, frame: ExportFrame, choice: Choice
+) -> Iterator[InputError]:
+    """All that a format still needs of a cell, and choices that do not go with what is promised."""
+    if is_at_cycle(dialect, frame.promise):
+        if choice.is_thinned:
+            yield InputError(f"--thin-mm, --thin-deg: expected no thinning of a timed {dialect.name} program")
+        yield from refusals(partial(lead_time, {robot.name: cycle_of(robot) for robot in frame.cell.robots}))
+    if frame.promise is Promise.SEQUENCE_ONLY:
+        yield from refusals(*(partial(require_signals, frame, robot.name) for robot in frame.cell.robots))
+    rows = max(len(program.times) for program in run_programs(run))
+    yield from refusals(*dialect.demands(frame, rows))
+
+
+def _shaped(
+    shared: Shared, dialect: Dialect, choice: Choice, *, frame: ExportFrame, orders: Sequence[Orders]
+) -> tuple[tuple[ProgramRows, ...], float]:
+    """Rows of the robots that are exported, with marks, as the format holds them; and by how much they are later."""
+    run, programs = shared.run, full_rows(shared.run)
+    if orders:
+        programs = tuple(_with_marks(program, order) for program, order in zip(programs, orders, strict=True))
+    thinning = thinning_of(dialect, frame.promise, choice)
+    if is_at_cycle(dialect, frame.promise):
+        cycles = {robot.name: cycle_of(robot) for robot in run.cell.robots}  # all start and end together
+        programs = tuple(_only(program, frame.robots) for program in programs)
+        return tuple(resampled(run.cell, program, cycles) for program in programs), lead_time(cycles)
+    if thinning is not None:
+        limits = ThinningLimits(
+            turn=thinning[1] / DEG, slide=thinning[0] / MM, tool=thinning[0] / MM, shortest_time=dialect.shortest_time
+        )
+        scene, groups = shared.scene, row_groups(frame)
+        rows_of_run = essential_rows(run)
+        programs = tuple(
+            thinned(scene, program, groups=groups, limits=limits, essential_rows=rows)
+            for program, rows in zip(programs, rows_of_run, strict=True)
+        )
+    return tuple(_only(program, frame.robots) for program in programs), 0.0
+
+
+def is_at_cycle(dialect: Dialect, promise: Promise) -> bool:
+    """Whether the rows of an export lie on the cycle of the controller."""
+    return dialect.at_cycle and promise is Promise.TIMED
+
+
+def thinning_of(dialect: Dialect, promise: Promise, choice: Choice) -> tuple[float, float] | None:
+    """How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out."""
+    return None if is_at_cycle(dialect, promise) else choice.thinning(dialect)
+
+
+def row_groups(frame: ExportFrame) -> list[list[str]]:
+    """Robots that keep the same rows: all of a controller where they are to stay together, or else each its own."""
+    if frame.promise not in BOTH:
+        return [[name] for name in frame.robots]
+    groups: dict[str, list[str]] = {}
+    for name, controller in controllers_of(frame.cell, frame.robots).items():
+        groups.setdefault(controller, []).append(name)
+    return list(groups.values())
+
+
+def _with_marks(program: ProgramRows, orders: Orders) -> ProgramRows:
+    """A program whose robots wait for one another."""
+    return replace(program, robots={n: replace(rows, marks=orders.marks) for n, rows in program.robots.items()})
+
+
+def _only(program: ProgramRows, robots: Sequence[str]) -> ProgramRows:
+    """A program of some robots."""
+    missing = [name for name in robots if name not in program.robots]
+    if missing:
+        raise InputError(f"program of '{missing[0]}': expected rows, got none")
+    return replace(program, robots={name: program.robots[name] for name in robots})

@@ -1,0 +1,1 @@
+"""Program formats: one file or folder each, with a writer and a reader of its own."""

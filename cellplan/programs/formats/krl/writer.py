@@ -1,0 +1,128 @@
+"""KUKA KRL: a module of a .src and a .dat file for each robot, one PTP motion to each row, pages as subprograms."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import zip_longest
+from math import floor
+from typing import Final
+
+from cellplan.errors import raise_findings, refusals
+from cellplan.model.report.exported import ExportFrame, ExportJob, Promise
+from cellplan.programs.elements.dialect import Dialect
+from cellplan.programs.elements.handshake import HandshakeStep
+from cellplan.programs.elements.joints import Axes
+from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
+from cellplan.programs.elements.text import comment, fixed, joined
+from cellplan.programs.formats.krl.names import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
+from cellplan.programs.formats.krl.reader import read_krl
+
+DECIMALS: Final = 5
+PAGE: Final = 1000  # rows; public programs are split at 1400 to 2500 lines
+ADVANCE: Final = 3  # motions that are read ahead: the default of the controller
+HEADER: Final = ("&ACCESS RVP", "&REL 1")
+LINE_END: Final = "\r\n"
+
+
+def render_krl(job: ExportJob) -> dict[str, str]:
+    """Text of every file, by its path: ``<robot>.src`` and ``.dat``, or ``<robot>/<program>.src`` and ``.dat``.
+
+    Raises:
+        InputError: A robot cannot be written: it has no KUKA controller, is no arm of six axes with at most six others
+            before it, lacks a signal, or a position cannot be written with the decimals.
+    """
+    paths = program_paths(job.frame, KRL, MODULES)
+    raise_findings(refusals(*_demands(job.frame, 0)))
+    return render_programs(job, KRL, paths, _files)
+
+
+def _demands(frame: ExportFrame, _rows: int) -> Iterator[Callable[[], object]]:
+    """What these programs need of the cell."""
+    for robot in robots_of(frame, KRL):
+        yield partial(require_numbers, frame, robot)
+        yield partial(require_six_axes, frame.robot(robot), external=EXTERNAL, what="KRL")
+
+
+def _files(program: PagedProgram) -> dict[str, str]:
+    """The module of a program, or its main module and those of its pages."""
+    setup = _setup(program)
+    if len(program.pages) == 1:
+        moves = _moves(program, program.pages[0])
+        return _module(program, program.path, [*setup, *moves], program.pages[0])
+    calls = [f"{program.name}{ending}()" for ending in program.endings]
+    files = _module(program, program.path, [*setup, *calls], range(0), calls)
+    for ending, page in zip(program.endings, program.pages, strict=True):
+        files |= _module(program, f"{program.path}{ending}", _moves(program, page), page)
+    return files
+
+
+def _setup(program: PagedProgram) -> list[str]:
+    """What is set before the first motion. Targets are joint positions: neither tool nor base moves them."""
+    control = program.placed.control
+    tool, base = (None, None) if control is None else (control.tool_number, control.base_number)
+    return [
+        "BAS(#INITMOV,0)",
+        f"$ADVANCE={ADVANCE}",
+        f"$TOOL={f'TOOL_DATA[{tool}]' if tool else '$NULLFRAME'}",
+        f"$BASE={f'BASE_DATA[{base}]' if base else '$NULLFRAME'}",
+        *map(_instruction, program.first),
+    ]
+
+
+def _moves(program: PagedProgram, page: range) -> list[str]:
+    """The motions of a page, each with its speed and rounding where these change, and the handshakes after them."""
+    lines, marks, speed, rounding = list[str](), set(program.rows.marks), None, None
+    for row in page:
+        if program.speeds[row] != speed:
+            speed = program.speeds[row]
+            lines.append(f"BAS(#VEL_PTP,{speed})")
+        share = min(floor(WHOLE * float(program.shares[row]) + 1e-9), 100)  # counts in halves of a motion, in [%]
+        if share not in {0, rounding}:
+            rounding = share
+            lines.append(f"$APO.CPTP={rounding}")
+        lines.append(f"PTP {POINT}{row + 1}{' C_PTP' if share else ''}")
+        if row in marks:
+            lines += [_instruction(step) for step in program.steps]
+    return lines
+
+
+def _instruction(step: HandshakeStep) -> str:
+    """One step of a handshake. Both kinds stop the advance run: they are done when the robot stands at the row."""
+    if step.waits:
+        return f"WAIT FOR {'' if step.is_on else 'NOT '}$IN[{step.signal}]"
+    return f"$OUT[{step.signal}]={'TRUE' if step.is_on else 'FALSE'}"
+
+
+def _module(
+    program: PagedProgram, path: str, statements: Sequence[str], page: range, calls: Sequence[str] = ()
+) -> dict[str, str]:
+    """Both files of a module; points are declared in the order of their rows."""
+    name, head = path.rpartition("/")[2], [line for note in program.notes for line in comment(note, ";")]
+    source = [*HEADER, f"DEF {name}()", *head, *(f"EXT {call}" for call in calls), *statements, "END"]
+    axes = Axes.of(program.placed)
+    numbers = program.numbers[page.start : page.stop, [*axes.arm, *axes.external]].tolist()
+    points = [
+        f"DECL E6AXIS {POINT}{row + 1}={{{_components(values, program.decimals)}}}"
+        for row, values in zip(page, numbers, strict=True)
+    ]
+    data = [*HEADER, f"DEFDAT {name}", *head, *points, "ENDDAT"]
+    return {f"{path}.src": joined(source, line_end=LINE_END), f"{path}.dat": joined(data, line_end=LINE_END)}
+
+
+def _components(values: Sequence[float], decimals: int) -> str:
+    """Components of a point: all axes of the arm, then all external ones, unused ones at zero."""
+    return ",".join(f"{axis} {fixed(value, decimals)}" for axis, value in zip_longest(AXES, values, fillvalue=0.0))
+
+
+KRL: Final[Dialect] = Dialect(
+    name="krl",
+    title="KUKA KRL: a .src and a .dat file for each robot",
+    render=render_krl,
+    read=lambda frame, files: read_krl(frame, files, program_paths(frame, KRL, MODULES)),
+    decimals=DECIMALS,
+    promises=(Promise.SEQUENCE_ONLY,),
+    kinds=frozenset({"kuka"}),
+    is_thinned=True,
+    is_rounded=True,
+    split=PAGE,
+    demands=_demands,
+)

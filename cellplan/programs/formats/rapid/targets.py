@@ -1,0 +1,140 @@
+r"""Targets of RAPID as text: joint targets, targets on the part, frames, and the configuration of an arm.
+
+Configuration data are numbers of quarter turns of axes 1, 4 and 6, counted from zero downwards as well (0 for 0 to 90
+degrees, -1 for -90 to 0), and ``cfx`` from 0 to 7: twice two signs of the place of the wrist and the sign of axis 5
+(RAPID reference, confdata):
+
+.. math:: cfx = 4 [\text{wrist behind axis 1}] + 2 [\text{wrist behind the lower arm}] + [\text{axis 5 negative}]
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.cell.cell import Robot
+from cellplan.model.units import MM
+from cellplan.programs.elements.joints import Axes, from_numbers, to_numbers
+from cellplan.programs.elements.text import fixed
+from cellplan.programs.formats.rapid.units import ABSENT, EXTERNAL_AXES, QUATERNION_DECIMALS, RapidUnit, quaternions
+
+QUARTER: Final = 90.0  # [deg]
+MEETING_TOL: Final = 1e-6  # [m] axes of a wrist that pass nearer than this to its centre meet there
+PARALLEL_TOL: Final = 1e-6  # [rad] angle by which axes may miss being parallel or square
+FORWARD_TOL: Final = 1e-3  # [m] an arm whose wrist is nearer than this to the plane of axis 1 is not stretched forward
+
+
+def joint_targets(unit: RapidUnit, q: Array) -> list[str]:
+    """Joint targets ``[[6],[6]]`` of positions in [rad] or [m], shape (N, n).
+
+    Raises:
+        InputError: A position cannot be written with the decimals.
+    """
+    numbers = to_numbers(unit.robot, q, decimals=unit.decimals)
+    arm = _fields(numbers[:, unit.axes.arm], unit.decimals) if unit.has_tool else [",".join([ABSENT] * 6)] * len(q)
+    return [f"[[{axes}],[{rest}]]" for axes, rest in zip(arm, _external(unit, numbers), strict=True)]
+
+
+def part_targets(unit: RapidUnit, q: Array, X_PT: Array) -> list[str]:
+    """Targets ``[[3],[4],[4],[6]]`` of tool tips on the part: place, quaternion, configuration, external axes.
+
+    Args:
+        q: Its joints in [rad] or [m], shape (N, n), whose configuration is stated.
+        X_PT: Its tool tip in the part frame, shape (N, 4, 4), in [m].
+
+    Raises:
+        InputError: A position cannot be written, or the configuration of such an arm is not known.
+    """
+    places = _fields(X_PT[:, :3, 3] * MM, unit.decimals)
+    turns = _fields(quaternions(X_PT[:, :3, :3]), QUATERNION_DECIMALS)
+    configurations = [",".join(map(str, row)) for row in configuration(unit.robot, q).tolist()]
+    rest = _external(unit, to_numbers(unit.robot, q, decimals=unit.decimals))
+    return [
+        f"[[{place}],[{turn}],[{conf}],[{ext}]]"
+        for place, turn, conf, ext in zip(places, turns, configurations, rest, strict=True)
+    ]
+
+
+def frame_text(X: Array, decimals: int) -> str:
+    """A frame ``[[x,y,z],[w,x,y,z]]`` in [mm] of a pose in [m], shape (4, 4)."""
+    place = _fields(X[None, :3, 3] * MM, decimals)[0]
+    return f"[[{place}],[{_fields(quaternions(X[None, :3, :3]), QUATERNION_DECIMALS)[0]}]]"
+
+
+def configuration(robot: Robot, q: Array) -> NDArray[np.int_]:
+    """Configuration data cf1, cf4, cf6, cfx of an arm, shape (N, 4).
+
+    Which side is in front follows from the zero of the controller, at which the arm is stretched forward.
+
+    Args:
+        robot: A robot whose last six joints are those of an arm with a wrist of three axes that meet.
+        q: Its joints in [rad] or [m], shape (N, n).
+
+    Raises:
+        InputError: The robot is no such arm.
+    """
+    arm = list(Axes.of(robot).arm)
+    zero = from_numbers(robot, np.zeros((1, len(robot.model.joints))))
+    at_zero, places = _wrist_sides(robot, arm, zero)[0], _wrist_sides(robot, arm, q)
+    if np.any(np.abs(at_zero) < FORWARD_TOL):
+        raise InputError(
+            f"robots.{robot.name}: expected an arm that is stretched forward at the zero of its controller, as its "
+            f"targets on the part state a configuration"
+        )
+    behind = places * np.sign(at_zero) < 0.0
+    numbers = to_numbers(robot, q, decimals=6)[:, arm]
+    quarters = np.floor(numbers[:, [0, 3, 5]] / QUARTER).astype(int)
+    cfx = 4 * behind[:, 0] + 2 * behind[:, 1] + (numbers[:, 4] < 0.0)
+    return np.column_stack([quarters, cfx])
+
+
+def _wrist_sides(robot: Robot, arm: list[int], q: Array) -> Array:
+    """Signed distances in [m] of the wrist from axis 1 and, times its length, from the lower arm, shape (N, 2)."""
+    joints = [robot.model.joints[place] for place in arm]
+    first, second, third = joints[:3]
+    wrist_B = _wrist_centre(robot, arm)
+    forward = np.cross(second.axis_B, first.axis_B)
+    is_level = abs(second.axis_B @ first.axis_B) < PARALLEL_TOL
+    if not is_level or np.linalg.norm(np.cross(second.axis_B, third.axis_B)) > PARALLEL_TOL:
+        raise InputError(
+            f"robots.{robot.name}: expected an arm whose axes 2 and 3 are parallel and cross axis 1, as its targets on "
+            f"the part state a configuration"
+        )
+    upper = rotation_about(second.axis_B, q[:, arm[1]])
+    elbow = upper @ (third.point_B - second.point_B)
+    bent = rotation_about(third.axis_B, q[:, arm[2]]) @ (wrist_B - third.point_B)
+    wrist = elbow + (upper @ bent[..., None])[..., 0]  # from axis 2
+    return np.stack(
+        [(wrist + second.point_B - first.point_B) @ forward, np.cross(elbow, wrist) @ second.axis_B], axis=1
+    )
+
+
+def _wrist_centre(robot: Robot, arm: list[int]) -> Array:
+    """The point at the reference configuration where the last three axes meet, in [m], shape (3,)."""
+    joints = [robot.model.joints[place] for place in arm[3:]]
+    across = [np.eye(3) - np.outer(joint.axis_B, joint.axis_B) for joint in joints]
+    right = np.sum([part @ joint.point_B for part, joint in zip(across, joints, strict=True)], axis=0)
+    centre = np.linalg.lstsq(np.sum(across, axis=0), right, rcond=None)[0]
+    gaps = [np.linalg.norm(part @ (centre - joint.point_B)) for part, joint in zip(across, joints, strict=True)]
+    if max(gaps) > MEETING_TOL:
+        raise InputError(
+            f"robots.{robot.name}: expected an arm whose axes 4, 5 and 6 meet in a point, as its targets on the part "
+            f"state a configuration"
+        )
+    return centre
+
+
+def _external(unit: RapidUnit, numbers: Array) -> list[str]:
+    """External axes of every row, those that the unit does not have marked as absent."""
+    count = len(unit.axes.external)
+    missing = [ABSENT] * (EXTERNAL_AXES - count)
+    if not count:
+        return [",".join(missing)] * len(numbers)
+    return [",".join([field, *missing]) for field in _fields(numbers[:, unit.axes.external], unit.decimals)]
+
+
+def _fields(numbers: Array, decimals: int) -> list[str]:
+    """Rows of numbers with fixed decimals."""
+    return [",".join(fixed(number, decimals) for number in row) for row in numbers.tolist()]

@@ -1,0 +1,280 @@
+"""Reader of URScript programs: statements of our own subset, one on each line, and the handshakes among them."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.model.cell.cell import Robot
+from cellplan.model.report.exported import ExportFrame, ProgramRows, Promise, RobotRows
+from cellplan.programs.elements.joints import ARM, Angle, from_numbers
+from cellplan.programs.elements.text import line_error, lines_of, mismatch_error, truncated_error
+from cellplan.programs.elements.timed_rows import cycle_of, file_path, require_paths
+from cellplan.programs.formats.urscript.rows import move_acceleration
+from cellplan.programs.formats.urscript.text import (
+    ENDING,
+    approach_call,
+    decimals_of_urscript,
+    function_names,
+    handshake_lines,
+    lowering,
+    most_rows,
+    page_name,
+    require_turns,
+    servo_call,
+    stop_call,
+)
+from cellplan.programs.formats.zones import tool_shares
+
+MOVES: Final = ("movej", "servoj")  # instructions of rows
+_GAP: Final = re.compile(r"\s*([()\[\],=:])\s*")
+_SPEED: Final = r"(?!0\.0+(?![0-9]))(?:0|[1-9][0-9]{0,3})\.[0-9]{3}"
+_RADIUS: Final = r"(?!0\.0+(?![0-9]))[0-9]\.[0-9]{4}"
+
+
+class UrscriptStatement(NamedTuple):
+    """One instruction: its line, from 1, its text without comment and spare spaces, and the line as it stands."""
+
+    line: int
+    text: str
+    shown: str
+
+
+class _Statements:
+    """Instructions of a file, taken one after the other."""
+
+    def __init__(self, text: str, file: str) -> None:
+        """Find all instructions."""
+        self.file, self.place = file, 0
+        lines = lines_of(text, file)
+        self.all = [
+            UrscriptStatement(number, plain, content)
+            for number, line in enumerate(lines, start=1)
+            if (content := line.partition("#")[0].strip()) and (plain := compact(content))
+        ]
+        self.last = len(lines)
+
+    def call_routines(self, most: int) -> None:
+        """Put the instructions of all routines where the program calls these, in their order.
+
+        Args:
+            most: Most rows of a routine, or of a program without any.
+
+        Raises:
+            InputError: A routine has more rows, another name, or is not called next.
+        """
+        inside, called = list[UrscriptStatement](), list[str]()
+        while self.peek().text.startswith("def "):
+            called.append(page_name(len(called) + 1))
+            self.take(f"def {called[-1]}():")
+            inside += self._routine(most)
+        if not called:
+            self._require_length([statement for statement in self.all if statement.text.startswith(MOVES)], most)
+            return
+        start = self.place
+        while self.peek().text != f"{called[0]}()":
+            self.place += 1
+        begin = self.all[start : self.place]
+        for name in called:
+            self.take(f"{name}()")
+        if moves := [statement for statement in begin if statement.text.startswith(MOVES)]:
+            raise line_error(self.file, moves[0].line, f"{called[0]}()", moves[0].shown)
+        self.all, self.place = [*begin, *inside, *self.all[self.place :]], 0
+
+    def _routine(self, most: int) -> list[UrscriptStatement]:
+        """The instructions of a routine up to its end."""
+        statements, depth = list[UrscriptStatement](), 1
+        while depth:
+            at = self.peek()
+            depth += at.text.startswith("while ") - (at.text == "end")
+            statements.append(at)
+            self.place += 1
+        self._require_length([statement for statement in statements if statement.text.startswith(MOVES)], most)
+        return statements[:-1]
+
+    def _require_length(self, moves: Sequence[UrscriptStatement], most: int) -> None:
+        """Refuse more rows than a routine holds."""
+        if len(moves) > most:
+            line = moves[most].line
+            raise InputError(f"{self.file}:{line}: expected {most} rows at most in a routine, got {len(moves)}")
+
+    def peek(self) -> UrscriptStatement:
+        """The next instruction.
+
+        Raises:
+            InputError: There is none.
+        """
+        if self.place == len(self.all):
+            raise truncated_error(self.file, self.last, "an instruction")
+        return self.all[self.place]
+
+    def take(self, expected: str) -> None:
+        """Go past an instruction that has to be a given one.
+
+        Raises:
+            InputError: It is another one.
+        """
+        statement = self.peek()
+        if statement.text != compact(expected):
+            raise line_error(self.file, statement.line, expected.strip(), statement.shown)
+        self.place += 1
+
+    def end(self) -> None:
+        """Make sure that nothing follows.
+
+        Raises:
+            InputError: Something does.
+        """
+        if self.place < len(self.all):
+            statement = self.all[self.place]
+            raise line_error(self.file, statement.line, "the end of the file", statement.shown)
+
+
+def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
+    """Read the files of an export back, strictly; spaces, comments and empty lines may be others.
+
+    Raises:
+        InputError: With file and line, when a text is not such a file.
+    """
+    keys = [(program, robot) for program in frame.programs for robot in frame.robots]
+    paths = {key: file_path(key[0], f"{key[1]}{ENDING}") for key in keys}
+    require_paths(files, tuple(paths.values()))
+    names, programs = function_names(frame), []
+    for program in frame.programs:
+        robots = {}
+        for robot in frame.robots:
+            path = paths[program, robot]
+            statements = _Statements(files[path], path)
+            statements.take(f"def {names[program, robot]}():")
+            statements.call_routines(most_rows(frame))
+            read = _timed if frame.promise is Promise.TIMED else _sequence
+            robots[robot] = read(frame, frame.robot(robot), statements)
+            statements.take("end")
+            statements.end()
+        programs.append(ProgramRows(name=program, robots=robots))
+    return tuple(programs)
+
+
+def compact(text: str) -> str:
+    """An instruction with single spaces between words, and none beside brackets and signs."""
+    return _GAP.sub(r"\1", " ".join(text.split()))
+
+
+class _Points:
+    """Joint positions of rows as they are found.
+
+    Attributes:
+        lines: Line of each row.
+        numbers: Its positions in [rad].
+    """
+
+    def __init__(self, frame: ExportFrame, robot: Robot, file: str) -> None:
+        """Begin with no row."""
+        self.robot, self.file = robot, file
+        self.lines: list[int] = []
+        self.numbers: list[list[float]] = []
+        decimals = decimals_of_urscript(frame, robot)
+        number = rf"(?!-0\.0+(?![0-9]))-?(?:0|[1-9][0-9]{{0,2}})\.[0-9]{{{decimals}}}"
+        self.pattern = rf"\[({number}(?:,{number}){{{ARM - 1}}})\]"
+        self.expected = f"{ARM} positions with {decimals} decimals"
+
+    def add(self, statements: _Statements, pattern: re.Pattern[str], what: str) -> re.Match[str]:
+        """Take in the row of the next instruction.
+
+        Raises:
+            InputError: It is another instruction.
+        """
+        statement = statements.peek()
+        match = pattern.fullmatch(statement.text)
+        if match is None:
+            raise line_error(self.file, statement.line, f"{what} with {self.expected}", statement.shown)
+        statements.place += 1
+        self.lines.append(statement.line)
+        self.numbers.append([float(text) for text in match[1].split(",")])
+        return match
+
+    def rows(self, *, times: bool, marks: tuple[int, ...] = ()) -> RobotRows:
+        """All rows.
+
+        Raises:
+            InputError: A position is beyond two turns.
+        """
+        where = [f"{self.file}:{line}" for line in self.lines]
+        numbers = np.array(self.numbers)
+        require_turns(self.robot.model.joint_names, numbers, row_of=where)
+        cycle_ms = round(1000.0 * cycle_of(self.robot))
+        return RobotRows(
+            robot=self.robot.name,
+            q=from_numbers(self.robot, numbers, angle=Angle.RADIANS),
+            times=np.arange(len(numbers)) * cycle_ms / 1000.0 if times else None,
+            marks=marks,
+        )
+
+
+def _timed(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+    """Rows of a program that follows them at the cycle of its controller."""
+    points = _Points(frame, robot, statements.file)
+    servo = re.compile(rf"servoj\({points.pattern},{re.escape(compact(servo_call(frame, robot)))}\)")
+    _approach(points, statements)
+    while statements.peek().text.startswith("servoj"):
+        points.add(statements, servo, f"servoj([…], {servo_call(frame, robot)})")
+    if len(points.lines) < 2:
+        raise line_error(statements.file, statements.peek().line, "servoj", statements.peek().shown)
+    statements.take(stop_call(robot))
+    return points.rows(times=True)
+
+
+def _approach(points: _Points, statements: _Statements) -> None:
+    """The move to the first row."""
+    pattern = re.compile(rf"movej\({points.pattern},{re.escape(compact(approach_call()))}\)")
+    points.add(statements, pattern, f"movej([…], {approach_call()})")
+
+
+def _sequence(frame: ExportFrame, robot: Robot, statements: _Statements) -> RobotRows:
+    """Rows and marks of a program that moves from row to row."""
+    points, marks, radii = _Points(frame, robot, statements.file), list[int](), [0.0]
+    acceleration = re.escape(f"{move_acceleration(robot):.3f}")
+    move = re.compile(rf"movej\({points.pattern},a={acceleration},v=({_SPEED})(?:,r=({_RADIUS}))?\)")
+    first = statements.peek()
+    is_met = not first.text.startswith("movej")
+    if is_met:
+        statements.take(lowering(frame, robot.name) if handshake_lines(frame, robot.name) else "movej")
+    _approach(points, statements)
+    is_blended, at = False, statements.all[statements.place - 1]
+    while (statement := statements.peek()).text != "end":
+        if statement.text.startswith("movej"):
+            match = points.add(statements, move, f"movej([…], a={move_acceleration(robot):.3f}, v=…)")
+            _require_speed(robot, float(match[2]), statement, statements.file)
+            is_blended, at = match[3] is not None, statement
+            radii.append(float(match[3] or 0.0))
+            continue
+        if is_blended or not is_met:
+            raise line_error(statements.file, statement.line, "movej, or end", statement.shown)
+        _meet(frame, robot, statements)
+        marks.append(len(points.lines) - 1)
+    if is_blended:
+        raise line_error(statements.file, at.line, "a stop at the last row, without r", at.shown)
+    if is_met and not marks:
+        raise mismatch_error(statements.file, first.line, "a handshake at a row, as its output is lowered", "none")
+    rows = points.rows(times=False, marks=tuple(marks))
+    return replace(rows, rounding=tool_shares(robot, rows.q, np.array(radii)))
+
+
+def _require_speed(robot: Robot, speed: float, statement: UrscriptStatement, file: str) -> None:
+    """Make sure that a speed is none beyond those of all joints."""
+    largest = max(joint.velocity for joint in robot.model.joints)
+    if speed > largest:
+        raise line_error(file, statement.line, f"a speed of {largest:.3f} rad/s at most", statement.shown)
+
+
+def _meet(frame: ExportFrame, robot: Robot, statements: _Statements) -> None:
+    """The handshake of a robot at a mark."""
+    lines = handshake_lines(frame, robot.name)
+    if not lines:
+        statement = statements.peek()
+        raise line_error(statements.file, statement.line, "movej, or end", statement.shown)
+    for line in lines:
+        statements.take(line)

@@ -1,0 +1,132 @@
+"""Zones: how near to a row a target leaves the straight motion, in lengths of tool path or in turns of axes.
+
+A share of a segment is known from the joints. Languages that state a zone by its size need the way of the tool instead:
+the distance of its tip from the row when the share is left to go.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cellplan.geometry.transforms import Array, rotation_about
+from cellplan.model.cell.cell import Robot
+from cellplan.programs.elements.corners import LARGEST_SHARE
+
+HALVINGS: Final = 24  # of the search for a share, to 3e-8
+STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not count
+
+
+def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
+    """How far the tool is from each row in [m] when a share of the segment before or after it is left, shape (N,).
+
+    It is the smaller one of both; zero at both ends.
+
+    Args:
+        q: Its rows in [rad] or [m], shape (N, n).
+        shares: Of the segments, 0 to 0.5, shape (N,).
+    """
+    zones = np.zeros(len(q))
+    if len(q) > 2:
+        inner, share = q[1:-1], shares[1:-1, None]
+        zones[1:-1] = np.min([_away(robot, inner, other, share) for other in (q[:-2], q[2:])], axis=0)
+    return zones
+
+
+def tool_tips(robot: Robot, q: Array) -> Array:
+    """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
+
+    Args:
+        q: Positions of the model in [rad] or [m], shape (N, n).
+    """
+    model = robot.model
+    p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
+    for link in reversed(model.links_to_flange):
+        axis, drive = model.axes[link], model.drive(link)
+        position = drive.ratio * q[:, drive.joint] + drive.offset
+        if axis.is_revolute:
+            R = rotation_about(axis.axis_B, position)
+            p = axis.point_B + np.einsum("nij,nj->ni", R, p - axis.point_B)
+        else:
+            p = p + position[:, None] * axis.axis_B
+    return p
+
+
+def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:
+    """The largest of a scale that is no larger than each size, 0 where none is, shape (N,)."""
+    whole = np.array([0, *scale])
+    taken: NDArray[np.int_] = whole[np.searchsorted(whole, sizes, side="right") - 1]
+    return taken
+
+
+def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
+    """Largest share of the segments of a row within which the tool is nearer to it than a zone, 0 to 0.5, shape (N,).
+
+    Args:
+        q: Its rows in [rad] or [m], shape (N, n).
+        zones: Sizes in [m], 0 for a stop, shape (N,).
+    """
+    shares = np.zeros(len(q))
+    rows = np.flatnonzero(zones > 0.0)
+    rows = rows[(rows > 0) & (rows < len(q) - 1)]
+    for other in (rows - 1, rows + 1):
+        low, high = np.zeros(len(rows)), np.full(len(rows), LARGEST_SHARE)
+        inside = _away(robot, q[rows], q[other], high[:, None]) <= zones[rows]
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            near = _away(robot, q[rows], q[other], middle[:, None]) <= zones[rows]
+            low, high = np.where(near, middle, low), np.where(near, high, middle)
+        shares[rows] = np.maximum(shares[rows], np.where(inside, LARGEST_SHARE, high))
+    return shares
+
+
+def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
+    """Share of the way of the axis that moves most in the shorter segment of a row, in [deg] or [mm], shape (N,).
+
+    Args:
+        q: Its rows in [rad] or [m], shape (N, n).
+        share: Of the segments, 0 to 0.5, of all rows or of each, shape (N,).
+    """
+    travels = _axis_travels(robot, q)
+    zones: Array = share * np.min(np.max(np.where(np.isfinite(travels), travels, 0.0), axis=2), axis=0)
+    return zones
+
+
+def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
+    """Largest share of its segments in which an axis is nearer to a row than a zone, 0 to 0.5, shape (N,).
+
+    Args:
+        q: Its rows in [rad] or [m], shape (N, n).
+        turns: Zones of turning axes in [deg], shape (N,).
+        slides: Zones of sliding axes in [mm], shape (N,).
+    """
+    zones = np.stack([turns if joint.is_revolute else slides for joint in robot.model.joints], axis=1)
+    with np.errstate(over="ignore"):
+        shares = np.max(zones / _axis_travels(robot, q), axis=(0, 2))
+    shares[[0, -1]] = 0.0
+    return np.minimum(shares, LARGEST_SHARE)
+
+
+def part_shares(p: Array, zones: Array) -> Array:
+    """As ``tool_shares`` for straight lines between points, NaN where a point is not known, shape (N, 3)."""
+    lengths = np.full((2, len(p)), np.nan)
+    lengths[0, 1:] = lengths[1, :-1] = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = np.where(zones > 0.0, zones / np.min(lengths, axis=0), 0.0)
+    return np.where(np.isnan(shares), LARGEST_SHARE, np.minimum(shares, LARGEST_SHARE))
+
+
+def _away(robot: Robot, q: Array, other: Array, share: Array) -> Array:
+    """Distance of the tool from where it is in some rows, a share on the way to others, in [m], shape (N,)."""
+    away: Array = np.linalg.norm(tool_tips(robot, q + share * (other - q)) - tool_tips(robot, q), axis=1)
+    return away
+
+
+def _axis_travels(robot: Robot, q: Array) -> Array:
+    """Way of each axis to and from each row in [deg] or [mm], infinite where it stands, shape (2, N, n)."""
+    units = np.array([joint.display_unit.scale for joint in robot.model.joints])
+    moved = np.abs(np.diff(q, axis=0))
+    travels = np.full((2, *q.shape), np.inf)
+    travels[0, 1:] = travels[1, :-1] = np.where(moved > STANDS, moved * units, np.inf)
+    return travels

@@ -1,0 +1,1 @@
+"""Judgement of programs as they are read back: rows, tools, speeds, and which rows may be rounded."""

@@ -1,0 +1,238 @@
+"""Where the tools, further holders and bodies of a played program are: against all that its cell demands of them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.certify.lever_arms import LeverArms
+from cellplan.certify.run_pairs import scene_of_run
+from cellplan.checks.clearance.mounting import check_mounting
+from cellplan.checks.clearance.tool_depth import check_depths, tool_depths, tool_reach
+from cellplan.checks.joints.locked import check_locked, with_locked_joints
+from cellplan.checks.tools.between_checks import (
+    check_between_rows,
+    check_closures_between,
+    check_task_between,
+    with_between,
+)
+from cellplan.checks.tools.closure import check_closure, closure_accuracy
+from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.cell.cell import Relation, stacked_positions
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
+from cellplan.model.task.task import Task
+from cellplan.model.units import MM
+from cellplan.programs.judgement.schedule_at import schedule_at
+from cellplan.programs.rows.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
+from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+
+Errors = TypeVar("Errors", TaskAccuracy, ClosureAccuracy)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PathRows:
+    """Joint positions of a phase, straight between times.
+
+    Attributes:
+        corners: How far all joints may be off together at each time by rounding, with sign, shape (M, nq); see
+            ``margins.corners_at``.
+    """
+
+    scene: Scene  # the cell as it is in the phase
+    schedule: Schedule  # desired tool poses at the rows of the run
+    times: Array  # times in [s] on the phase's own time, shape (M,)
+    q: Mapping[str, Array]  # positions of all robots there in [rad] or [m], shape (M, n), by robot
+    is_row: Flags  # which of them are rows of the run, where what the cell demands of rows holds, shape (M,)
+    is_break: Flags  # which of them are needed, the joints being straight between these already, shape (M,)
+    off: Array  # how far each joint may be from the straight motion by itself in each step, shape (M - 1, nq)
+    corners: Array
+
+    @property
+    def stacked(self) -> Array:
+        """Positions of all robots, shape (M, nq)."""
+        return stacked_positions(self.scene.cell, self.q)
+
+    @property
+    def is_off(self) -> bool:
+        """Whether joints may be off the straight motion at all."""
+        return bool(np.any(self.off) or np.any(self.corners))
+
+    def tool_off(self, relation: Relation) -> Array:
+        """By how much a tool may be off on the part at each time in [m], and turned in [rad], shape (M, 2).
+
+        Between two times it is no more than the value between both values.
+        """
+        deviations = np.zeros((len(self.times), 2))
+        if not self.is_off:
+            return deviations
+        arms = LeverArms(self.scene, self.stacked)
+        if np.any(self.off):
+            steps = np.pad(tool_margins(arms, self.scene, relation, self.off), ((1, 1), (0, 0)))
+            deviations += np.maximum(steps[:-1], steps[1:])
+        return deviations + tool_corners(arms, self.scene, relation, self.stacked, self.corners)
+
+    def depth_off(self, task: Task) -> Array:
+        """By how much deeper a tool may be for it at each time in [m], shape (M,): as far as any point of it moves."""
+        off = self.tool_off(task)
+        depths: Array = off[:, 0] + tool_reach(self.scene.cell, task.robot) * off[:, 1]
+        return depths
+
+
+def path_rows(played: ExecutedProgram, stretch: ExecutedStretch, scene: Scene) -> PathRows:
+    """The path of a program in one of its phases."""
+    times = played.grid(stretch.begin, stretch.end, with_corners=True)
+    return PathRows(
+        scene=scene,
+        schedule=stretch.motion.schedule,
+        times=times - stretch.begin,
+        q=played.at(times),
+        is_row=played.is_row(times),
+        is_break=played.is_break(times),
+        off=off_chords(played, times),
+        corners=all_corners(played, times),
+    )
+
+
+def path_findings(rows: PathRows) -> Iterator[str]:
+    """What the cell demands of the places of tools, holders and bodies, and the rows do not keep."""
+    for check in _checks(rows):
+        if not check.passed:
+            yield check.message
+    yield from clearance_findings(rows)
+
+
+def keeps_tools(rows: PathRows) -> bool:
+    """Whether tools and further holders are where they have to be."""
+    return all(check.passed for check in _checks(rows))
+
+
+def keeps_clearance(rows: PathRows) -> bool:
+    """Whether bodies keep the distances that are demanded of them."""
+    scene = _demanding(rows)
+    return certify(scene, rows.stacked[rows.is_break], with_minimum=False, with_curves=False).is_met
+
+
+def _checks(rows: PathRows) -> list[Check]:
+    """Tool errors at the rows and between them, depth, further holders, locked joints and mounted bodies."""
+    scene, cell, q = rows.scene, rows.scene.cell, rows.q
+    schedule = relaxed(schedule_at(rows.schedule, rows.times))
+    tools = [rows.tool_off(scheduled.task) for scheduled in schedule.tasks]
+    holders = [rows.tool_off(grasp) for grasp in cell.closures]
+    X_WP = part_poses(cell, scene.chains, q)
+    accuracy = tuple(
+        task_accuracy(task, scene.chains[task.task.robot], q=q[task.task.robot], X_WP=X_WP) for task in schedule.tasks
+    )
+    closures = closure_accuracy(cell, scene.chains, q, X_WP)
+    strict_accuracy = accuracy
+    accuracy, closures = check_between_rows(
+        scene, schedule, q, accuracy=accuracy, closures=closures, off=[*tools, *holders]
+    )
+    accuracy = tuple(with_off(errors, off) for errors, off in zip(accuracy, tools, strict=True))
+    closures = tuple(with_off(errors, off) for errors, off in zip(closures, holders, strict=True))
+    checks: list[Check] = []
+    for scheduled, given, errors, plain in zip(
+        schedule.tasks, rows.schedule.tasks, accuracy, strict_accuracy, strict=True
+    ):
+        tolerance = scheduled.task.tolerance
+        accuracy_checks = with_between(
+            check_accuracy(schedule, errors, scheduled.task), check_task_between(errors, tolerance)
+        )
+        strict = _at_rows(rows, given, plain) if all(check.passed for check in accuracy_checks) else ()
+        both = [*accuracy_checks, *strict]
+        checks += with_locked_joints(both, errors, tolerance, times=schedule.times, locked=cell.motion.locked)
+    checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
+    checks += check_depths(cell, _depths(rows, schedule))
+    checks += check_locked(cell, schedule.times, q)
+    checks += check_mounting(scene, stacked_positions(cell, q), schedule.times)
+    return checks
+
+
+def relaxed(schedule: Schedule) -> Schedule:
+    """The schedule with what is allowed between rows everywhere."""
+    tasks = []
+    for scheduled in schedule.tasks:
+        tolerance = scheduled.task.tolerance
+        allowed = tolerance.changed(
+            position_mm=tolerance.between_rows_mm or tolerance.position_mm,
+            orientation_deg=tolerance.between_rows_deg or tolerance.orientation_deg,
+        )
+        tasks.append(replace(scheduled, task=replace(scheduled.task, tolerance=allowed)))
+    return replace(schedule, tasks=tuple(tasks))
+
+
+def with_off(errors: Errors, off: Array) -> Errors:
+    """Errors at times that are as much larger as the tool may be off there, shape (M, 2)."""
+    position, orientation = (
+        _longer(vectors, off[:, kind]) for kind, vectors in enumerate((errors.position_error, errors.orientation_error))
+    )
+    return replace(errors, position_error=position, orientation_error=orientation)
+
+
+def _longer(vectors: Array, by: Array) -> Array:
+    """Vectors of shape (M, 3) that are longer by something, shape (M,); those without a length along the first axis."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    along = np.where(lengths > 0.0, vectors / np.maximum(lengths, np.finfo(float).tiny), np.eye(3)[0])
+    return vectors + by[:, None] * along
+
+
+def _depths(rows: PathRows, schedule: Schedule) -> tuple[ToolDepth, ...]:
+    """The largest depth of the tool of each task, with what it may be deeper by rounding."""
+    depths = tool_depths(rows.scene.cell, schedule, rows.scene.chains, rows.q)
+    tasks = {scheduled.task.name: scheduled.task for scheduled in schedule.tasks}
+    return tuple(replace(depth, depth=depth.depth + float(rows.depth_off(tasks[depth.task]).max())) for depth in depths)
+
+
+def _at_rows(rows: PathRows, given: TaskSchedule, errors: TaskAccuracy) -> tuple[Check, ...]:
+    """Errors at the rows of the run, where the cell demands more of them than of what lies between."""
+    task: Task = given.task
+    tolerance = task.tolerance
+    if tolerance.between == (tolerance.position_mm.si, tolerance.orientation_deg.si) or not np.any(rows.is_row):
+        return ()
+    at_rows = replace(
+        errors,
+        position_error=np.where(rows.is_row[:, None], errors.position_error, 0.0),
+        orientation_error=np.where(rows.is_row[:, None], errors.orientation_error, 0.0),
+    )
+    return check_accuracy(replace(rows.schedule, times=rows.times), at_rows, task)
+
+
+def clearance_findings(rows: PathRows) -> Iterator[str]:
+    """The pairs of bodies that touch or are not proved to keep their distance, with what of it rounding takes."""
+    scene = _demanding(rows)
+    q = stacked_positions(scene.cell, rows.q)[rows.is_break]
+    if certify(scene, q, with_minimum=False, with_curves=False).is_met:
+        return
+    bound = certify(scene, q, with_curves=False)  # what ended at its first fault says little of the pairs
+    for pair in bound.pairs:
+        if pair.is_met:
+            continue
+        first, second = bound.names(pair)
+        sample = min((*pair.touches, *pair.unproved), default=pair.at)
+        at_s = float(np.interp(sample, np.arange(rows.is_break.sum()), rows.times[rows.is_break]))
+        proof = f"are proved to keep {MM * pair.proved:.4g} mm only"
+        if np.isfinite(pair.distance) and pair.distance < pair.demand:
+            proof = f"come as near as {MM * pair.distance:.4g} mm or nearer"
+        if pair.touches:
+            proof = "touch"
+        usual = rows.scene.pairs[pair.row]
+        added = pair.demand - (usual.demand if usual.rule is Rule.CLEARANCE else 0.0)
+        wide, cure = "", "let them pass farther apart"
+        if rows.is_off and added > 0.0:
+            wide = f", {MM * added:.2g} mm of it for what rows may be off by rounding"
+            cure = f"leave out less (--thin-mm, --thin-deg), so that rounding takes less, or {cure}"
+        demanded = f"demanded {MM * pair.demand:.4g} mm{wide}"
+        yield f"clearance: {first} and {second} {proof}, at {at_s:.3f} s, {demanded}; {cure}"
+
+
+def _demanding(rows: PathRows) -> Scene:
+    """The scene of a phase whose pairs are to keep what joints may be off besides their clearance."""
+    scene = scene_of_run(rows.scene, [scheduled.task.name for scheduled in rows.schedule.tasks])
+    if not rows.is_off:
+        return scene
+    return raised(LeverArms(scene, rows.stacked), scene, rows.off + in_steps(rows.corners))

@@ -1,0 +1,131 @@
+"""Programs of a run: each with its phases, where tools are in process, and where holders move."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cellplan.certify.run_pairs import scene_of_run
+from cellplan.geometry.arrays import Array, Flags
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.plan import rows_of
+from cellplan.model.report.verified_run import ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
+from cellplan.model.task.task import Frame
+from cellplan.programs.elements.timed_rows import are_within
+from cellplan.runs.plan.demanded import DemandedProgram
+from cellplan.runs.plan.program import STILL_TOL
+from cellplan.scene.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunPhase:
+    """A phase of a program."""
+
+    name: str
+    place: int  # number of the motion of the run that it repeats
+    first: int  # its first row in the program
+    last: int  # its last row, which the next phase may share
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RunProgram:
+    """A program of all robots of a cell.
+
+    Attributes:
+        process: Whether the tool of a task is in process, shape (N,), by task, both ends of a process included.
+    """
+
+    name: str | None  # name of the program; None for the only one
+    times: Array  # times of its rows in [s], from 0, shape (N,)
+    q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
+    phases: tuple[RunPhase, ...]  # its phases in their order
+    process: dict[str, Flags]
+
+    def phase_at(self, row: int) -> RunPhase:
+        """The phase of a row; the earlier one of two that share it."""
+        return next((phase for phase in self.phases if phase.first <= row <= phase.last), self.phases[-1])
+
+    def busy(self) -> Flags:
+        """Whether some tool stays in process from the row before to the row after, shape (N,)."""
+        is_busy = np.zeros(len(self.times), dtype=bool)
+        for inside in self.process.values():
+            is_busy[1:-1] |= inside[:-2] & inside[1:-1] & inside[2:]
+        return is_busy
+
+
+def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
+    """The programs of a run: one from home to home, or one for each of its phases."""
+    motion, plan = run.motion, run.motion.plan
+    motions: Sequence[ReadMotion | VerifiedMotion] = run.motions
+    process = {task: are_within(motion.sigma, stretches) for task, stretches in plan.process.items()}
+    rows = [rows_of(phase, motion.sigma) for phase in plan.program]
+    if run.cell.program is not None:
+        phases = tuple(
+            RunPhase(name=phase.name, place=place % len(run.motions), first=columns.start, last=columns.stop - 1)
+            for place, (phase, columns) in enumerate(zip(plan.program, rows, strict=True))
+        )
+        return (RunProgram(name=None, times=motion.times, q=motion.q, phases=phases, process=process),)
+    return tuple(
+        RunProgram(
+            name=verified.name,
+            times=verified.schedule.times,
+            q=motion.q[columns],
+            phases=(RunPhase(name=phase.name, place=place, first=0, last=columns.stop - columns.start - 1),),
+            process={task: process[task][columns] for task in phase.tasks},
+        )
+        for place, (phase, columns, verified) in enumerate(zip(plan.program, rows, motions, strict=True))
+    )
+
+
+def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
+    """What another order of the robots spoils, one reason each: the first times at which it would.
+
+    While a tool is in process on the part, every holder must stand still: otherwise the path of the tool on the part
+    depends on both clocks. Two holders of one part must not move at all.
+    """
+    holders = cell.positioners
+    moves = _moves(cell, program.q, holders)
+    if len(holders) > 1 and moves.any():
+        yield f"{_where(program, moves)}: the holders {' and '.join(holders)} move the part: another order strains it"
+    for task, inside in program.process.items():
+        work = next((other for other in cell.tasks if other.name == task), None)
+        if work is None or work.relative_to is Frame.WORLD:
+            continue
+        spoilt = moves & inside[:-1] & inside[1:]
+        if spoilt.any():
+            yield (
+                f"{_where(program, spoilt)}: the part moves while the tool of '{work.robot}' is in process ('{task}'): "
+                f"another order spoils the tool path"
+            )
+
+
+def scenes_of(run: VerifiedRun) -> list[Scene]:
+    """The scene of each motion of a run, while its tasks are worked on."""
+    if run.cell.program is None:
+        made = [Scene.from_cell(run.cell)] * len(run.motions)
+    else:
+        made = DemandedProgram.of(run.cell).scenes(run.cell)
+    return [
+        scene_of_run(scene, [scheduled.task.name for scheduled in motion.schedule.tasks])
+        for scene, motion in zip(made, run.motions, strict=True)
+    ]
+
+
+def moving_robots(cell: Cell, program: RunProgram) -> tuple[str, ...]:
+    """Names of the robots that move in a program."""
+    return tuple(robot.name for robot in cell.robots if _moves(cell, program.q, (robot.name,)).any())
+
+
+def _moves(cell: Cell, q: Array, robots: tuple[str, ...]) -> Flags:
+    """Whether one of some robots moves in each step, shape (N - 1,)."""
+    moves = np.zeros(len(q) - 1, dtype=bool)
+    for name in robots:
+        moves |= np.any(np.abs(np.diff(q[:, cell.columns(name)], axis=0)) > STILL_TOL, axis=1)
+    return moves
+
+
+def _where(program: RunProgram, steps: Flags) -> str:
+    """Phase and instant of the first of some steps."""
+    step = int(np.flatnonzero(steps)[0])
+    name = "" if program.name is None or program.name == program.phase_at(step + 1).name else f"{program.name}, "
+    return f"{name}phase '{program.phase_at(step + 1).name}', {program.times[step]:g} s"

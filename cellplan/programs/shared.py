@@ -1,0 +1,75 @@
+"""Shared: what all exports of one run have in common, worked out once however many formats are written."""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.programs.promises.orders import Orders, certified_orders
+from cellplan.programs.rows.played import ExecutedProgram
+from cellplan.runs.plan.demanded import DemandedProgram
+from cellplan.scene.scene import Scene
+
+Result = TypeVar("Result")
+
+
+class Shared:
+    """What exports of one run have in common, whatever their format.
+
+    Nothing of it outlives the object, so that a proof rests on what was worked out in the same call.
+    """
+
+    def __init__(self, run: VerifiedRun) -> None:
+        """Begin with nothing."""
+        self.run = run
+        self._results: dict[object, Any] = {}
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The cell made computable."""
+        return Scene.from_cell(self.run.cell)
+
+    @cached_property
+    def scenes(self) -> Sequence[Scene]:
+        """The scene of each motion of the run."""
+        if self.run.cell.program is None:
+            return [self.scene] * len(self.run.motions)
+        return DemandedProgram.of(self.run.cell).scenes(self.run.cell)
+
+    def orders(self, progress: Progress = silent) -> tuple[Orders, ...]:
+        """Marks of every program, between which every order of the robots is certified.
+
+        Raises:
+            NotVerifiedError: Marks do not suffice.
+        """
+        return self.once("orders", lambda: certified_orders(self.run, progress=progress))
+
+    def once(self, key: object, make: Callable[[], Result]) -> Result:
+        """What was found for a key before, or else what is found now.
+
+        Args:
+            key: What the result depends on besides the run.
+        """
+        if key not in self._results:
+            self._results[key] = make()
+        known: Result = self._results[key]
+        return known
+
+
+def played_digest(played: ExecutedProgram) -> str:
+    """SHA-256 of all that a played program is, besides its run: equal digests are played alike to the last bit."""
+    state = hashlib.sha256()
+    about = (played.place, str(played.interpolation), played.exported, played.lead.hex())
+    state.update(repr(about).encode())
+    for name, rows in played.rows.items():
+        state.update(repr((name, rows.marks)).encode())
+        for values in (rows.q, rows.times, rows.qd, rows.process):
+            state.update(b"none" if values is None else repr((values.dtype.str, values.shape)).encode())
+            state.update(b"" if values is None else np.ascontiguousarray(values).tobytes())
+    for name, shares in played.shares.items():
+        state.update(repr((name, shares.shape)).encode() + np.ascontiguousarray(shares).tobytes())
+    return state.hexdigest()

@@ -1,0 +1,82 @@
+"""The rows of a program with the poses of its tools, for its wide table: of a solution, or of a verified run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from cellplan.checks.tools.tracking import part_poses
+from cellplan.model.cell.cell import Cell
+from cellplan.model.motion.motion import JointTable, Motion, Schedule
+from cellplan.model.report.report import Report
+from cellplan.model.report.verified_run import VerifiedMotion, VerifiedRun
+from cellplan.programs.formats.wide import PhaseRows, WideRows, file_name, read_wide, render_wide
+from cellplan.runs.solution import Solution
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+Checked = tuple[Cell, Schedule, Report]  # a phase: the cell as it is in it, its schedule and its report
+
+
+def solution_rows(solution: Solution) -> WideRows:
+    """All rows of a solution, gaps between its phases included."""
+    checked = [(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
+    return _program_rows(solution.cell, solution.motion, checked)
+
+
+def verified_rows(run: VerifiedRun) -> WideRows:
+    """All rows of a verified run, gaps between its phases included."""
+    return _program_rows(run.cell, run.motion, [_checked(motion) for motion in run.motions])
+
+
+def render_wide_tables(run: VerifiedRun) -> dict[str, str]:
+    """Text of every wide table, by its path in the folder of the export: one for each program of the run.
+
+    Raises:
+        InputError: A joint cannot be written with the decimals of the format, or two columns have the same name.
+    """
+    return {file_name(name): render_wide(rows) for name, rows in _programs(run)}
+
+
+def read_wide_tables(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, JointTable], ...]:
+    """Read the files of an export back, strictly: the joint tables of each motion, by robot.
+
+    Args:
+        run: The run that they were made from.
+        files: Text by path, as ``render_wide_tables`` gives it.
+
+    Raises:
+        InputError: With file and line, when a text is not such a table.
+    """
+    return run.by_phase([read_wide(run.cell, files[path], path) for path in map(file_name, run.programs)])
+
+
+def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, WideRows]]:
+    """The rows of every program of a run, by its name."""
+    if run.cell.program is not None:
+        yield None, verified_rows(run)
+        return
+    for phase, motion in zip(run.motion.plan.program, run.motions, strict=True):
+        rows = run.motion.rows(phase)
+        times, sigma = motion.schedule.times, run.motion.sigma[rows]
+        process = run.motion.plan.process
+        phase_rows = _phase_rows(phase.name, slice(0, len(times)), _checked(motion))
+        yield motion.name, WideRows(cell=run.cell, times=times, sigma=sigma, phases=[phase_rows], process=process)
+
+
+def _program_rows(cell: Cell, motion: Motion, checked: Sequence[Checked]) -> WideRows:
+    """All rows of a program; cycles after the first one repeat the phases of the first."""
+    phases = [
+        _phase_rows(phase.name, motion.rows(phase), checked[place % len(checked)])
+        for place, phase in enumerate(motion.plan.program)
+    ]
+    return WideRows(cell=cell, times=motion.times, sigma=motion.sigma, phases=phases, process=motion.plan.process)
+
+
+def _phase_rows(name: str, rows: slice, checked: Checked) -> PhaseRows:
+    """A phase with the poses of its tools."""
+    cell, schedule, report = checked
+    chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
+    X_WT = {robot: chain.tool_poses(report.q[robot]) for robot, chain in chains.items()}
+    X_WP = part_poses(cell, chains, report.q)
+    return PhaseRows(name=name, rows=rows, schedule=schedule, report=report, X_WT=X_WT, X_WP=X_WP)
+
+
+def _checked(motion: VerifiedMotion) -> Checked:
+    return motion.cell, motion.schedule, motion.report

@@ -1,0 +1,1 @@
+"""Sections of the record of a run, one subject each."""

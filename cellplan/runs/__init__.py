@@ -1,0 +1,1 @@
+"""Runs: solved, written, opened again and verified."""

@@ -1,0 +1,299 @@
+"""Retiming of a program: each phase as fast as its joints and feeds allow, or in a demanded time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration, retimed_jerk_limit
+from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
+from cellplan.checks.joints.limits import joint_uses
+from cellplan.checks.tools.tracking import part_poses
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import Array
+from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.motion.joint_path import JointPath
+from cellplan.model.motion.motion import Motion, Schedule
+from cellplan.model.progress import Progress, silent
+from cellplan.model.settings.units import si_or_none
+from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.process_times import fixed_rests
+from cellplan.model.task.task import Task
+from cellplan.planning.timing.fixed_rates import FixedRate
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
+from cellplan.planning.timing.schedule import TIME_DECIMALS
+from cellplan.runs.plan.program import ProgramClock
+from cellplan.runs.plan.step_errors import StepErrors
+from cellplan.scene.scene import Scene
+
+ROUNDING: Final = 5e-10  # [s] of nominal times in rows
+NOMINAL_STEP: Final = 1e-4  # [s] of nominal time over which the speed of a tool is taken
+
+
+def retimed(
+    scenes: Sequence[Scene], clock: ProgramClock, motions: Sequence[Motion], *, progress: Progress = silent
+) -> tuple[ProgramClock, list[Motion]]:
+    """A program and the motions of its phases on the clock that the cell's timing asks for.
+
+    Args:
+        motions: Motion of each of its phases as their time laws have them.
+
+    Returns:
+        The same objects where the program runs as it is written.
+
+    Raises:
+        InputError: The joints cannot go as fast as the demanded cycle asks for.
+    """
+    cell = scenes[0].cell
+    if cell.motion.timing is Timing.AS_WRITTEN:
+        return clock, list(motions)
+    phases = clock.plan.program
+    paths = [joint_path(motion) if phase.tasks else None for phase, motion in zip(phases, motions, strict=True)]
+    retimed_phases = _Retimed(scenes, clock, motions, paths)
+    if cell.program is None:
+        clocks = retimed_phases.nominal([cell.motion.cycle] * len(motions), progress)
+    else:
+        clocks = retimed_phases.nominal([None] * len(motions), progress)
+        if cell.motion.cycle is not None:
+            clocks = retimed_phases.nominal(retimed_phases.cycles(clocks), progress)
+    nominal = [phase.begin + sigma for phase, sigma in zip(phases, clocks, strict=True)]
+    for phase, sigma in zip(phases, nominal, strict=True):
+        np.round(sigma, TIME_DECIMALS, out=sigma)
+        sigma[0], sigma[-1] = phase.begin, phase.end
+    clock = clock.retimed(clock.joined(nominal))
+    return clock, retimed_phases.motions_at(clock, nominal)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Retimed:
+    """The phases of a program that is retimed; transfer moves and dwells keep their rows."""
+
+    scenes: Sequence[Scene]  # the scene of each phase
+    clock: ProgramClock  # the program as its time laws have it
+    motions: Sequence[Motion]  # motion of each phase, likewise
+    paths: Sequence[JointPath | None]  # the joints of each phase between its rows too; None where it keeps its rows
+
+    def nominal(self, cycles: Sequence[float | None], progress: Progress) -> list[Array]:
+        """Nominal times of the rows of each phase in [s] from its begin, as fast as possible or in given times."""
+        curves: dict[tuple[int, float | None], Array] = {}  # all cycles of a program have the same motions
+        for place, (motion, path, cycle) in enumerate(zip(self.motions, self.paths, cycles, strict=True)):
+            progress("retiming", place / len(cycles))
+            if (key := (id(motion), cycle)) not in curves:
+                schedule = self.clock.schedules[place]
+                scene = self.scenes[place]
+                curves[key] = motion.times if path is None else _nominal_times(scene, schedule, path, cycle)
+        return [curves[id(motion), cycle].copy() for motion, cycle in zip(self.motions, cycles, strict=True)]
+
+    def cycles(self, fastest: Sequence[Array]) -> list[float | None]:
+        """Times in [s] of the phases in the demanded cycle of a program from home to home, all slower alike."""
+        cell = self.scenes[0].cell
+        motion, count = cell.motion, 1 if cell.program is None else cell.program.cycles
+        of_one = len(fastest) // count
+        steps = np.array([len(sigma) - 1 for sigma in fastest[:of_one]])
+        is_open = np.array([path is not None for path in self.paths[:of_one]])
+        left = round((motion.cycle or 0.0) / motion.step) - int(steps[~is_open].sum())
+        if left < steps[is_open].sum():
+            raise InputError(
+                f"{cell.origin.at('motion.timing')}: expected a cycle of at least {steps.sum() * motion.step:.6g} s, "
+                f"which the program with its transfer moves takes, got {motion.cycle:g}; make it longer, or write "
+                "fastest"
+            )
+        ends = np.round(np.cumsum(steps * is_open) * (left / max(1, int(steps[is_open].sum())))).astype(int)
+        counts = np.diff(ends, prepend=0)
+        return [
+            float(cycle * motion.step) if free else None for cycle, free in zip(counts, is_open, strict=True)
+        ] * count
+
+    def motions_at(self, clock: ProgramClock, nominal: Sequence[Array]) -> list[Motion]:
+        """The motion of each phase in the rows of another clock."""
+        made: list[Motion] = []
+        for place, (phase, path, motion) in enumerate(zip(clock.plan.program, self.paths, self.motions, strict=True)):
+            nominal_times, times = nominal[place] - phase.begin, clock.schedules[place].times
+            q = motion.q if path is None else path.at(nominal_times)
+            made.append(replace(motion, times=times, sigma=nominal_times, q=q, iterations=None, slack=None))
+        return made
+
+
+def joint_path(motion: Motion) -> JointPath:
+    """The joints over the nominal time, also between the rows; those that stand still in the rows do so everywhere."""
+    if motion.path is None:
+        return JointPath.through(motion.times, motion.q)
+    stands = np.all(motion.q == motion.q[0], axis=0)
+    nodes = [np.where(stands[:, None], motion.q[0][:, None], node) for node in motion.path.nodes]
+    return replace(motion.path, start=motion.q[0], nodes=nodes)
+
+
+def joint_bounds(cell: Cell) -> JointLimitsInTime:
+    """Limits of all joints of a cell: stated ones, else those that the cell assumes."""
+    velocity, acceleration, jerk = [], [], []
+    for robot in cell.robots:
+        for index, joint in enumerate(robot.model.joints):
+            limit = acceleration_limit(robot, index)[0]
+            velocity.append(joint.velocity)
+            acceleration.append(np.inf if limit is None else limit)
+            jerk.append(retimed_jerk_limit(cell, robot, index) or np.inf)
+    return JointLimitsInTime(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowLimits:
+    """The limits of a cell in rows of one phase, as the checks compute them.
+
+    Attributes:
+        path: The joints over the nominal time; needed for the speed of the tools in the world only.
+    """
+
+    scene: Scene  # the scene of the cell
+    paths: tuple[ClockedPath, ...]  # paths of the tasks that are worked on
+    bounds: JointLimitsInTime  # limits of all joints
+    step: float  # time between two rows in [s]
+    path: JointPath | None = None
+    errors: StepErrors | None = None  # errors of the tools between rows; None where they do not bound the speed
+
+    def shares(self, times: Array, q: Array) -> tuple[Array, Array, Array]:
+        """Largest velocity, acceleration and jerk of each joint, in shares of the limits, shape (nq,) each."""
+        cell, loads = self.scene.cell, []
+        for robot in cell.robots:
+            positions, cycle = q[:, cell.columns(robot.name)], robot.controller_cycle
+            signed = point_accelerations(times, positions)[..., None]
+            loads.append(
+                (
+                    [use.peak_velocity for use in joint_uses(robot, times, positions)],
+                    joint_accelerations(times, positions, cycle=cycle).values.max(axis=0),
+                    jerks(times, signed, window=cycle).max(axis=0),
+                )
+            )
+        velocity, acceleration, jerk = (np.concatenate(ratios) for ratios in zip(*loads, strict=True))
+        return velocity / self.bounds.velocity, acceleration / self.bounds.acceleration, jerk / self.bounds.jerk
+
+    def slower(self, sigma: Array, q: Array) -> float:
+        """By which factor rows have to be slower for every limit to hold in them.
+
+        Args:
+            sigma: Nominal times of the rows in [s], shape (N,).
+            q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        """
+        times = np.round(np.arange(len(q)) * self.step, TIME_DECIMALS)
+        velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
+        feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
+        tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, self._part_share(times, q) ** 0.5)
+
+    def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
+        """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
+
+        Args:
+            sigma: Nominal times of the rows in [s], shape (N,).
+            times: Their times in [s], shape (N,).
+        """
+        return {
+            path.task.name: float((np.diff(path.targets(sigma)[2]) / np.diff(times)).max() / _largest_feed(path.task))
+            for path in self.paths
+            if path.task.feed is not None
+        }
+
+    def _waits(self, sigma: Array) -> float:
+        """Longest stretch of nominal time of a delay or a dwell in a step, as a share of the step."""
+        within = [
+            np.minimum(sigma[1:], end) - np.maximum(sigma[:-1], begin)
+            for path in self.paths
+            for begin, end in fixed_rests(path.task, path.corners)
+        ]
+        return float(np.max(within, initial=0.0) - ROUNDING) / self.step
+
+    def feed_share(self, sigma: Array) -> Array:
+        """Share of the speed limits of the tools that is taken up at the speed of the nominal time, shape (N,)."""
+        share = np.zeros(len(sigma))
+        for path in self.paths:
+            if path.task.feed is not None:
+                twists = path.targets(sigma)[1]
+                is_moving = (sigma >= path.start) & (sigma <= path.end)
+                share = np.maximum(share, is_moving * np.linalg.norm(twists[:, :3], axis=1) / path.task.feed)
+            for begin, end in fixed_rests(path.task, path.corners):
+                share = np.maximum(share, (sigma >= begin) & (sigma <= end))
+        if self.errors is not None:
+            share = np.maximum(share, self.errors.steepness(sigma, self.step))
+        if self.path is not None:
+            q, move = self.path.at(sigma), 0.5 * NOMINAL_STEP * self.path.at(sigma, 1)
+            share = np.maximum(share, self._tool_moves(q - move, q + move) / NOMINAL_STEP)
+        return share
+
+    def _tool_moves(self, before: Array, after: Array) -> Array:
+        """Longest moves of a tool tip in the world, divided by the speed that is allowed, in [s], shape (N,)."""
+        cell, limit = self.scene.cell, si_or_none(self.scene.cell.checks.tool_speed_mm_s)
+        longest = np.zeros(len(before))
+        for robot in cell.robots if limit is not None else ():
+            columns, chain = cell.columns(robot.name), self.scene.chains[robot.name]
+            at = [chain.tool_poses(q[:, columns])[:, :3, 3] for q in (before, after)]
+            longest = np.maximum(longest, np.linalg.norm(at[1] - at[0], axis=1) / limit)
+        return longest
+
+    def _part_share(self, times: Array, q: Array) -> float:
+        """Acceleration of the part as a share of what is allowed."""
+        cell, limit = self.scene.cell, self.scene.cell.checks.part_acceleration_m_s2
+        if limit is None or not cell.positioners:
+            return 0.0
+        by_robot = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
+        X_WP = part_poses(cell, self.scene.chains, by_robot)
+        cycle = cell.robot(cell.positioners[0]).controller_cycle
+        return part_acceleration(cell, times, X_WP, window=cycle).corner.peak / limit
+
+
+def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
+    """The limits in the rows of one phase; its schedule names the tasks."""
+    return RowLimits(scene, schedule.paths, joint_bounds(scene.cell), scene.cell.motion.step)
+
+
+def transfer_retimer(scene: Scene) -> Retimer:
+    """What transfer moves are timed by: the limits of all joints, of the tools in the world and of the part."""
+    limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
+    return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)
+
+
+def fixed_rates(paths: Sequence[ClockedPath]) -> tuple[FixedRate, ...]:
+    """Where the rate of the nominal time is demanded: while a process is on, and in dwells."""
+    rates = []
+    for path in paths:
+        process = path.task.process
+        if process is not None:
+            rates.append(FixedRate(begin=path.start, end=path.end, tolerance=process.tolerance))
+        rates += [FixedRate(begin=begin, end=end) for begin, end in fixed_rests(path.task, path.corners)]
+    return tuple(rates)
+
+
+def _largest_feed(task: Task) -> float:
+    """Largest speed in [m/s] of a task with a feed."""
+    return (task.feed or np.inf) * (1.0 + (task.process.tolerance if task.process else 0.0))
+
+
+def _nominal_times(scene: Scene, schedule: Schedule, path: JointPath, cycle: float | None) -> Array:
+    """Nominal times of the rows of one phase in [s], shape (N,): as fast as possible, or within a cycle in [s]."""
+    errors, motion = StepErrors(scene, schedule.paths, path), scene.cell.motion
+    limits = replace(row_limits(scene, schedule), path=path, errors=errors)
+    retimer = Retimer(
+        bounds=limits.bounds,
+        step=motion.step,
+        feed_share=limits.feed_share,
+        slower=limits.slower,
+        fixed_rates=fixed_rates(schedule.paths),
+        errors=errors,
+    )
+    fastest = retimer.fastest(path)
+    if cycle is None:
+        return fastest.sigma
+    steps = round(cycle / motion.step)
+    if fastest.steps <= steps:
+        sigma = fastest.lasting(steps).sigma
+        if len(sigma) != steps + 1:
+            raise InputError(
+                f"{scene.cell.origin.at('motion.timing')}: expected a cycle of {fastest.steps * motion.step:g} s, as "
+                f"feeds of processes, delays and dwells decide how long all motion takes, got {cycle:g}"
+            )
+        if limits.slower(sigma, path.at(sigma)) <= 1.0:
+            return sigma
+    least = max(fastest.steps, steps + (fastest.steps <= steps)) * motion.step
+    raise InputError(
+        f"{scene.cell.origin.at('motion.timing')}: expected a cycle of at least {least:.6g} s, in which all joints "
+        f"keep their limits along this path, got {cycle:g}; make it longer, or write fastest"
+    )

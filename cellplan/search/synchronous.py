@@ -1,0 +1,50 @@
+"""Jobs that a search can judge: one synchronous motion by the weighted pseudo-inverse."""
+
+from collections.abc import Collection
+
+from cellplan.errors import InputError
+from cellplan.model.cell.cell import Cell, Mode, Timing
+
+
+def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> None:
+    """Refuse jobs whose motion is not one synchronous pseudo-inverse motion on the clock of the cell.
+
+    Args:
+        what: What the job is needed for, as messages name it.
+        paths: Robots that may have a given joint path.
+
+    Raises:
+        InputError: The job is another one.
+    """
+    motion, solver = cell.motion, cell.solver
+    at = cell.origin.at
+    if cell.program is not None:
+        raise InputError(f"{at('program')}: expected a cell without a program from home to home for {what}")
+    if motion.mode not in {Mode.SIMULTANEOUS, Mode.PART_AT_REST}:
+        raise InputError(f"{at('motion.mode')}: expected simultaneous or part_at_rest for {what}, got '{motion.mode}'")
+    if motion.timing is not Timing.AS_WRITTEN:
+        raise InputError(
+            f"{at('motion.timing')}: expected as_written for {what}, got '{motion.timing}': it states the shortest "
+            "cycle by the time laws"
+        )
+    if motion.locked:
+        raise InputError(f"{at('motion.locked_joints')}: expected no failed joints for {what}")
+    if motion.cyclic:
+        raise InputError(f"{at('motion.cyclic')}: expected false for {what}, got true")
+    for robot in cell.robots:
+        if robot.path is not None and robot.name not in paths:
+            raise InputError(f"{at(f'robots.{robot.name}.path')}: expected no given joint path for {what}: remove it")
+    for key in solver.nonminimal_keys:
+        raise InputError(
+            f"{at(f'solver.{key}')}: expected the weighted pseudo-inverse without goals, with constant weights, for "
+            f"{what}"
+        )
+
+
+def is_searchable(cell: Cell) -> bool:
+    """Whether the job is one that a search can judge; see ``refuse_other_jobs``."""
+    try:
+        refuse_other_jobs(cell, "a search")
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,91 @@
+"""Signals, tools and bases of a cell file: those that controllers of a kind have, and no others."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cellplan.errors import InvalidFileError
+from cellplan.files.cell.load import load_cell
+from cellplan.model.cell.cell import Cell
+from cellplan.model.settings.controllers import HandshakeEntry
+
+KUKA = "    model: kuka_kr6\n"
+LEADS = "{id: c1, handshake: {output: 5, inputs: {worker: 7}}}"
+
+Load = Callable[..., Cell]
+
+
+@pytest.fixture
+def connected(base_cell: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Load:
+    """Loads the small cell with the holder on a controller, after replacing pieces of its text."""
+    monkeypatch.chdir(tmp_path)
+    text = base_cell.replace(KUKA, f"{KUKA}    controller: {LEADS}\n")
+    text = text.replace("part:\n", "controllers:\n  c1: {kind: kuka}\npart:\n", 1)
+
+    def load_changed(*changes: tuple[str, str]) -> Cell:
+        changed = text
+        for old, new in changes:
+            assert changed.count(old) == 1, f"{old!r} must occur once"
+            changed = changed.replace(old, new)
+        Path("c").write_text(changed, encoding="utf-8")
+        return load_cell("c")
+
+    return load_changed
+
+
+@pytest.mark.parametrize(("kind", "numbers"), [("ur", (0, 7)), ("kuka", (1, 4096)), ("staubli", (0, 65535))])
+def test_the_first_and_the_last_signal_of_a_kind_can_be_stated(
+    connected: Load, kind: str, numbers: tuple[int, int]
+) -> None:
+    first, last = numbers
+    signals = ("output: 5, inputs: {worker: 7}", f"output: {first}, inputs: {{worker: {last}}}")
+
+    holder = connected(("kind: kuka", f"kind: {kind}"), signals).robot("holder").control
+
+    assert holder is not None
+    assert holder.handshake == HandshakeEntry(output=first, inputs={"worker": last})
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected", "signals"),
+    [
+        ("kuka", "a whole number from 1 to 4096", ["0", "4097", "go"]),
+        ("ur", "a whole number from 0 to 7", ["8", "go"]),
+        ("abb, tasks: {T_1: ROB_1}", "a name", ["0", "17"]),
+    ],
+)
+@pytest.mark.parametrize("place", ["output", "inputs.worker"])
+def test_signals_that_a_kind_does_not_have_are_refused(
+    connected: Load, kind: str, expected: str, signals: list[str], place: str
+) -> None:
+    """At the line of the signal, and nothing else is said."""
+    sound = (
+        {"output": "doThere", "inputs.worker": "diGo"} if kind.startswith("abb") else {"output": 5, "inputs.worker": 7}
+    )
+    verb = "name" if kind.startswith("abb") else "number"
+    for signal in signals:
+        used = sound | {place: signal}
+        text = f"output: {used['output']}, inputs: {{worker: {used['inputs.worker']}}}"
+        got = signal if signal.isdecimal() else f"{signal!r}"
+
+        with pytest.raises(InvalidFileError) as caught:
+            connected(("kind: kuka", f"kind: {kind}"), ("output: 5, inputs: {worker: 7}", text))
+
+        assert str(caught.value).splitlines() == [
+            f"c:6: robots.holder.controller.handshake.{place}: expected {expected}, as controllers of kind "
+            f"{kind.partition(',')[0]} {verb} their signals, got {got}"
+        ]
+
+
+@pytest.mark.parametrize("key", ["tool_number", "base_number"])
+def test_kuka_controllers_have_as_many_tools_and_bases_as_they_have(connected: Load, key: str) -> None:
+    leads = "{id: c1, handshake: "
+    control = connected((leads, f"{{id: c1, {key}: 128, handshake: ")).robot("holder").control
+
+    assert getattr(control, key) == 128
+    with pytest.raises(InvalidFileError) as caught:
+        connected((leads, f"{{id: c1, {key}: 129, handshake: "))
+    assert str(caught.value).splitlines() == [
+        f"c:6: robots.holder.controller.{key}: expected at most 128, as many as controllers of kind kuka have, got 129"
+    ]

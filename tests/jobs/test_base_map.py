@@ -1,0 +1,165 @@
+"""Maps of a base: verdicts beside plain solves, symmetry, messages, files."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cellplan import BaseGrid, base_map, load_cell, solve, write_base_map
+from cellplan.cli.main import run
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.jobs.base_map.prepared import prepared
+from cellplan.model.cell.cell import Cell
+from cellplan.search.base_map.verdicts import PlaceVerdict, Verdict, judge, verdicts_at_start
+
+CELLS = Path(__file__).resolve().parents[2] / "cells"
+CELL = CELLS / "planar_pair.yaml"
+STARTS = {"robots.left.start_deg": [50, -85, 35], "motion.duration_s": 2.0, "motion.step_s": 0.02}
+SOLVED = {**STARTS, "solver.integrator": "accurate", "tasks.circle.tolerance.position_mm": 0.5}
+GRID = BaseGrid(x=(1000, 2600), y=(-600, 1000), step=200)
+
+
+@pytest.fixture(scope="module")
+def cell() -> Cell:
+    return load_cell(CELL).with_values(SOLVED)
+
+
+@pytest.fixture(scope="module")
+def mapped(cell: Cell) -> Any:
+    return base_map(cell, "right", GRID)
+
+
+def passes(cell: Cell, place: Any) -> bool:
+    """Whether a plain solve of a place passes every check."""
+    values = {"robots.right.base.x_mm": place["x_mm"], "robots.right.base.y_mm": place["y_mm"]}
+    try:
+        solution = solve(cell.with_values({**values, "robots.right.start_deg": place["start"] or "auto"}))
+    except (InputError, NoSolutionError):
+        return False
+    return all(run.report.passed for run in solution.runs)
+
+
+@pytest.mark.slow
+def test_ten_random_places_pass_or_fail_as_plain_solves_do(cell: Cell, mapped: Any) -> None:
+    chosen = np.random.default_rng(5).choice(len(mapped["places"]), 10, replace=False).tolist()
+    places = [mapped["places"][place] for place in chosen]
+
+    verdicts = [place["verdict"] == "passes" for place in places]
+
+    assert verdicts == [passes(cell, place) for place in places]
+    assert 2 <= sum(verdicts) <= 8  # both kinds are among them
+
+
+@pytest.mark.parametrize("verdict", ["passes", "limit"])
+def test_a_place_passes_or_fails_as_a_plain_solve_does(cell: Cell, mapped: Any, verdict: str) -> None:
+    place = [place for place in mapped["places"] if place["verdict"] == verdict][3]
+
+    assert passes(cell, place) == (verdict == "passes")
+
+
+def test_a_map_moves_with_its_cell(cell: Cell, mapped: Any) -> None:
+    by = {"robots.left.base.x_mm": 400, "robots.left.base.y_mm": -200}
+    moved = cell.with_values({**by, "robots.right.base.x_mm": 2300, "robots.right.base.y_mm": 100})
+
+    other = base_map(moved, "right", BaseGrid(x=(1400, 3000), y=(-800, 800), step=200))
+
+    assert [place["verdict"] for place in other["places"]] == [place["verdict"] for place in mapped["places"]]
+    cycles = [[p["figures"]["cycle_s"] for p in entry["places"] if p["figures"]] for entry in (mapped, other)]
+    np.testing.assert_allclose(*cycles, rtol=1e-4)
+
+
+def test_every_place_has_a_verdict_and_what_fails_has_a_reason(mapped: Any) -> None:
+    assert sum(mapped["counts"].values()) == len(mapped["places"]) == 81
+    assert all((place["reason"] == "") == (place["verdict"] == "passes") for place in mapped["places"])
+    best = [mapped["places"][entry["place"]]["figures"]["cycle_s"] for entry in mapped["best"]]
+    assert best == sorted(best)
+    assert best[0] == min(place["figures"]["cycle_s"] for place in mapped["places"] if place["verdict"] == "passes")
+
+
+def test_equal_maps_have_equal_bytes(cell: Cell, mapped: Any, tmp_path: Path) -> None:
+    write_base_map(mapped, tmp_path / "one")
+    write_base_map(base_map(cell, "right", GRID), tmp_path / "other")
+
+    files = [{file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "other")]
+    assert files[0] == files[1]
+    assert set(files[0]) == {"map.json", "map.html", "map.svg"}
+    assert json.loads(files[0]["map.json"]) == json.loads(json.dumps(mapped))
+
+
+def test_the_picture_is_written_in_requested_formats_too(mapped: Any, tmp_path: Path) -> None:
+    write_base_map(mapped, tmp_path / "map", formats=["png"])
+    write_base_map(mapped, tmp_path / "map", formats=["pdf"])  # an earlier map is replaced
+
+    assert {file.name for file in (tmp_path / "map").iterdir()} == {"map.json", "map.html", "map.svg", "map.pdf"}
+    assert (tmp_path / "map" / "map.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_base_is_turned_to_the_part_on_request(cell: Cell) -> None:
+    grid = BaseGrid(x=(1900, 1900), y=(0, 300), step=300, yaw="toward")
+
+    angles = [place["yaw_deg"] for place in base_map(cell, "right", grid)["places"]]
+
+    assert angles[0] != angles[1]
+    assert all(90.0 < abs(angle) <= 180.0 for angle in angles)  # the part is on the side of smaller x
+
+
+def test_the_best_place_is_certified_by_a_solve(cell: Cell) -> None:
+    few = base_map(cell, "right", BaseGrid(x=(1900, 1900), y=(300, 300)), certify=1)
+
+    assert few["best"][0]["certified"]["status"] == "passed"
+    assert few["best"][0]["options"][:2] == ["robots.right.base.x_mm=1900", "robots.right.base.y_mm=300"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--robot", "left"], "--robot: expected a robot with a task that does not hold the part (right), got 'left'"),
+        (["--robot", "right", "--x", "9"], "--x: expected FROM:TO in mm, such as 500:2000, got '9'"),
+        (["--robot", "right", "--y", "9:3"], "--y: expected FROM:TO in mm with FROM not above TO, got 9:3"),
+        (["--robot", "right", "--yaw", "left"], "--yaw: expected degrees or toward, got 'left'"),
+        (["--robot", "right", "--grid", "0"], "--grid: expected millimetres above 0, got 0"),
+        (
+            ["--robot", "right", "--mode", "pairwise"],
+            "motion.mode: expected simultaneous or part_at_rest for a map of bases, got 'pairwise'",
+        ),
+        (
+            ["--robot", "right", "--set", "program={}"],
+            "program: expected a cell without a program from home to home for a map of bases",
+        ),
+    ],
+)
+def test_what_cannot_be_mapped_is_one_located_line(
+    options: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    status = run(["map", str(CELL), "-q", "-o", str(tmp_path / "map"), *options])
+
+    assert status == 2
+    error = capsys.readouterr().err.strip()
+    assert error.endswith(message)
+    assert "\n" not in error
+
+
+@pytest.mark.parametrize(("clearance", "verdict"), [(20, Verdict.PASSES), (60, Verdict.COLLISION)])
+def test_starts_judged_together_are_judged_as_each_by_itself(clearance: float, verdict: Verdict) -> None:
+    near = load_cell(CELL).with_values({**STARTS, "checks.clearance_mm": clearance})  # the arms are 30 mm apart
+    ready = prepared(near, "right", BaseGrid(x=(1900, 2300), y=(100, 100), step=400))
+    q, at = ready.starts()
+    known, inside = verdicts_at_start(ready.job, q, at)
+    q, at = q[inside], at[inside]
+
+    together = judge(ready.job, q, at)
+
+    alone: dict[int, PlaceVerdict] = {}
+    for start, place in zip(q, at.tolist(), strict=True):
+        (judgement,) = judge(ready.job, start[None], np.array([place])).values()
+        alone[place] = judgement.or_better(alone.get(place))
+    assert len(known) == 2
+    assert len(set(at.tolist())) < len(at)
+    assert verdict in {value.verdict for value in together.values()}
+    assert together.keys() == alone.keys()
+    for place, judgement in together.items():
+        assert judgement.verdict is alone[place].verdict
+        np.testing.assert_array_equal(judgement.start, alone[place].start)
+        assert judgement.cycle == pytest.approx(alone[place].cycle, rel=1e-9)

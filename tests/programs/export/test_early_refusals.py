@@ -1,0 +1,179 @@
+"""What the files of a run say against an export is said at once, all of it, before anything is verified."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from cellplan import open_gate
+from cellplan.cli.main import run as run_command
+from cellplan.errors import InputError, NotVerifiedError
+from cellplan.jobs.recover.state import refuse_state
+from cellplan.model.report.exported import Promise
+from cellplan.model.report.verified_run import ReadRun
+from cellplan.model.settings.controllers import ControllerEntry, HandshakeEntry, KindName, RobotControlEntry
+from cellplan.programs.dialects import DIALECTS
+from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.prepare import refuse_unfit
+from cellplan.programs.export.several import refuse_unfit_run
+
+NAMES = ("left", "right", "idle")
+
+
+@pytest.fixture(scope="module")
+def read(sound: Path) -> ReadRun:
+    """The run as it was read; what is verified after that is of no account."""
+    runs: list[ReadRun] = []
+    open_gate(sound / "run", cell=sound / "cell" / "small.yaml", refuse=runs.append)
+    return runs[0]
+
+
+def on(read: ReadRun, kind: KindName, *, handshake: HandshakeEntry | None = None, **stated: float) -> ReadRun:
+    """The run with all robots on one controller."""
+    control = RobotControlEntry(id="c", handshake=handshake)
+    robots = tuple(replace(robot, control=control) for robot in read.cell.robots)
+    controllers = {"c": ControllerEntry(kind=kind, **stated)}
+    return replace(read, cell=replace(read.cell, robots=robots, controllers=controllers))
+
+
+def refusing(form: str, choice: Choice) -> Callable[[ReadRun], None]:
+    return partial(refuse_unfit_run, formats={form: True}, choice=choice, folder=Path("out"))
+
+
+@pytest.mark.parametrize(
+    ("refuse", "reason"),
+    [
+        (refusing("krl", Choice()), "robots.left.controller: expected the controller that plays krl, got none"),
+        (refusing("csv", Choice(robots=("lefty",))), "--robot: expected one of left, right, idle, got 'lefty'"),
+        (refusing("csv", Choice(promise=Promise.SYNCHRONISED)), "--promise: expected timed with csv"),
+        (refusing("wide", Choice(robots=("left",))), "--format: expected no choice of robots"),
+        (refusing("ros2", Choice(split=1)), "--split: expected 2 to 100000 rows with ros2, got 1"),
+        (
+            lambda read: refuse_state(read.cell, read.motion, at=99.0, frozen={}, keep=()),
+            "--at: expected a time of the program, 0 to ",
+        ),
+        (
+            lambda read: refuse_state(read.cell, read.motion, at=0.1, frozen={}, keep=("lefty",)),
+            "--keep: expected the name of a robot",
+        ),
+    ],
+)
+def test_nothing_is_verified_before_a_refusal(sound: Path, refuse: Callable[[ReadRun], None], reason: str) -> None:
+    stages: list[str] = []
+
+    with pytest.raises(InputError) as refusal:
+        open_gate(
+            sound / "run",
+            cell=sound / "cell" / "small.yaml",
+            refuse=refuse,
+            progress=lambda stage, _: stages.append(stage),
+        )
+
+    assert str(refusal.value).startswith(reason)
+    assert stages == []
+
+
+def test_every_robot_without_a_controller_is_named(read: ReadRun) -> None:
+    with pytest.raises(InputError) as refusal:
+        refuse_unfit(read, DIALECTS["val3"], Choice())
+
+    assert str(refusal.value).splitlines() == [
+        f"robots.{name}.controller: expected the controller that plays val3, got none" for name in NAMES
+    ]
+
+
+def test_all_that_a_stream_needs_is_said_at_once(read: ReadRun) -> None:
+    lagging = on(read, "ur")
+
+    with pytest.raises(InputError) as refusal:
+        refuse_unfit(lagging, DIALECTS["stream"], Choice(thin_mm=None))
+
+    assert str(refusal.value).count("controllers.c.latency_ms: expected the time by which its robots follow") >= 1
+
+
+def test_signals_of_all_robots_and_their_names_are_said_at_once(read: ReadRun) -> None:
+    """The motion allows no other order: what else is missing is said beside that, with a cure."""
+    urs = on(read, "kuka", handshake=HandshakeEntry(output="x", inputs={"left": "y"}))
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        refuse_unfit(urs, DIALECTS["krl"], Choice())
+
+    first, cure, *needed = refusal.value.findings
+    assert first.startswith("krl: not sequence only: ")
+    assert "left, right, idle share controller 'c', but krl as cellplan writes it moves each robot by" in cure
+    said = "\n".join(needed)
+    for name in ("right", "idle"):  # the leader reads all others
+        assert f"robots.left.controller.handshake.inputs: expected the input that '{name}' sets, got none" in said
+    for name in NAMES:
+        assert f"robots.{name}.controller.handshake.output: expected a whole number from 1 to 4096" in said
+
+
+def test_the_cure_is_no_controller_that_all_robots_have_already(read: ReadRun) -> None:
+    for kind, form in (("staubli", "val3"), ("kuka", "krl")):
+        with pytest.raises(NotVerifiedError) as refusal:
+            refuse_unfit(on(read, kind), DIALECTS[form], Choice())
+
+        assert "state one controller" not in str(refusal.value)
+        assert "--format stream, csv" in str(refusal.value)
+
+
+def test_of_several_formats_that_all_are_refused_each_says_why(read: ReadRun) -> None:
+    formats = {"krl": True, "val3": False}
+
+    with pytest.raises(NotVerifiedError) as refusal:
+        refuse_unfit_run(read, formats, Choice(robots=("left",)), folder=Path("out"))
+
+    assert str(refusal.value).splitlines() == [
+        f"{form}: robots.left.controller: expected the controller that plays {form}, got none"
+        for form in ("krl", "val3")
+    ]
+
+
+def test_a_format_that_can_be_written_keeps_several_from_being_refused(read: ReadRun) -> None:
+    stages: list[str] = []
+
+    refuse_unfit_run(read, {"krl": True, "csv": True}, Choice(), folder=Path("out"))
+    stages.append("verified")
+
+    assert stages == ["verified"]
+
+
+def test_no_folder_is_announced_that_is_not_there(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "--format",
+        "krl",
+        "--format",
+        "val3",
+        "-o",
+        str(tmp_path / "programs"),
+        "--cell",
+        str(sound / "cell" / "small.yaml"),
+        "-q",
+    ]
+
+    assert run_command(["export", str(sound / "run"), *words]) == 2
+
+    out, err = capsys.readouterr()
+    assert "programs:" not in out + err
+    assert not (tmp_path / "programs").exists()
+
+
+def test_programs_of_another_run_are_refused_before_that_is_verified(
+    sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, cell = tmp_path / "csv", str(sound / "cell" / "small.yaml")
+    words = ["--format", "csv", "-o", str(folder), "--cell", cell, "-q"]
+    assert run_command(["export", str(sound / "run"), *words]) == 0
+    record = folder / "export.json"
+    record.write_text(record.read_text().replace('"run": "', '"run": "0'))
+    capsys.readouterr()
+
+    assert run_command(["verify", str(folder), "--run", str(sound / "run"), "--cell", cell, "-v"]) == 2
+
+    err = capsys.readouterr().err
+    assert "the programs were made from another run" in err
+    assert "certifying" not in err
