@@ -89,7 +89,7 @@ def test_the_integrator_is_the_one_a_cell_file_with_these_words_would_take(
 
     assert cell.solver.is_accurate == (integrator == "accurate")
     (tmp_path / "again.yaml").write_text(render_cell(cell), encoding="utf-8")
-    assert load_cell(tmp_path / "again.yaml").solver.integrator is Integrator(integrator)
+    assert load_cell(tmp_path / "again.yaml").solver.integrator == Integrator(integrator)
 
 
 def test_a_method_against_the_integrator_of_the_cell_file_is_refused(cell_with: Write) -> None:

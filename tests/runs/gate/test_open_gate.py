@@ -208,7 +208,7 @@ def test_a_run_with_another_integrator_passes_and_states_what_was_chosen(
     run = open_gate(tmp_path / "run", cell=sound / "cell" / "small.yaml")
 
     assert list(run.remarks) == remarks
-    assert run.cell.solver.integrator is Integrator.EULER
+    assert run.cell.solver.integrator == Integrator.EULER
 
 
 def test_how_finely_a_motion_was_resolved_is_left_to_the_planner(sound: Path, tmp_path: Path) -> None:
