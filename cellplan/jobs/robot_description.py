@@ -8,7 +8,7 @@ from cellplan.geometry.transforms import rpy_from_rotation
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.robot.robot_description import DescribedJoint, DescribedMimic, RobotDescription
 from cellplan.model.units import DEG, MM, joint_unit
-from cellplan.report.record.sections.controller import zero_record
+from cellplan.report.record.sections.rests_on import zero_record
 
 # Record
 

@@ -111,7 +111,7 @@ def _solve_program(
     cell: Cell, *, task: str | None, near: Branches | None, early: EarlyClearance | None, progress: Progress
 ) -> tuple[Scene, Solution]:
     """The stages of a program from home to home, verified but for their clearance, and the scene with the part held."""
-    from cellplan.planning.sequence.only_task import with_only_task
+    from cellplan.planning.sequence.arrangement import with_only_task
     from cellplan.runs.plan.sequence import plan_program  # with all transfer moves, which few cells have
 
     planned = plan_program(cell if task is None else with_only_task(cell, task), near=near, progress=progress)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies
 
-from cellplan.certify import bound, search
+from cellplan.certify import bound
+from cellplan.certify import certify as search
 from cellplan.certify.certify import certify
 from cellplan.certify.pair_state import SEARCH_TOL
 from cellplan.certify.survey import CLOSEST_COUNT, Survey

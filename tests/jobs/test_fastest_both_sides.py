@@ -12,10 +12,9 @@ from builders.two_phases import PAIR
 from cellplan import Cell, load_cell, solve
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.jobs.fastest.result import fastest_lines, fastest_record
-from cellplan.jobs.fastest.scaling import scaled_values
 from cellplan.jobs.fastest.shortest import fastest
 from cellplan.jobs.fastest.time_laws import RootBracket
-from cellplan.jobs.fastest.timed_program import Binding, Law, TimedProgram
+from cellplan.jobs.fastest.timed_program import Binding, Law, TimedProgram, scaled_values
 from cellplan.model.progress import silent
 
 CELLS = Path(__file__).resolve().parents[2] / "cells"

@@ -68,8 +68,7 @@ def _record(result: "CellCheck") -> dict[str, Any]:
     """The result in printed units."""
     from cellplan.report.record.common import check_record, number
     from cellplan.report.record.sections.clearance import left_out_record
-    from cellplan.report.record.sections.open_surfaces import open_surfaces_record
-    from cellplan.report.record.sections.rests_on import missing_tools
+    from cellplan.report.record.sections.rests_on import missing_tools, open_surfaces_record
     from cellplan.report.record.sections.solver import moved_start_record
     from cellplan.report.record.sections.tasks import direction_record
     from cellplan.report.text.notes import open_surface_notes

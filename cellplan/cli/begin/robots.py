@@ -100,8 +100,8 @@ def _described(model: str, options: RobotsOptions, xacro_args: dict[str, str]) -
 def _record(name: str, model: "RobotModel") -> dict[str, Any]:
     """One robot in printed units."""
     from cellplan.jobs.robot_description import published_reach
-    from cellplan.report.record.sections.controller import zero_record
-    from cellplan.report.record.sections.joint_limits import joint_record
+    from cellplan.report.record.sections.joints import joint_record
+    from cellplan.report.record.sections.rests_on import zero_record
     from cellplan.scene.kinematics.reach import arm_reach
 
     return {
@@ -117,7 +117,7 @@ def _record(name: str, model: "RobotModel") -> dict[str, Any]:
 
 def _lines(record: dict[str, Any]) -> list[str]:
     """One robot as text: joint, range, largest speed."""
-    from cellplan.report.record.sections.joint_limits import limits_text
+    from cellplan.report.record.sections.joints import limits_text
 
     lines = [record["name"], f"  reach {record['reach_mm']:g} mm from the first axis; {record['source']}"]
     if (published := record["published_reach"]) is not None:

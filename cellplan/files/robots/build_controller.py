@@ -15,7 +15,7 @@ from cellplan.files.yaml.reader import YamlDocument, read_yaml
 from cellplan.geometry.arrays import Array
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import Joint, RobotModel
-from cellplan.model.settings.controller import ControllerZeroEntry
+from cellplan.model.settings.controllers import ControllerZeroEntry
 from cellplan.model.settings.units import si_or_none
 
 PARALLEL: Final = 0.999  # [-] cosine of two axes that count as parallel: 2.6 deg

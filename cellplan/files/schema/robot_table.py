@@ -16,7 +16,7 @@ from cellplan.files.schema.robot import (
     TurningSpeed,
 )
 from cellplan.files.schema.shapes import MESH_FILE, MESH_UNIT, SOLID_SHAPES, MeshUnit, SphereEntry, require_unit_of
-from cellplan.model.settings.controller import ControllerZeroEntry
+from cellplan.model.settings.controllers import ControllerZeroEntry
 from cellplan.model.settings.entry import (
     NOT_TURNED,
     ORIGIN,

@@ -6,9 +6,15 @@ import numpy as np
 
 from cellplan.errors import NotPlanarError
 from cellplan.geometry.transforms import Array, inverse
-from cellplan.jobs.explain.derivations.coupling import PLANE, coupling_graph
 from cellplan.jobs.explain.derivations.davies import network
-from cellplan.jobs.explain.derivations.graph import Circuit, CouplingGraph, circuits, spanning_tree
+from cellplan.jobs.explain.derivations.graph import (
+    PLANE,
+    Circuit,
+    CouplingGraph,
+    circuits,
+    coupling_graph,
+    spanning_tree,
+)
 from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.motion.plan import Phase
 from cellplan.model.task.task import Frame, PlaneName

@@ -8,7 +8,7 @@ from cellplan.jobs.explain.explain import MatrixShape, Structure
 from cellplan.model.cell.cell import Cell, Grasp, Robot
 from cellplan.model.task.task import Task
 from cellplan.report.record.common import Record, number
-from cellplan.report.record.sections.joint_limits import joint_record, limits_text
+from cellplan.report.record.sections.joints import joint_record, limits_text
 
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
 TOOL_AXIS = ("across_tool_1", "across_tool_2")  # what free spin leaves of the three turns

@@ -7,8 +7,7 @@ from typing import Final, Self
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.input.findings import shown
-from cellplan.jobs.fastest.scaling import scaled_values, steps_within
-from cellplan.jobs.fastest.timed_program import Law, SolvedAt, TimedProgram
+from cellplan.jobs.fastest.timed_program import Law, SolvedAt, TimedProgram, scaled_values, steps_within
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
 

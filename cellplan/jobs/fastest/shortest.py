@@ -9,9 +9,16 @@ from typing import Final
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.jobs.fastest.demand import MetDemand, calmest, refuse_unless_possible
-from cellplan.jobs.fastest.scaling import refuse_fixed_times, scaled_values, steps_within, whole_steps
 from cellplan.jobs.fastest.time_laws import shortest_by_time_laws
-from cellplan.jobs.fastest.timed_program import Law, SolvedAt, TimedProgram
+from cellplan.jobs.fastest.timed_program import (
+    Law,
+    SolvedAt,
+    TimedProgram,
+    refuse_fixed_times,
+    scaled_values,
+    steps_within,
+    whole_steps,
+)
 from cellplan.model.cell.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent

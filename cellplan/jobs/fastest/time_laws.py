@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import NoSolutionError, TooFewStepsError
-from cellplan.jobs.fastest.scaling import NEAR, scaled_values
-from cellplan.jobs.fastest.timed_program import Binding, Law, SolvedAt, TimedProgram
+from cellplan.jobs.fastest.timed_program import NEAR, Binding, Law, SolvedAt, TimedProgram, scaled_values
 from cellplan.model.cell.cell import Cell
 from cellplan.model.task.task import Task
 from cellplan.model.units import MM

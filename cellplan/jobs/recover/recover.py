@@ -15,7 +15,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.planning.timing.schedule import TIME_DECIMALS
-from cellplan.report.record.sections.controller import zero_text
+from cellplan.report.record.sections.rests_on import zero_text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.cell.changes import plain_values
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.fastest.scaling import refuse_fixed_times, scaled_values, whole_steps
+from cellplan.jobs.fastest.timed_program import refuse_fixed_times, scaled_values, whole_steps
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.limits import standing_of
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch

@@ -6,10 +6,11 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.acceleration import CycleTime
-from cellplan.model.settings.controller import ControllerZeroEntry
-from cellplan.model.settings.entry import Entry, Name, by_kind, rule
+from cellplan.model.settings.entry import Angle, Coordinate, Entry, Name, Text, by_kind, rule
 from cellplan.model.settings.units import Ms, Within
 
+LARGEST_FACTOR: Final = 1_000.0  # [-] a larger coupling is a mistake
+Factor = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
 IDENTIFIER: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 IDENTIFIER_WORDS: Final = "a name of 1 to 32 ASCII letters, digits or '_' that begins with a letter"
 SIGNAL_WORDS: Final = "a name or a whole number from 0"
@@ -21,6 +22,39 @@ LAST_FRAME: Final = 999
 MOST_DECIMALS: Final = 9
 TASK_LIMIT: Final = 64
 SIGNAL_LIMIT: Final = 64
+
+
+class ControllerZeroEntry(Entry):
+    """Joint positions of the controller: sign * model + zero + sum of factor * controller position of another joint."""
+
+    zero_deg: dict[str, Angle] = Field(
+        default={},
+        description="By revolute joint, what the controller shows while the model reads zero; 0 when absent.",
+    )
+    zero_mm: dict[str, Coordinate] = Field(
+        default={},
+        description="By prismatic joint, what the controller shows while the model reads zero; 0 when absent.",
+    )
+    sign: dict[str, Literal[1, -1]] = Field(
+        default={}, description="By joint, -1 where the controller counts the other way round; 1 when absent."
+    )
+    coupling: dict[str, dict[str, Factor]] = Field(
+        default={},
+        description="By joint, the factors of the controller positions of earlier joints of its kind that are added.",
+    )
+    limits_deg: dict[str, tuple[Angle, Angle]] = Field(
+        default={},
+        description="By revolute joint, the smallest and the largest position that the controller allows of what it "
+        "shows: of a coupled joint too, whose range in the model depends on the others.",
+    )
+    source: Text = Field(default="not stated", description="Where this is known from.")
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        """An empty entry would confirm a counting that was never stated."""
+        if not self.model_fields_set:
+            raise rule("expected zero_deg, zero_mm, sign or coupling, or the source that says there are none, got none")
+        return self
 
 
 def _identifier(text: str) -> str:

@@ -12,7 +12,7 @@ from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.collocation.joint_polynomials import CollocatedPath, joined
 from cellplan.planning.collocation.run import AccurateRun
 from cellplan.planning.euler.cycle_closing import SAME_POSE, closing_drift, not_back
-from cellplan.planning.timing.common_cycles import common_cycles
+from cellplan.planning.timing.schedule import common_cycles
 from cellplan.planning.tracking.problem import TrackingProblem
 
 PERIODIC: Final = 3e-9  # [rad] or [m] by which joints may be off after a cycle that is repeated: they would jump by it

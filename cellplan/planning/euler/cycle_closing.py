@@ -9,7 +9,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell, Grasp, Relation, joint_at
 from cellplan.model.motion.motion import Schedule
-from cellplan.planning.timing.common_cycles import SAME_PERIOD, common_cycles
+from cellplan.planning.timing.schedule import SAME_PERIOD, common_cycles
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.planning.tracking.singularity import singular_words
 

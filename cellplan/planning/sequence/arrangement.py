@@ -1,7 +1,7 @@
 """Arrangement of the tasks of a cell into blocks that are worked on one after another."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -213,3 +213,20 @@ class SequenceProgress:
         """Go on to the next task or mark of robots."""
         for robot in robots:
             self._places[robot] += 1
+
+
+def with_only_task(cell: Cell, name: str) -> Cell:
+    """The cell with one of its tasks only, in the order of its robot and after nothing else.
+
+    Raises:
+        InputError: There is no such task.
+    """
+    chosen = next((task for task in cell.tasks if task.name == name), None)
+    if chosen is None:
+        raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{name}'")
+    tasks: tuple[Task, ...] = (replace(chosen, after=()),)
+    left_out = {task.name for task in cell.tasks} - {name}
+    robots = (
+        replace(robot, order=tuple(item for item in robot.order if item not in left_out)) for robot in cell.robots
+    )
+    return replace(cell, robots=tuple(robots), tasks=tasks)

@@ -11,8 +11,7 @@ from cellplan.errors import InputError, TooFewStepsError
 from cellplan.geometry.curves.arc_length import quickly
 from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.clock import Clock
-from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.process_times import demanded_spans, leaves_at, ramp_shares
@@ -29,6 +28,7 @@ WHOLE_TURN: Final = 1e-9  # [rad] a turn per cycle this near to whole turns brin
 TIME_DECIMALS: Final = 12  # decimals kept of k * step, so that 0.001 * 3 reads 0.003
 MOST_VALUES: Final = 10_000_000  # [-] samples times joints: 24 joints for seven minutes at 1 ms
 BYTES_OF_A_VALUE: Final = 600  # [bytes] that a solve takes for each at most: measured 420 with few bodies
+SAME_PERIOD: Final = 1e-9  # [s] difference of cycles that take equally long: rounding
 
 
 def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
@@ -303,3 +303,10 @@ def require_memory(cell: Cell, samples: int) -> None:
         f"{joints}, which take about {samples * joints * BYTES_OF_A_VALUE / 1e9:.2g} GB of memory; make the step at "
         f"least {math.ceil(least / digits) * digits:g} s"
     )
+
+
+def common_cycles(schedule: Schedule) -> Array | None:
+    """Times in [s] between which the cycles of all tasks lie, shape (cycles + 1,); None when they differ."""
+    every = [np.array([task.begin, *task.cycle_ends]) for task in schedule.tasks]
+    same = all(len(times) == len(every[0]) and np.max(np.abs(times - every[0])) <= SAME_PERIOD for times in every)
+    return every[0] if same and len(every[0]) > 1 else None

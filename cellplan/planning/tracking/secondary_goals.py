@@ -29,7 +29,7 @@ from cellplan.model.settings.solver import (
     ObstacleGoalEntry,
 )
 from cellplan.model.task.task import Frame
-from cellplan.planning.timing.common_cycles import common_cycles
+from cellplan.planning.timing.schedule import common_cycles
 from cellplan.planning.tracking.obstacle_distances import ClosestPairs
 from cellplan.planning.tracking.weighted_inverse import ROUNDING
 from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel

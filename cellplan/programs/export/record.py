@@ -15,7 +15,7 @@ from cellplan.programs.export.prepare import PreparedExport
 from cellplan.programs.export.written import Written
 from cellplan.programs.promises.orders import Orders, OrderStretch
 from cellplan.programs.promises.skew import PER_SECOND
-from cellplan.report.record.sections.controller import zero_text
+from cellplan.report.record.sections.rests_on import zero_text
 from cellplan.runs.write_run import versions
 
 SCHEMA: Final = "cellplan.programs.formats/2"

@@ -16,7 +16,7 @@ from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.judgement.compare_rows import other_rows
 from cellplan.programs.judgement.judge_path import path_findings, path_rows
 from cellplan.programs.judgement.judge_speeds import joint_findings, motion_findings, position_findings
-from cellplan.programs.rows.part_errors import ToolsOnPart
+from cellplan.programs.rows.part_targets import ToolsOnPart
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.programs.rows.rows import full_rows
 from cellplan.programs.shared import Shared, played_digest

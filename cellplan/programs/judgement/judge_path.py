@@ -22,11 +22,10 @@ from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Relation, stacked_positions
-from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth
 from cellplan.model.task.task import Task
 from cellplan.model.units import MM
-from cellplan.programs.judgement.schedule_at import schedule_at
 from cellplan.programs.rows.margins import all_corners, in_steps, off_chords, raised, tool_corners, tool_margins
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.scene.pairs import Rule
@@ -236,3 +235,28 @@ def _demanding(rows: PathRows) -> Scene:
     if not rows.is_off:
         return scene
     return raised(LeverArms(scene, rows.stacked), scene, rows.off + in_steps(rows.corners))
+
+
+def schedule_at(schedule: Schedule, times: Array) -> Schedule:
+    """The same tasks at other times of the same phase, from the paths that are known at any time.
+
+    Times after the end of the phase have the poses of its end.
+
+    Args:
+        schedule: The tasks at the rows of a run, on the phase's own time.
+        times: Times in [s], increasing from 0, shape (M,), M at least 2.
+
+    Raises:
+        ValueError: The poses of a task are known at its rows only.
+    """
+    if not schedule.is_continuous:
+        raise ValueError("schedule: expected paths that are known between the rows of a run too")
+    inside = np.minimum(times, schedule.times[-1])
+    nominal = inside if schedule.clock is None else schedule.clock.at(inside)
+    rate = np.gradient(nominal, times)[:, None]
+    clock = None if schedule.clock is None else Clock(times=times, sigma=nominal)
+    tasks = []
+    for task, path, X_PT in zip(schedule.tasks, schedule.paths, schedule.poses(inside), strict=True):
+        _, V_PT_P, travelled = path.targets(nominal)
+        tasks.append(replace(task, X_PT=X_PT, V_PT_P=rate * V_PT_P, travelled=travelled))
+    return replace(schedule, times=times, tasks=tuple(tasks), clock=clock)

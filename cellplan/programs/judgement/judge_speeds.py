@@ -18,7 +18,7 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import Interpolation
 from cellplan.model.report.report import Check
 from cellplan.programs.elements.timed_rows import cycle_of
-from cellplan.programs.judgement.schedule_at import schedule_at
+from cellplan.programs.judgement.judge_path import schedule_at
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch
 from cellplan.programs.rows.rows import times_of
 from cellplan.scene.scene import Scene

@@ -24,8 +24,7 @@ from cellplan.model.task.task import Task
 from cellplan.programs.elements.corners import LARGEST_SHARE, may_round, row_shares
 from cellplan.programs.elements.dialect import Dialect
 from cellplan.programs.judgement.judge import played_programs
-from cellplan.programs.judgement.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows
-from cellplan.programs.judgement.schedule_at import schedule_at
+from cellplan.programs.judgement.judge_path import PathRows, keeps_clearance, keeps_tools, path_rows, schedule_at
 from cellplan.programs.promises.orders import Orders, blocked_orders
 from cellplan.programs.rows.margins import body_reach, corner_vectors, holder_of, robot_corners
 from cellplan.programs.rows.played import ExecutedProgram, ExecutedStretch

@@ -17,7 +17,7 @@ from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.model.units import MM
 from cellplan.programs.elements.corners import switches
 from cellplan.programs.rows.interpolant import row_velocities
-from cellplan.programs.rows.part_errors import ToolsOnPart
+from cellplan.programs.rows.part_targets import ToolsOnPart
 from cellplan.programs.rows.rows import EssentialRows, WorkRows, times_of
 from cellplan.scene.scene import Scene
 

@@ -42,8 +42,12 @@ from cellplan.report.record.sections.joints import (
     locked_joints_record,
     repeatability_record,
 )
-from cellplan.report.record.sections.open_surfaces import OpenSurfaceRecord, open_surfaces_record
-from cellplan.report.record.sections.rests_on import RestsOnRecord, rests_on_record
+from cellplan.report.record.sections.rests_on import (
+    OpenSurfaceRecord,
+    RestsOnRecord,
+    open_surfaces_record,
+    rests_on_record,
+)
 from cellplan.report.record.sections.skew import SkewKey, skew_record
 from cellplan.report.record.sections.solver import SolverRecord, solver_record
 from cellplan.report.record.sections.stops import StopsKey, stops_record

@@ -24,9 +24,8 @@ from cellplan.report.record.sections.accelerations import AccelerationsRecord, N
 from cellplan.report.record.sections.clearance import clearance_record, left_out_record
 from cellplan.report.record.sections.idle import missing_moves
 from cellplan.report.record.sections.joints import joints_record, repeatability_record, with_worst_time
-from cellplan.report.record.sections.open_surfaces import open_surfaces_record
 from cellplan.report.record.sections.payload import hardest_loads, loads_record
-from cellplan.report.record.sections.rests_on import rests_on_record
+from cellplan.report.record.sections.rests_on import open_surfaces_record, rests_on_record
 from cellplan.report.record.sections.skew import SkewKey, least_skew_record
 from cellplan.report.record.sections.solver import solver_record
 from cellplan.report.record.sections.tasks import tasks_record

@@ -11,8 +11,8 @@ from cellplan.model.cell.idle import not_in_program
 from cellplan.model.motion.plan import NOT_IN_PROGRAM, Phase
 from cellplan.model.report.report import Report
 from cellplan.report.record.sections.accelerations import table_line
-from cellplan.report.record.sections.controller import zero_text
 from cellplan.report.record.sections.idle import missing_moves
+from cellplan.report.record.sections.rests_on import zero_text
 
 
 def table_headers(

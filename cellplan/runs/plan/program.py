@@ -11,8 +11,7 @@ from cellplan.errors import InputError
 from cellplan.files.run.stored import CLOCK
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell, Robot
-from cellplan.model.motion.clock import Clock
-from cellplan.model.motion.motion import ClockTable, JointTable, Motion, Schedule
+from cellplan.model.motion.motion import Clock, ClockTable, JointTable, Motion, Schedule
 from cellplan.model.motion.plan import Hold, Interval, Phase, Plan, rows_of
 from cellplan.model.task.process_times import fixed_rests
 from cellplan.model.task.task import TIME_TOLERANCE

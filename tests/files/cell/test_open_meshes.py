@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from cellplan.model.cell.cell import Cell
-from cellplan.report.record.sections.open_surfaces import open_surfaces_record
+from cellplan.report.record.sections.rests_on import open_surfaces_record
 from cellplan.report.text.notes import open_surface_notes
 
 Load = Callable[..., Cell]

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cellplan.model.motion.clock import Clock
-from cellplan.model.motion.motion import Motion
+from cellplan.model.motion.motion import Clock, Motion
 from cellplan.model.motion.plan import ALL_TASKS, Carry, Hold, Phase, Plan, Role, Transfer, Work, rows_of
 
 ROLES: dict[str, Role] = {"arm": Work("cut"), "holder": Carry(), "other": Hold(at_home=True), "further": Hold()}

@@ -15,7 +15,7 @@ from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.exported import Promise
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.judgement.judge import judge
-from cellplan.programs.judgement.schedule_at import schedule_at
+from cellplan.programs.judgement.judge_path import schedule_at
 from cellplan.programs.rows.rows import essential_rows, full_rows
 from cellplan.programs.rows.thin import ThinningLimits, thinned
 from cellplan.scene.kinematics.screw_chain import ScrewChain

@@ -7,14 +7,16 @@ import numpy as np
 
 from cellplan.errors import InputError, NotPlanarError, PrimaryChoiceError
 from cellplan.geometry.transforms import Array, inverse, skew
-from cellplan.jobs.explain.derivations.coupling import components, coupling_graph, virtual_joint
 from cellplan.jobs.explain.derivations.graph import (
     Circuit,
     CouplingGraph,
     Signs,
     circuit_matrix,
     circuits,
+    components,
+    coupling_graph,
     spanning_tree,
+    virtual_joint,
 )
 from cellplan.jobs.explain.derivations.serial_chain import (
     axis_positions,

@@ -1,8 +1,7 @@
 """The cycle of a layout's motion: as the nodes have it, then as short as the limits of the verified motion allow."""
 
-from cellplan.jobs.fastest.scaling import scaled_values, whole_steps
 from cellplan.jobs.fastest.time_laws import from_both_sides
-from cellplan.jobs.fastest.timed_program import Law, TimedProgram
+from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values, whole_steps
 from cellplan.jobs.layout.trials.prepared import PreparedSearch
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress

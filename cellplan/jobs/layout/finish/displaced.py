@@ -11,8 +11,7 @@ from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.fastest.scaling import scaled_values
-from cellplan.jobs.fastest.timed_program import Law, TimedProgram
+from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values
 from cellplan.jobs.layout.finish.cycles import load_of, required_time
 from cellplan.jobs.layout.finish.finish import margin_of, rejection_of
 from cellplan.jobs.layout.request import LayoutRequest

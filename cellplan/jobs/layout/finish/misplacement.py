@@ -11,8 +11,7 @@ import numpy as np
 
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.fastest.scaling import whole_steps
-from cellplan.jobs.fastest.timed_program import Law, TimedProgram
+from cellplan.jobs.fastest.timed_program import Law, TimedProgram, whole_steps
 from cellplan.jobs.layout.finish.cycles import load_of, required_time, scaled
 from cellplan.jobs.layout.finish.displaced import DisplacedLayout, verified
 from cellplan.jobs.layout.finish.finish import (

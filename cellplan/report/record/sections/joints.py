@@ -1,8 +1,10 @@
 """Joints in the record of a run: positions, velocities, accelerations, drift over cycles, joints that fail."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterable
-from typing import Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 from cellplan.model.cell.acceleration import JointAcceleration
 from cellplan.model.cell.cell import Cell
@@ -11,6 +13,9 @@ from cellplan.model.robot.repeatability import Repeatability
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, Record, number
 from cellplan.report.record.phases import AT, PHASE
+
+if TYPE_CHECKING:
+    from cellplan.model.robot.robot import Joint
 
 
 class JointAccelerationRecord(TypedDict, total=False):
@@ -25,6 +30,13 @@ class JointAccelerationRecord(TypedDict, total=False):
     peak_jerk_at_s: Annotated[Number, "its time"]
     jerk_limit: Annotated[Number, "admissible jerk; null if none is stated"]
     jerk_window_ms: Annotated[Number, "cycle time of the controller"]
+
+
+def velocity_ratio(use: JointUse) -> float:
+    """Largest speed as a fraction of its limit; infinite if a joint moves whose limit is zero."""
+    if use.velocity_limit > 0.0:
+        return use.peak_velocity / use.velocity_limit
+    return 0.0 if use.peak_velocity == 0.0 else math.inf
 
 
 class JointRecord(JointAccelerationRecord):
@@ -136,13 +148,6 @@ def _acceleration_record(use: JointAcceleration | None) -> JointAccelerationReco
     }
 
 
-def velocity_ratio(use: JointUse) -> float:
-    """Largest speed as a fraction of its limit; infinite if a joint moves whose limit is zero."""
-    if use.velocity_limit > 0.0:
-        return use.peak_velocity / use.velocity_limit
-    return 0.0 if use.peak_velocity == 0.0 else math.inf
-
-
 def with_worst_time(record: Any) -> Any:
     """A joint with the time, and the phase if it has one, at which it is nearest to a limit of its own."""
     source = "margin" if _is_position_worse(record) else "peak_velocity"
@@ -226,3 +231,28 @@ def locked_joints_record(report: Report, cell: Cell) -> list[LockedJointRecord]:
             }
         )
     return records
+
+
+def joint_record(joint: Joint) -> dict[str, Any]:
+    """Name, type, limits and speed of one joint, with the unit in the keys."""
+    unit, scale = joint.display_unit
+    return {
+        "name": joint.name,
+        "type": str(joint.kind),
+        f"lower_{unit}": _figure(scale * joint.lower),
+        f"upper_{unit}": _figure(scale * joint.upper),
+        f"velocity_{unit}_s": _figure(scale * joint.velocity),
+    }
+
+
+def limits_text(record: dict[str, Any]) -> tuple[str, str]:
+    """Range and largest speed of one joint as text."""
+    unit = "deg" if "lower_deg" in record else "mm"
+    lower, upper = record[f"lower_{unit}"], record[f"upper_{unit}"]
+    limits = "endless" if lower is None or upper is None else f"{lower:g} … {upper:g} {unit}"
+    return limits, f"{record[f'velocity_{unit}_s']:g} {unit}/s"
+
+
+def _figure(value: float) -> float | None:
+    """The value of the data sheet; None for an endless joint."""
+    return float(f"{value:.9g}") if math.isfinite(value) else None

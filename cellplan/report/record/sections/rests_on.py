@@ -5,17 +5,22 @@ from typing import Annotated, Final, TypedDict
 
 import numpy as np
 
-from cellplan.geometry.shapes import support
+from cellplan.geometry.mesh.load import open_edges
+from cellplan.geometry.shapes import Mesh, Shape, support
 from cellplan.geometry.transforms import inverse
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.report.report import Standoff
+from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.payload import LoadUse
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.units import MM
 from cellplan.report.record.common import Number, number
-from cellplan.report.record.sections.controller import ZeroRecord, zero_record
 from cellplan.report.record.sections.payload import LoadRecord, loads_record, unjudged_loads
 
 IN_FRONT: Final = 0.005  # [m] by which a link's own body must stick out of the flange to be a tool: a disc does not
+UNKNOWN = "joint positions count from the model's zero, taken as the controller's; not confirmed"
+SAME = "joint positions count from the model's zero, which is the controller's"
+OTHER = "joint positions count from the model's zero; on the controller "
 
 
 class BodiesRecord(TypedDict):
@@ -24,6 +29,15 @@ class BodiesRecord(TypedDict):
     accuracy_mm: Annotated[Number, "largest distance by which the real arm exceeds its link bodies"]
     source: Annotated[str, "source of that value"]
     own_accuracy_mm: Annotated[dict[str, Number], "by body: values of bodies that differ"]
+
+
+class ZeroRecord(TypedDict):
+    """From which zero the joint positions of a robot count."""
+
+    line: Annotated[str, "the zero as one line of text"]
+    is_stated: Annotated[bool, "whether the counting of the controller is known"]
+    controller: Annotated[dict[str, str], "by joint that the controller counts otherwise: its position there"]
+    source: Annotated[str, "source of that"]
 
 
 class RestsOnRecord(TypedDict):
@@ -109,3 +123,87 @@ def _has_tool(robot: Robot) -> bool:
         for X_FS in [X_FB @ body.X_BS]
     ]
     return max(reaches, default=0.0) > IN_FRONT
+
+
+class OpenSurfaceRecord(TypedDict):
+    """A body whose mesh is not closed."""
+
+    body: Annotated[str, "the body"]
+    key: Annotated[str, "key of the cell that names it"]
+    mesh: Annotated[str, "file of the mesh"]
+    open_edges: Annotated[int, "number of open edges"]
+    has_inside: Annotated[
+        bool, "whether points with a winding number above one half count as inside (links), or none do (`open: true`)"
+    ]
+
+
+def open_surfaces_record(cell: Cell) -> list[OpenSurfaceRecord]:
+    """Each body whose mesh is not closed, with the key that names it, and whether it has an inside nevertheless."""
+    return [
+        {
+            "body": body,
+            "key": key,
+            "mesh": shape.source,
+            "open_edges": open_edges(shape),
+            "has_inside": shape.is_leaky,
+        }
+        for body, key, shape in _bodies(cell)
+        if isinstance(shape, Mesh) and not shape.is_closed
+    ]
+
+
+def _bodies(cell: Cell) -> Iterator[tuple[str, str, Shape]]:
+    """Name of each body, its key in the cell, and its shape."""
+    for robot in cell.robots:
+        key = f"robots.{robot.name}"
+        for link in robot.model.bodies:
+            yield f"{robot.name}/{link.name}", f"{key}.model", link.shape
+        yield from _tool_bodies(robot, f"{key}.tool")
+    for thing in cell.obstacles:
+        yield thing.name, f"environment.{thing.name}", thing.shape
+
+
+def _tool_bodies(robot: Robot, key: str) -> Iterator[tuple[str, str, Shape]]:
+    """Solids of a tool with their names in reports."""
+    for place, body in enumerate(robot.tool.bodies, start=1):
+        yield f"{robot.name}/tool" if place == 1 else f"{robot.name}/tool_{place}", key, body.shape
+
+
+def zero_record(model: RobotModel) -> ZeroRecord:
+    """The zero of one robot."""
+    zero = model.controller
+    return {
+        "line": zero_text(model),
+        "is_stated": zero is not None,
+        "controller": {} if zero is None else _terms(model, zero),
+        "source": "not stated" if zero is None else zero.source,
+    }
+
+
+def zero_text(model: RobotModel) -> str:
+    """From which zero the joint positions of a robot count, and those of its controller, as one line."""
+    zero = model.controller
+    if zero is None:
+        return UNKNOWN
+    if zero.is_identity:
+        return SAME
+    return OTHER + ", ".join(f"{joint} = {term}" for joint, term in _terms(model, zero).items())
+
+
+def _terms(model: RobotModel, zero: ControllerZero) -> dict[str, str]:
+    """Position on the controller by joint, for the joints that it counts otherwise: ``model - 90 deg``."""
+    terms = {}
+    for index, joint in enumerate(model.joints):
+        unit, scale = joint.display_unit
+        text = "-model" if zero.sign[index] < 0.0 else "model"
+        text += _signed(scale * float(zero.zero[index]), f" {unit}")
+        for other, factor in zip(model.joint_names, zero.coupling[index], strict=True):
+            text += _signed(float(factor), f" {other}")
+        if text != "model":
+            terms[joint.name] = text
+    return terms
+
+
+def _signed(value: float, what: str) -> str:
+    """A term of a sum; nothing for zero."""
+    return f" {'-' if value < 0.0 else '+'} {abs(value):.9g}{what}" if value else ""

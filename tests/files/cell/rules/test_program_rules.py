@@ -12,7 +12,7 @@ from cellplan.files.cell.write import render_cell
 from cellplan.model.cell.cell import Cell, Mode
 from cellplan.model.settings.program import MarkEntry
 from cellplan.model.task.task import StraightMove
-from cellplan.planning.sequence.only_task import with_only_task
+from cellplan.planning.sequence.arrangement import with_only_task
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]

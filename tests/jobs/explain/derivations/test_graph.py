@@ -6,8 +6,14 @@ from builders.random_cells import random_cell
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.jobs.explain.derivations.coupling import coupling_graph
-from cellplan.jobs.explain.derivations.graph import Coupling, CouplingGraph, circuit_matrix, circuits, spanning_tree
+from cellplan.jobs.explain.derivations.graph import (
+    Coupling,
+    CouplingGraph,
+    circuit_matrix,
+    circuits,
+    coupling_graph,
+    spanning_tree,
+)
 from cellplan.model.robot.robot import JointKind
 
 
