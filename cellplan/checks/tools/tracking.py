@@ -51,6 +51,7 @@ def pose_accuracy(scheduled: TaskSchedule, X_PT: Array) -> TaskAccuracy:
         path_bulge=scheduled.bulge,
         start_s=task.start,
         end_s=scheduled.end,
+        judged_from=task.judged_from,
     )
 
 

@@ -97,6 +97,7 @@ class TaskAccuracy:
         start_s: Instant at which the path begins.
         end_s: Instant at which the path is done.
         between: Errors between the rows; None where they were not evaluated.
+        judged_from: Time in [s] from which its errors are judged: 0 unless the tool needs time to settle.
     """
 
     task: str
@@ -108,6 +109,7 @@ class TaskAccuracy:
     end_s: float
     between: BetweenRows | None = None
     path_bulge: float | None = None
+    judged_from: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -305,9 +305,13 @@ class Task:
 
     def first_judged(self, times: Array) -> int:
         """Index of the first of these times in [s], shape (N,), at which errors are judged; at most the last."""
-        first = int(np.searchsorted(times, self.judged_from - TIME_TOLERANCE))
-        return min(first, len(times) - 1) if self.settle > 0.0 else 0
+        return first_judged(times, self.judged_from)
 
     def __repr__(self) -> str:
         """One line without arrays."""
         return f"<Task '{self.name}' of robot '{self.robot}': {type(self.path).__name__}, {self.relative_to}>"
+
+
+def first_judged(times: Array, judged_from: float) -> int:
+    """Index of the first of some times in [s], shape (N,), at which errors are judged; at most the last."""
+    return min(int(np.searchsorted(times, judged_from - TIME_TOLERANCE)), len(times) - 1)

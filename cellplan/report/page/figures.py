@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, seconds, small, stated
-from cellplan.report.record.phases import phase_key
+from cellplan.report.record.phases import has_phases, phase_key
 from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.notes import accuracy_note, clock_note
 
@@ -47,7 +47,7 @@ def _cycle_figure(record: Record) -> dict[str, Any]:
     """Cycle time, and what determines it unless the cell file states it."""
     note = (
         f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another"
-        if "runs" in record
+        if has_phases(record)
         else ""
     )
     if "samples" in record:

@@ -6,7 +6,7 @@ from typing import Final
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.left_out import TITLES, LeftOutKind, left_out_lines
 from cellplan.report.page.checks import failure_groups
-from cellplan.report.page.times import phase_begins
+from cellplan.report.page.times import page_begin, phase_begins
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import floored, small
 
@@ -40,12 +40,19 @@ def process_speeds(record: Record, cell: Cell) -> Entries:
             "robot": task["robot"],
             "speed": task["process_speed"],
             "demanded": _demanded(cell, name),
-            "shift": phase_begins(record).get(task.get("phase", "")) if "runs" in record else 0.0,
+            "shift": _begin_on_page(record, task),
             "is_bad": name in failed,
         }
         for name, task in record["tasks"].items()
     ]
     return sorted(rows, key=lambda row: not row["is_bad"])
+
+
+def _begin_on_page(record: Record, task: Record) -> float | None:
+    """Time in [s] on the clock of the page at which the phase of a task begins; None where it is in no phase."""
+    phase = task.get("phase")
+    begin = 0.0 if phase is None else phase_begins(record).get(phase)
+    return None if begin is None else begin - page_begin(record)
 
 
 def _demanded(cell: Cell, name: str) -> str:

@@ -28,6 +28,7 @@ from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, power, range_bar, small, stated, worst
+from cellplan.report.record.phases import has_phases
 from cellplan.report.record.sections.clearance import CLASSES
 from cellplan.report.record.sections.tasks import direction_text
 from cellplan.report.text.method import method_lines
@@ -97,7 +98,7 @@ def overview_page(record: Record, *, cell: Cell, **pictures: Unpack[PageFiles]) 
 
 def _links(record: Record, plots: Iterable[str], pictures: PageFiles) -> dict[str, Links]:
     """Files that a page leads to."""
-    names = ["report.json"] if "runs" in record else ["report.json", "series.json"]
+    names = ["report.json"] if has_phases(record) else ["report.json", "series.json"]
     names += [name for name, text in ((STILL, pictures.get("still")), (FLOOR_PLAN, pictures.get("floor_plan"))) if text]
     return file_links(pictures.get("files", ()), plots, names, phase=record.get("phase"))
 
@@ -117,7 +118,7 @@ def _shared_parts(record: Record, cell: Cell, pictures: PageFiles) -> dict[str, 
         "begins": begins,
         "worst": worst_instant(record),
         "line": time_line(record, cell),
-        "at": TimeLinks(view, page_begin(record), begins if "runs" in record else {}),
+        "at": TimeLinks(view, page_begin(record), begins),
         "view": view,
         "still": svg_element(pictures.get("still", "")),
         "floor_plan_svg": svg_element(pictures.get("floor_plan", "")),

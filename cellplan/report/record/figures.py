@@ -4,15 +4,16 @@ import csv
 import io
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import chain
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 
+from cellplan.model.motion.plan import ALL_TASKS
 from cellplan.model.report.report import Report
+from cellplan.model.task.task import first_judged
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, Record, number
 from cellplan.report.record.numbers import fixed, floored, percent, plain, small
@@ -20,7 +21,9 @@ from cellplan.report.record.sections.joints import velocity_ratio
 
 SECONDS_PER_HOUR: Final = 3600.0
 REDUCED: Final = 250.0  # [mm/s]
+ALL: Final = "all"  # subject of what is measured of a phase as a whole
 Fold = Callable[..., Any]  # max, min or sum
+FiguresRecord = dict[str, dict[str, dict[str, Number]]]  # by phase, quantity and subject
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +33,7 @@ class FigureQuantity:
     key: str  # of its worst value, in records and tables
     over_phases: Fold  # the value of one subject over several phases
     worst: Fold  # the value over all subjects
-    scale: float  # from SI to the unit of the record
+    scale: float  # from SI to the unit of its key
     subject: str  # key of the subject that is worst; empty where that is not recorded
     absent: Number  # the worst value where there is none
     meaning: str  # what it is
@@ -67,7 +70,8 @@ _LISTED: Final = (
     FigureQuantity("min_clearance_mm", min, min, MM, "min_clearance_pair", None, "smallest certified distance of two bodies; null if it was not certified"),
     FigureQuantity("max_tool_speed_mm_s", max, max, MM, "max_tool_speed_robot", 0.0, "largest speed of a tool tip in the world"),
     FigureQuantity("max_axis_speed_mm_s", max, max, MM, "max_axis_speed_joint", None, "largest speed of a point on a joint axis: shoulder, elbow or wrist"),
-    FigureQuantity("share_above_250_mm_s", sum, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
+    FigureQuantity("time_above_250_s", sum, max, 1.0, "", None, "time in which a tool tip is faster than 250 mm/s"),
+    FigureQuantity("share_above_250_mm_s", max, max, 1.0, "share_above_250_robot", None, "largest share of the cycle in which a tool tip is faster than 250 mm/s"),
     FigureQuantity("load_s", sum, sum, 1.0, "", None, "for all joints added up, the time that a joint needs for its travel at top speed"),
     FigureQuantity("energy_proxy_s", sum, sum, 1.0, "", None, "sum over all joints of the integral of (velocity / limit)^2 over the time"),
 )
@@ -107,16 +111,40 @@ LOAD: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """What a program measures: by quantity and subject the value over all phases, in SI."""
+    """What a program measures: by phase, quantity and subject a value in the unit of the quantity's key."""
 
-    rows: Mapping[str, Mapping[str, float]]
+    by_phase: Mapping[str, Mapping[str, Mapping[str, float]]]
+    of_program: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # of all phases at once
+
+    @classmethod
+    def of_record(cls, record: Record) -> Self:
+        """The figures in a ``report.json``; null there is what has no bound."""
+        rows: Mapping[str, Mapping[str, Mapping[str, Number]]] = record["figures"]
+        read = {
+            phase: {
+                key: {subject: math.inf if value is None else value for subject, value in subjects.items()}
+                for key, subjects in quantities.items()
+            }
+            for phase, quantities in rows.items()
+        }
+        return cls(read)
+
+    def in_phases(self, names: Iterable[str]) -> Self:
+        """The figures of some phases alone."""
+        return type(self)({name: self.by_phase[name] for name in names})
 
     def of(self, key: str) -> Mapping[str, float]:
-        """The values of all subjects."""
-        return self.rows.get(key, {})
+        """The values of all subjects, each over all phases."""
+        if key in self.of_program:
+            return self.of_program[key]
+        values: dict[str, list[float]] = {}
+        for quantities in self.by_phase.values():
+            for subject, value in quantities.get(key, {}).items():
+                values.setdefault(subject, []).append(value)
+        return {subject: QUANTITIES[key].over_phases(series) for subject, series in values.items()}
 
     def recorded(self, key: str) -> Any:
-        """The worst value in the unit of the record, or the subject that has it."""
+        """The worst value, or the subject that has it."""
         if key in SUBJECTS:
             rows = self.of(SUBJECTS[key].key)
             return (SUBJECTS[key].worst(rows, key=rows.__getitem__) or None) if rows else None
@@ -124,55 +152,75 @@ class Figures:
         if not values:
             return quantity.absent
         value = quantity.worst(values)
-        return value if isinstance(value, int) else number(quantity.scale * value)  # a count stays one
+        return value if isinstance(value, int) else number(value)  # a count stays one
 
     def record(self, keys: Sequence[str]) -> dict[str, Any]:
         """Worst values by key."""
         return {key: self.recorded(key) for key in keys}
 
 
-def figures_of(reports: Sequence[Report], *, cycle: float | None = None, load: float | None = None) -> Figures:
-    """The figures of a program.
+def figures_of(reports: Iterable[Report], *, cycle: float | None = None, load: float | None = None) -> Figures:
+    """The figures of a program, as its ``report.json`` has them.
 
     Args:
         reports: The report of each phase.
         cycle: Time from the first row of the program to the last one in [s], where that is asked for.
         load: Share of its time in which the limits would allow the same motion, likewise.
     """
-    rows = _folded(map(_measured, reports))
+    figures = Figures({phase_of(report): _figures_of_phase(report) for report in reports})
+    of_program: dict[str, dict[str, float]] = {} if load is None else {"load_ratio": {ALL: load}}
     if cycle is not None:
-        rows |= {"cycle_time_s": {"": cycle}, "parts_per_h": {"": SECONDS_PER_HOUR / cycle}}
-        rows["share_above_250_mm_s"] = {it: time / cycle for it, time in rows["share_above_250_mm_s"].items()}
-    if load is not None:
-        rows["load_ratio"] = {"": load}
-    return Figures(rows)
+        of_program |= {"cycle_time_s": {ALL: cycle}, "parts_per_h": {ALL: SECONDS_PER_HOUR / cycle}}
+        above = figures.of("time_above_250_s")
+        of_program["share_above_250_mm_s"] = {robot: time / cycle for robot, time in above.items()}
+    return replace(figures, of_program=of_program)
 
 
-def figures_of_records(phases: Iterable[Record]) -> Figures:
-    """The figures of a program from the ``report.json`` of each of its phases; tool errors once settled."""
-    return Figures(_folded(map(_recorded, phases)))
+def figures_record(reports: Iterable[Report]) -> FiguresRecord:
+    """The figures of each phase, as they stand in ``report.json``."""
+    return {
+        phase: {
+            key: {subject: value if math.isfinite(value) else None for subject, value in subjects.items()}
+            for key, subjects in quantities.items()
+        }
+        for phase, quantities in figures_of(reports).by_phase.items()
+    }
 
 
-def _folded(phases: Iterable[Iterable[tuple[str, str, float]]]) -> dict[str, dict[str, float]]:
-    """By key and subject the value over all phases."""
+def phase_of(report: Report) -> str:
+    """Name of the phase of a report."""
+    return report.phase or ALL_TASKS
+
+
+def _figures_of_phase(report: Report) -> dict[str, dict[str, float]]:
+    """By quantity and subject the values of one phase, with the digits of a record."""
     values: dict[str, dict[str, list[float]]] = {}
-    for key, subject, value in chain.from_iterable(phases):
+    for key, subject, value in _measured(report):
         values.setdefault(key, {}).setdefault(subject, []).append(value)
     return {
-        key: {it: QUANTITIES[key].over_phases(every) for it, every in subjects.items()}
+        key: {subject: _printed(QUANTITIES[key], series) for subject, series in subjects.items()}
         for key, subjects in values.items()
     }
 
 
+def _printed(quantity: FigureQuantity, values: Sequence[float]) -> float:
+    """The worst of several values in SI, in the unit of its key; a count stays one."""
+    value = quantity.worst(values)
+    printed = value if isinstance(value, int) else number(quantity.scale * value)
+    return math.inf if printed is None else printed
+
+
 def _measured(report: Report) -> Iterator[tuple[str, str, float]]:
-    """Key, subject and value of everything that one phase measures."""
-    yield "cycle_time_s", "", report.cycle_time
-    yield "failed_checks", "", sum(not check.passed for check in report.checks)
-    yield "energy_proxy_s", "", energy_proxy(report)
+    """Key, subject and value in SI of everything that one phase measures."""
+    yield "cycle_time_s", ALL, report.cycle_time
+    yield "failed_checks", ALL, sum(not check.passed for check in report.checks)
+    yield "energy_proxy_s", ALL, energy_proxy(report)
     for use in report.joints:
+        joint = f"{use.robot}/{use.joint}"
         if use.is_revolute and np.isfinite(use.margin):
-            yield "min_margin_deg", f"{use.robot}/{use.joint}", use.margin
-        yield "max_velocity_ratio", f"{use.robot}/{use.joint}", velocity_ratio(use)
+            yield "min_margin_deg", joint, use.margin
+        yield "max_velocity_ratio", joint, velocity_ratio(use)
+        yield "load_s", joint, use.travel / use.velocity_limit if use.velocity_limit else 0.0
     for hard in report.accelerations.joints:
         if hard.ratio is not None:
             yield "max_acceleration_ratio", f"{hard.robot}/{hard.joint}", hard.ratio
@@ -180,38 +228,16 @@ def _measured(report: Report) -> Iterator[tuple[str, str, float]]:
         if near.minimum is not None:
             yield "min_clearance_mm", " - ".join(near.pair or ()), near.minimum
     for task in report.accuracy:
-        position, orientation = (np.linalg.norm(e, axis=1).max() for e in (task.position_error, task.orientation_error))
-        between = task.between
+        between, judged = task.between, slice(first_judged(report.times, task.judged_from), None)
+        position, orientation = (
+            np.linalg.norm(error[judged], axis=1).max() for error in (task.position_error, task.orientation_error)
+        )
         yield "max_position_error_mm", task.task, max(position, between.position.largest if between else 0.0)
         yield "max_orientation_error_deg", task.task, max(orientation, between.orientation.largest if between else 0.0)
     for robot, speed in report.speeds.items():
         yield "max_tool_speed_mm_s", robot, speed.tool_peak
         yield "max_axis_speed_mm_s", f"{robot}/{speed.axis}", speed.axis_peak
-        yield "share_above_250_mm_s", robot, speed.share_above_reduced * report.cycle_time  # [s] until it is divided
-
-
-def _recorded(record: Record) -> Iterator[tuple[str, str, float]]:
-    """The same of the record of one phase."""
-    yield "cycle_time_s", "", record["cycle_time_s"]
-    yield "failed_checks", "", sum(not check["passed"] for check in record["checks"])
-    for robot, joints in record["joints"].items():
-        for name, use in joints.items():
-            joint, ratio = f"{robot}/{name}", use["velocity_ratio"]
-            if use["unit"] == "deg" and use["margin"] is not None:
-                yield "min_margin_deg", joint, use["margin"] / DEG
-            yield "max_velocity_ratio", joint, math.inf if ratio is None else ratio
-            yield "load_s", joint, use["travel"] / use["velocity_limit"] if use["velocity_limit"] else 0.0
-            if use.get("acceleration_ratio") is not None:
-                yield "max_acceleration_ratio", joint, use["acceleration_ratio"]
-    whole = record["clearance"]["whole"]
-    if whole["minimum_mm"] is not None:
-        yield "min_clearance_mm", " - ".join(whole["pair"] or ()), whole["minimum_mm"] / MM
-    for task, errors in record["tasks"].items():
-        for key, unit in (("position_error_mm", MM), ("orientation_error_deg", DEG)):
-            values = [errors[f"max_{key}"], errors.get(f"max_{key.replace('error', 'error_between_rows')}")]
-            yield f"max_{key}", task, max((value for value in values if value is not None), default=0.0) / unit
-    for robot, speed in record["speeds"].items():
-        yield "max_tool_speed_mm_s", robot, (speed["tool_peak_mm_s"] or 0.0) / MM
+        yield "time_above_250_s", robot, speed.share_above_reduced * report.cycle_time
 
 
 def energy_proxy(report: Report) -> float:

@@ -40,6 +40,11 @@ def phases_record(phases: Iterable[Phase]) -> list[PhaseRecord]:
     ]
 
 
+def has_phases(record: Record) -> bool:
+    """Whether a ``report.json`` is that of a program of several phases, each with a report in a folder of its name."""
+    return "runs" in record
+
+
 def phase_key(key: str) -> str:
     """Key of the phase of an instant: ``margin_phase`` of ``margin_at_s``, ``phase`` of ``at_s``."""
     return key.removesuffix(AT) + PHASE

@@ -17,6 +17,7 @@ from cellplan.report.record.common import (
     origin_record,
     status,
 )
+from cellplan.report.record.figures import FiguresRecord, figures_record
 from cellplan.report.record.phases import PhaseRecord, clock_from, phases_record
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, accelerations_record
 from cellplan.report.record.sections.clearance import (
@@ -85,6 +86,7 @@ class HeadRecord(OriginRecord):
         dict[str, RepeatabilityRecord], "by task, or under `all` for several tasks; empty if a path is open"
     ]
     clearance: Annotated[dict[str, MinimumRecord], "for `whole`, `robot_robot`, `self`, `part` and `environment`"]
+    figures: Annotated[FiguresRecord, "by phase, quantity and subject: what was measured, in the unit of the quantity"]
     required_clearance_mm: Annotated[Number, "`checks.clearance_mm` of the cell"]
     accelerations: Annotated[AccelerationsRecord, "accelerations in the world"]
     not_in_program: Annotated[list[str], "moves that the program does not contain"]
@@ -151,6 +153,7 @@ def run_record(
         "repeatability": repeatability_record(report),
         "locked_joints": locked_joints_record(report, cell),
         "clearance": clearance_record(clearance.minima),
+        "figures": figures_record([report]),
         "required_clearance_mm": number(cell.checks.clearance_mm),
         "pair_count": clearance.pair_count,
         "contacts": contacts_record(clearance),

@@ -17,7 +17,7 @@ from cellplan.report.record.common import (
     origin_record,
     status,
 )
-from cellplan.report.record.figures import Fold
+from cellplan.report.record.figures import Fold, figures_record
 from cellplan.report.record.phases import AT, clock_from, in_phase, phase_key, phases_record
 from cellplan.report.record.run import SCHEMA, HeadRecord
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
@@ -96,6 +96,7 @@ def summary_record(
         "joints": merged["joints"],
         "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
         "clearance": merged["clearance"],
+        "figures": figures_record(runs),
         "required_clearance_mm": number(cell.checks.clearance_mm),
         "left_out": left_out_record(dict.fromkeys(entry for report in runs for entry in report.clearance.left_out)),
         "checks": [

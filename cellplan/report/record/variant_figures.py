@@ -7,9 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, Record, number
-from cellplan.report.record.figures import KEY, Figures, figures_of_records
+from cellplan.report.record.figures import KEY, Figures
 
 INTERVALS: Final = 240  # of the cycle, for curves
 CURVE_DIGITS: Final = 4  # [-] significant, for curves
@@ -44,14 +43,14 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         phases: The ``report.json`` of each of its phases, in their order.
         proof: ``solved``, ``verified``, or why a run on disk was not verified again.
     """
-    whole, by_phase = figures_of_records(phases.values()), [figures_of_records([phase]) for phase in phases.values()]
-    at_work = [phase for phase in phases.values() if not record["tasks"].keys().isdisjoint(phase["tasks"])]
-    work = figures_of_records(at_work)
+    whole = Figures.of_record(record)
+    by_phase = [whole.in_phases([name]) for name in whole.by_phase]
+    tasks = zip(whole.by_phase, (phase["tasks"] for phase in phases.values()), strict=True)
+    work = whole.in_phases(name for name, worked_on in tasks if not record["tasks"].keys().isdisjoint(worked_on))
     robots = _robots(record, phases.values(), whole, by_phase, work)
     holders = [name for name, robot in robots.items() if robot["role"] == "positioner"]
     holding = sum(_load(whole, name) for name in holders)
     total, joints = sum(whole.of("load_s").values()), len(whole.of("load_s"))
-    errors = {"position_error_mm": MM, "orientation_error_deg": DEG}
     failed = [check for check in record["checks"] if not check["passed"]]
     cycle = record["cycle_time_s"]
     figures = {
@@ -71,7 +70,7 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
         "load_s": number(total),
         "robots": robots,
         "tasks": {
-            name: {key: number(unit * whole.of(f"max_{key}")[name]) for key, unit in errors.items()}
+            name: {key: whole.of(f"max_{key}")[name] for key in ("position_error_mm", "orientation_error_deg")}
             for name in record["tasks"]
         },
         "failed": [_with_phase(check) for check in failed[:MAX_FAILED]],

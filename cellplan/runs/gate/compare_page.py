@@ -11,6 +11,7 @@ from cellplan.report.page.render import PageFiles, overview_page, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record
+from cellplan.report.record.phases import has_phases
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 from cellplan.runs.drawings.cell_drawings import FLOOR_PLAN, STILL
@@ -46,7 +47,7 @@ def page_findings(
             stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place))
         )
         yield from _page_finding(stored, place, cell=motion.cell, motion=motion, record=record)
-    if "runs" in stored.record:
+    if has_phases(stored.record):
         reports = {str(motion.name): motion.report for motion in motions}
         expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
         record = _of_the_run(stored, "", expected)

@@ -20,6 +20,7 @@ from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.planning.modes import homeless
 from cellplan.report.record.common import Provenance, Record
+from cellplan.report.record.phases import has_phases
 from cellplan.report.record.run import run_record
 from cellplan.report.record.sections.idle import missing_moves
 from cellplan.report.record.series import series
@@ -141,7 +142,7 @@ def _demanded(cell: Cell, stored: StoredRun) -> DemandedProgram:
 
 def _only_task(cell: Cell, stored: StoredRun, file: str) -> str | None:
     """Name of the only task that was chosen; None for all."""
-    tasks = list(stored.record["runs"] if "runs" in stored.record else stored.record["tasks"])
+    tasks = list(stored.record["runs" if has_phases(stored.record) else "tasks"])
     every = [task.name for task in cell.tasks]
     if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
         raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
@@ -210,7 +211,7 @@ def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[Verifi
         motion.name or "": run_record(motion.report, cell=motion.cell, provenance=provenance) for motion in motions
     }
     got: dict[str, Record] = dict(stored.records)
-    if "runs" in stored.record:
+    if has_phases(stored.record):
         got[""] = stored.record
         reports = {str(motion.name): motion.report for motion in motions}
         expected[""] = summary_record(reports, cell=cell, provenance=provenance)
