@@ -4,9 +4,10 @@ Every run folder below OLD is compared with the folder of the same name below NE
 
 - joint tables byte for byte below their headers; where OLD has tables for each task and NEW has one program, the rows
   of each task must occur in the program in one piece, on whatever clock;
-- ``report.json`` key by key; series that OLD keeps in it are compared with ``series.json`` of NEW. Keys that only NEW
-  has are counted. Texts may differ by the pairs in RENAMED.json (here ``renamed_texts.json``), old and new pieces; with
-  ``--reworded`` also in any other words around the same figures, and those texts are counted.
+- ``report.json`` key by key; series that OLD keeps in it are compared with ``series.json`` of NEW. Keys that only one
+  of the two has are counted where ``report_paths.json`` lists them as added or removed, and differ otherwise. Texts
+  may differ by the pairs in RENAMED.json (here ``renamed_texts.json``), old and new pieces; with ``--reworded`` also
+  in any other words around the same figures, and those texts are counted.
 
 The exit status is 1 if anything else differs.
 """
@@ -23,6 +24,8 @@ from typing import Any, Final
 
 MAX_SHOWN: Final = 12  # differences of a report that are listed
 ONLY_NEW: Final = "only new"
+ONLY_OLD: Final = "only old"
+PATHS: Final[Mapping[str, list[str]]] = json.loads(Path(__file__).with_name("report_paths.json").read_text("utf-8"))
 REWORDED: Final = "reworded"
 FIGURE: Final = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 IGNORED: Final = frozenset({"inputs", "digests", "versions"})  # digests of files and versions of packages
@@ -55,7 +58,7 @@ def compare_run(old: Path, new: Path, *, texts: Mapping[str, str], may_be_reword
         for file in sorted(old.rglob("report.json"))
         for line in report_differences(file, new / file.relative_to(old), texts)
     ]
-    added = [line for line in differences if line.endswith(ONLY_NEW)]
+    added = [line for line in differences if is_listed(line)]
     reworded = [line for line in differences if may_be_reworded and line.endswith(REWORDED)]
     changed = [line for line in differences if line not in {*added, *reworded}]
     count = len(list(old.rglob("tables/*.csv")))
@@ -66,6 +69,13 @@ def compare_run(old: Path, new: Path, *, texts: Mapping[str, str], may_be_reword
     for line in [*tables, *changed[:MAX_SHOWN]]:
         print(f"    {line}")
     return bool(tables or changed)
+
+
+def is_listed(difference: str) -> bool:
+    """Whether a key that only one of two reports has is listed as added or removed."""
+    path = difference.partition(": ")[2].partition(": ")[0]
+    kinds = {ONLY_NEW: "added", ONLY_OLD: "removed"}
+    return any(difference.endswith(ending) and path in PATHS[kind] for ending, kind in kinds.items())
 
 
 def different_tables(old: Path, new: Path) -> Iterator[str]:
@@ -123,7 +133,7 @@ def differences(old: Any, new: Any, texts: Mapping[str, str], path: str = "") ->
         for key in dict.fromkeys([*old, *new]):
             place = f"{path}.{key}" if path else key
             if key not in old or key not in new:
-                yield f"{place}: {ONLY_NEW if key in new else 'only old'}"
+                yield f"{place}: {ONLY_NEW if key in new else ONLY_OLD}"
             else:
                 yield from differences(old[key], new[key], texts, place)
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
