@@ -136,7 +136,6 @@ def run_record(
         transfers: How the transfer moves of its phase were found, by the name of the phase.
         moved: How far its starts were moved.
     """
-    clearance = report.clearance
     return {
         "schema": SCHEMA,
         "cell": report.cell,
@@ -152,12 +151,12 @@ def run_record(
         "joints": joints_record(report.joints, report.accelerations.joints),
         "repeatability": repeatability_record(report),
         "locked_joints": locked_joints_record(report, cell),
-        "clearance": clearance_record(clearance.minima),
+        "clearance": clearance_record(report.clearance.minima),
         "figures": figures_record([report]),
         "required_clearance_mm": number(cell.checks.clearance_mm),
-        "pair_count": clearance.pair_count,
-        "contacts": contacts_record(clearance),
-        "exclusions": exclusions_record(clearance),
+        "pair_count": report.clearance.pair_count,
+        "contacts": contacts_record(report.clearance),
+        "exclusions": exclusions_record(report.clearance),
         "singularity": singularity_record(report.conditioning, report.times),
         "motion_share": motion_share_record(report, cell),
         "speeds": {robot: speed_record(speed) for robot, speed in report.speeds.items()},
@@ -166,11 +165,11 @@ def run_record(
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "rests_on": rests_on_record(cell, report.loads, report.standoffs),
-        "closest_pairs": closest_pairs_record(clearance),
-        "clearance_proof": clearance_proof_record(clearance),
+        "closest_pairs": closest_pairs_record(report.clearance),
+        "clearance_proof": clearance_proof_record(report.clearance),
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
-        "left_out": left_out_record(clearance.left_out),
+        "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
         "solver": solver_record(cell.solver, motion, transfers, moved),
         "accelerations": accelerations_record(report.accelerations),
