@@ -159,7 +159,7 @@ def measured(cell_file: Path, folder: Path, *, stops: int, seed: int, most: floa
     """Row of the table: a cell with random stops, no more of them than so many seconds of processor time allow."""
     run, rng = run_of(cell_file, folder), np.random.default_rng(seed)
     places = RunPlaces.of(run)
-    seconds, kinds_, reasons = list[float](), Counter[str](), Counter[str]()
+    seconds, ends, reasons = list[float](), Counter[str](), Counter[str]()
     smallest, faults, first = np.inf, list[str](), time.process_time()
     for at, frozen in random_stops(run, stops, rng):
         begin = time.process_time()
@@ -176,12 +176,12 @@ def measured(cell_file: Path, folder: Path, *, stops: int, seed: int, most: floa
             reasons[f"{recovery.reason[:400]} (at {at:.4f} {frozen})"] += 1
             continue
         kinds = {phase.kind for phase in recovery.judgement.phases} if recovery.judgement else set()
-        kinds_["back" if "back" in kinds else "straight off"] += 1
+        ends["back" if "back" in kinds else "straight off"] += 1
         result = judged(recovery, places, rng)
         smallest = min(smallest, result.smallest)
         faults += [f"at {at:.4f} {frozen}: {fault}" for fault in result.faults]
     lines = [
-        f"| {run.cell.name} | {len(seconds)} | {sum(kinds_.values())} | {kinds_['straight off']} | {kinds_['back']} | "
+        f"| {run.cell.name} | {len(seconds)} | {sum(ends.values())} | {ends['straight off']} | {ends['back']} | "
         f"{sum(reasons.values())} | {np.mean(seconds):.1f} | {max(seconds):.1f} | {MM * smallest:.2f} | {len(faults)} |"
     ]
     lines += [f"    fault: {fault}" for fault in faults[:20]]

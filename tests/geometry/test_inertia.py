@@ -33,5 +33,5 @@ def test_a_mesh_drawn_elsewhere_has_its_centre_there_and_its_inertia_turned() ->
     centre, inertia = centre_and_inertia(make_mesh(transform_points(X, box.vertices), box.faces, source="moved"))
 
     np.testing.assert_allclose(centre, X[:3, 3], atol=1e-12)
-    inertia_ = np.diag([0.13, 0.10, 0.05]) / 12.0
-    np.testing.assert_allclose(inertia, X[:3, :3] @ inertia_ @ X[:3, :3].T, atol=1e-12)
+    along_axes = np.diag([0.13, 0.10, 0.05]) / 12.0
+    np.testing.assert_allclose(inertia, X[:3, :3] @ along_axes @ X[:3, :3].T, atol=1e-12)

@@ -116,8 +116,8 @@ def test_a_lost_tile_costs_its_own_places_and_says_why(folder: Path, tmp_path: P
 def test_an_earlier_map_is_replaced_and_another_one_not_continued(folder: Path, tmp_path: Path) -> None:
     again = tmp_path / "map"
     again.mkdir()
-    for name, bytes_ in content(folder).items():
-        (again / name).write_bytes(bytes_)
+    for name, data in content(folder).items():
+        (again / name).write_bytes(data)
 
     other = MapRequest(cell=CELL, robot="right", grid=BaseGrid(x=(1000, 2600), step=200), settings=SETTINGS)
     with pytest.raises(Exception, match="expected the study that is to be continued, got one with another value"):

@@ -93,9 +93,9 @@ def test_the_cell_goes_before_the_file_of_the_robot(load: Callable[..., Cell]) -
         axes={"F3": AxisLimitEntry(moment_nm=6.0, inertia_kg_m2=0.1)},
         source="sheet",
     )
-    model_ = cell.robot("holder").model
-    assert model_.body_accuracy is not None
-    assert model_.payload is not None
+    merged = cell.robot("holder").model
+    assert merged.body_accuracy is not None
+    assert merged.payload is not None
 
 
 def test_masses_that_are_not_stated_are_none_and_not_zero(load: Callable[..., Cell]) -> None:

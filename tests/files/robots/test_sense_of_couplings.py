@@ -65,14 +65,14 @@ def test_the_shown_angle_is_that_of_the_forearm_to_the_level(
 
 
 @pytest.mark.parametrize(
-    ("sense", "signs", "factor", "sense_"),
+    ("sense", "signs", "factor", "turn"),
     [
         (1, "", -1, "the same way"),
         (-1, "", 1, "against each other"),
         (-1, "sign: {J3: -1}", -1, "the same way"),
     ],
 )
-def test_the_other_sign_is_refused(tmp_path: Path, sense: int, signs: str, factor: int, sense_: str) -> None:
+def test_the_other_sign_is_refused(tmp_path: Path, sense: int, signs: str, factor: int, turn: str) -> None:
     path = zero(tmp_path, f"coupling: {{J3: {{J2: {factor}}}}}\n{signs}\n")
 
     with pytest.raises(InputError) as refusal:
@@ -80,7 +80,7 @@ def test_the_other_sign_is_refused(tmp_path: Path, sense: int, signs: str, facto
 
     assert str(refusal.value) == (
         f"zero.yaml:1: coupling.J3.J2: expected {-factor}, with which the angle of 'J3' is shown against the level, as "
-        f"'J2' and 'J3' turn {sense_} on the controller, got {factor}"
+        f"'J2' and 'J3' turn {turn} on the controller, got {factor}"
     )
 
 

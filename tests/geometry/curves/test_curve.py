@@ -190,13 +190,13 @@ def test_parameters_at_lengths_invert_the_length(curve: Curve) -> None:
 
     assert np.all(np.diff(u) > 0.0)
     nodes, weights = np.polynomial.legendre.leggauss(20)
-    for low, high, length_ in zip(u[:-1], u[1:], np.diff(desired), strict=True):
+    for low, high, expected in zip(u[:-1], u[1:], np.diff(desired), strict=True):
         cuts = np.concatenate([[low], curve.knots[(curve.knots > low) & (curve.knots < high)], [high]])
         length = 0.0
         for a, b in pairwise(cuts):
             rates = curve.evaluate(a + 0.5 * (nodes + 1.0) * (b - a), whole)[1]
             length += 0.5 * (b - a) * float(weights @ np.linalg.norm(rates, axis=1))
-        assert length == pytest.approx(length_, abs=1e-11 * arc.total)
+        assert length == pytest.approx(expected, abs=1e-11 * arc.total)
 
 
 @pytest.mark.parametrize(

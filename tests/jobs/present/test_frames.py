@@ -107,8 +107,8 @@ def test_all_ways_to_a_run_give_the_same_frames(
         for other in (solution, sound / "run"):
             pd.testing.assert_frame_equal(to_frame(other, name), frame, rtol=1e-6, atol=1e-9)
         if name in tables(report):
-            frame_ = report.to_frame(name)
-            pd.testing.assert_frame_equal(frame_, frame[list(frame_.columns)], rtol=1e-6, atol=1e-9)
+            listed = report.to_frame(name)
+            pd.testing.assert_frame_equal(listed, frame[list(listed.columns)], rtol=1e-6, atol=1e-9)
     pd.testing.assert_frame_equal(solution.to_frame("joints"), to_frame(solution, "joints"))
 
 
@@ -129,8 +129,8 @@ def test_curves_are_those_of_series_json(sound: Path, report: Report) -> None:
             assert list(frame[f"{robot}.{joint}.speed_deg_s"][:-1]) == curves["speed_deg_s"]
             assert np.isnan(frame[f"{robot}.{joint}.speed_deg_s"].iloc[-1])
     pd.testing.assert_frame_equal(to_frame(sound / "run", "curves").drop(columns="phase"), frame, check_dtype=False)
-    frame_ = report.to_frame("curves")
-    pd.testing.assert_frame_equal(frame_, frame[list(frame_.columns)], rtol=1e-6, atol=1e-6, check_dtype=False)
+    listed = report.to_frame("curves")
+    pd.testing.assert_frame_equal(listed, frame[list(listed.columns)], rtol=1e-6, atol=1e-6, check_dtype=False)
 
 
 def test_plain_readers_read_what_our_own_reader_reads(sound: Path) -> None:

@@ -136,8 +136,8 @@ def test_a_layout_with_starts_is_shown_with_its_motion(cell: Path, sound: Path, 
     run = view(ViewRequest(path=sound / "run", cell=cell))[0]["scenes"][0]
     times, q = rows_of(dict(run["motion"]))
     for scene in scenes:
-        times_, rows = rows_of(dict(scene["motion"]))
-        assert np.array_equal(times_, times)
+        clock, rows = rows_of(dict(scene["motion"]))
+        assert np.array_equal(clock, times)
         assert np.abs(rows - q).max() < 1e-5  # the idle robot's place does not matter to the others
         assert min(scene["nearest"]["distances"]) == pytest.approx(min(run["nearest"]["distances"]), abs=1e-2)
 

@@ -78,8 +78,8 @@ def test_cells_together_do_what_each_does_alone() -> None:
     assert arrived == [0, 1, 2]
     for index, cell in enumerate(cells):
         alone = replace(CELL, cell=cell)
-        alone_, _, panels = carried_through(collocation(alone), alone, q[:, :1], np.zeros(1, dtype=np.intp))
-        np.testing.assert_allclose(last[:, index], alone_[:, 0], atol=1e-6)  # passes may end earlier for one alone
+        single, _, panels = carried_through(collocation(alone), alone, q[:, :1], np.zeros(1, dtype=np.intp))
+        np.testing.assert_allclose(last[:, index], single[:, 0], atol=1e-6)  # passes may end earlier for one alone
         assert passed[index] == panels[0]
 
 

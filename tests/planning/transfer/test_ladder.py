@@ -80,12 +80,12 @@ def rounded() -> tuple[Scene, PlannedTransfer]:
 
 
 def test_a_disc_goes_round_a_wall(rounded: tuple[Scene, PlannedTransfer]) -> None:
-    scene, transfer_ = rounded
+    scene, planned = rounded
 
-    assert transfer_.rungs == {"a": Rung.IN_TURN}
-    assert distance_to_box(densely(transfer_.q), WALL).min() >= CLEARANCE - ROUNDED_BACK
-    assert np.array_equal(transfer_.q[[0, -1]], [[-0.5, 0.1], [0.5, 0.1]])
-    assert_at_limits(scene, transfer_)
+    assert planned.rungs == {"a": Rung.IN_TURN}
+    assert distance_to_box(densely(planned.q), WALL).min() >= CLEARANCE - ROUNDED_BACK
+    assert np.array_equal(planned.q[[0, -1]], [[-0.5, 0.1], [0.5, 0.1]])
+    assert_at_limits(scene, planned)
 
 
 def test_discs_whose_ways_cross_go_one_after_the_other() -> None:

@@ -352,9 +352,9 @@ def test_rows_need_times_that_rise() -> None:
 
 @pytest.mark.parametrize("signal", ["12", "do 1", "a" * 33, "1do", "MoveL", "do;"])
 def test_signals_must_be_names(signal: str) -> None:
-    signal_ = named_signals(NAMES[:2])[NAMES[0]]
+    named = named_signals(NAMES[:2])[NAMES[0]]
 
-    text = refusal(changed_cell(sequence_job(), alpha={"handshake": signal_.model_copy(update={"output": signal})}))
+    text = refusal(changed_cell(sequence_job(), alpha={"handshake": named.model_copy(update={"output": signal})}))
 
     assert text == (
         "robots.alpha.controller.handshake.output: expected the name of a signal of at most 32 letters, digits and _, "

@@ -19,8 +19,8 @@ def busy(passed_run: Any) -> Any:
     """A run of which one task has a process, a dwell and an approach, and begins late."""
     circle = next(task for task in passed_run.cell.tasks if task.name == "circle")
     process = ProcessEntry(feed_mm_s=200.0, on_delay_s=0.3, off_delay_s=0.2)
-    task_ = replace(circle, process=process, dwell=0.25, approach=StraightMove(distance=0.05, duration=0.5), settle=0.1)
-    tasks = tuple(task_ if task is circle else task for task in passed_run.cell.tasks)
+    timed = replace(circle, process=process, dwell=0.25, approach=StraightMove(distance=0.05, duration=0.5), settle=0.1)
+    tasks = tuple(timed if task is circle else task for task in passed_run.cell.tasks)
     accuracy = tuple(
         replace(accuracy, start_s=0.5, end_s=3.0) if accuracy.task == "circle" else accuracy
         for accuracy in passed_run.report.accuracy

@@ -121,9 +121,9 @@ def test_columns_name_the_joints_of_each_robot() -> None:
     cell = mixed_cell(5)
     chains = BatchChains(cell)
     for index, robot in enumerate(cell.robots):
-        columns_ = chains.columns[:, index]
+        listed = chains.columns[:, index]
         columns = cell.columns(robot.name)
-        assert columns_[columns_ >= 0].tolist() == list(range(columns.start, columns.stop))
+        assert listed[listed >= 0].tolist() == list(range(columns.start, columns.stop))
 
 
 def test_a_robot_on_its_own_base_has_a_tool_that_rests() -> None:

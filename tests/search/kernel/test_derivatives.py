@@ -70,14 +70,14 @@ def test_derivatives_of_the_reference_cell_are_those_of_its_run(reference: Simpl
 def one_node(cell: Cell, q: Array, *, seed: int) -> Job:
     """A job of one node, at which the tools are where a configuration has them and move at random."""
     X = np.moveaxis(seen_poses(cell, q.T), (0, 1), (3, 2))
-    moving, relations_ = everyone(cell), relations(cell)
-    V = np.random.default_rng(seed).normal(size=(6, len(relations_), 1))
-    constraints = TaskConstraints.of(cell, relations_, moving)
+    moving, tasks = everyone(cell), relations(cell)
+    V = np.random.default_rng(seed).normal(size=(6, len(tasks), 1))
+    constraints = TaskConstraints.of(cell, tasks, moving)
     return Job(
         cell=cell,
-        relations=tuple(relations_),
+        relations=tuple(tasks),
         moving=tuple(moving),
-        tasks=BatchTasks(cell, relations_, moving),
+        tasks=BatchTasks(cell, tasks, moving),
         constraints=constraints,
         settling=np.ones(cell.joint_count),
         limits=cell.joint_limits,

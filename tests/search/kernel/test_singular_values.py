@@ -34,8 +34,8 @@ def test_derivatives_are_those_of_the_values(name: str) -> None:
     for step in (STEP, -STEP):
         layouts = [layout, layout, *(displaced(layout, directions, step).of_places([at]) for at in range(3))]
         there = np.moveaxis(q.T[..., None] + step * moved, 2, 0)
-        values_ = [SingularValues.of(job, *both, lambda: directions) for both in zip(layouts, there, strict=True)]
-        sides.append(np.array([one.values[0] for one in values_]).T)
+        at_ends = [SingularValues.of(job, *both, lambda: directions) for both in zip(layouts, there, strict=True)]
+        sides.append(np.array([one.values[0] for one in at_ends]).T)
     expected = (sides[0] - sides[1]) / (2.0 * STEP)
     np.testing.assert_allclose(by, expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
 

@@ -129,10 +129,10 @@ def test_mirrored_bases_are_mirror_images(cell: Cell, plane: str) -> None:
     assert variables.names == tuple(f"robots.kuka.base.{key}" for key in sides)
     placed = variables.placed(some_values(variables, share=3.0))
     axis = 1 if plane == "xz" else 0
-    M, mirror_ = np.eye(4), np.diag([1.0, -1.0, 1.0, 1.0])
+    M, mirrored = np.eye(4), np.diag([1.0, -1.0, 1.0, 1.0])
     M[axis, axis], M[axis, 3] = -1.0, 0.2
     yaw_only = placed.robot("kuka").X_WB
-    assert np.abs(M @ yaw_only @ mirror_ - placed.robot("abb").X_WB).max() <= 1e-12
+    assert np.abs(M @ yaw_only @ mirrored - placed.robot("abb").X_WB).max() <= 1e-12
 
 
 def test_a_cost_is_that_of_all_that_moves(cell: Cell) -> None:
