@@ -13,5 +13,5 @@ SAME_PEAK: Final = 1e-5  # [-] of a peak, which rounding may take from any row o
 
 
 def first_peak(values: Array) -> int:
-    """Index of the first of values, shape (N,), none below 0, that are the largest but for rounding."""
+    """Index of the first value that is the largest up to rounding, of values of shape (N,), none below 0."""
     return int(np.argmax(values >= (1.0 - SAME_PEAK) * values.max()))

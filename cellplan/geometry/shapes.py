@@ -93,7 +93,7 @@ def support(shape: Solid, directions: Array) -> Array:
 
 
 def support_point(shape: Solid, n: Array) -> Array:
-    """Point of the shape farthest along a unit direction, shape (3,); the middle of the face or edge that is so."""
+    """Point of the shape farthest along a unit direction, shape (3,); the middle where it is a face or an edge."""
     toward = np.where(np.abs(n) > FACING_TOL, np.sign(n), 0.0)
     point: Array
     match shape:

@@ -139,7 +139,7 @@ def near_in_chain(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -
 
 
 def stands_on(pair: ScenePair, bodies: Sequence[SceneBody], *, cell: Cell) -> bool:
-    """Whether a pair is the first link with a body, of a robot whose foot has none, and the surroundings."""
+    """Whether a pair is a thing of the surroundings and the first link with a body of a robot without a foot."""
     a, b = bodies[pair.first], bodies[pair.second]
     if a.kind is not Kind.LINK or b.kind is not Kind.OBSTACLE or a.robot is None or a.link == BASE:
         return False

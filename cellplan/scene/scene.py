@@ -102,15 +102,15 @@ class Scene:
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:
-        """What is not judged in full, but for two links of one robot's file; measures what stands, in milliseconds."""
+        """What is not judged in full, except links of one robot's file; bodies at rest are measured in milliseconds."""
         return left_out(self.cell, self.bodies, self.pairs, self.excluded, engine=self.engine)
 
     def moved(self, X_WB: Mapping[str, Array]) -> "Scene":
         """The scene with some robots elsewhere, and what stands on or below their bases with them.
 
-        Hulls and engine are kept; only columns whose height changes are made anew. What depends on the bases otherwise,
-        a column that comes or goes and a robot without a foot that stands with its first link in the surroundings, is
-        sorted by ``from_cell``, which takes as long as that does. A column that touches a link of its own robot in
+        Hulls and engine are kept; only columns whose height changes are made anew. Where a column comes or goes, or a
+        robot without a foot stands with its first link in the surroundings, the scene is built by ``from_cell``, which
+        takes as long as that does. A column that touches a link of its own robot in
         every configuration is not refused here; it shows as a contact.
 
         Args:

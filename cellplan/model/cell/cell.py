@@ -75,7 +75,7 @@ class Robot:
         attachments: Solids mounted on its links, their poses ``X_BS`` in B while all joints read zero.
         pedestal: What the base stands on, hangs from or is fixed to; None for a base on the floor or on an obstacle.
         gripper: Names of link bodies of its model that make up a gripper, which may work on the part as a tool does.
-        order: Names of its tasks and of marks in their order; empty for that of the cell's tasks.
+        order: Names of its tasks and marks in the order of work; empty for the order of the cell's tasks.
         path: Its joints over the whole clock; None where they follow from the tasks.
         control: Where it is connected; None when no controller is stated.
     """
@@ -137,7 +137,7 @@ class Grasp:
 
     @property
     def is_spin_free(self) -> bool:
-        """A grasp never leaves the rotation about the tool's own axis to chance."""
+        """A grasp always constrains the rotation about the tool's own axis."""
         return False
 
     @property
@@ -208,7 +208,7 @@ class LockedJoint:
 
 
 class Timing(StrEnum):
-    """When the joints are where on their path."""
+    """What times the motion along the path."""
 
     AS_WRITTEN = "as_written"
     FASTEST = "fastest"
@@ -225,7 +225,7 @@ class MotionSettings:
         step: Time between two rows in [s]: that of the grid, where there is one.
         cyclic: Whether all joints are to end where they started.
         locked: Joints that fail during the motion.
-        timing: Whether the time laws say when the joints are where, or the limits of the joints.
+        timing: What times the motion along the path: the time laws, or the limits of the joints.
         cycle: Time in [s] that each phase of a program takes; None unless the timing demands one.
         build_up: Time in [s] in which a joint without a stated limit of jerk is taken to build up its acceleration
             where a program is retimed; None for no limit.

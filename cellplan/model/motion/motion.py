@@ -135,7 +135,7 @@ class Schedule:
 
     @property
     def jumps(self) -> Array:
-        """Those of them that do not come from knots of the paths, which join pieces smoothly."""
+        """Breaks other than knots of the paths, at which pieces join smoothly."""
         return self._within_clock([path.jumps for path in self.paths])
 
     def poses(self, times: Array) -> tuple[Array, ...]:

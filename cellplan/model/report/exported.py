@@ -42,8 +42,8 @@ class RobotRows:
         process: Whether its tool is in process from each row to the next, shape (N,); None where a format states none.
         marks: Rows at which it waits for the other robots, in their order; as many for every robot of a program.
         rounding: Share of the shorter neighbouring segment within which the target rounds each row, 0 for a stop, at
-            most 0.5, shape (N,). In what is written None stands for the share of the job, in what was read for a format
-            that states none.
+            most 0.5, shape (N,). None stands for the share of the job in rows to be written, and for a
+            format that states none in rows that were read.
         X_PT: Its tool tip in the part frame in [m], shape (N, 4, 4), where a row is stated as a target on the part; NaN
             in all other rows, None where there is no such row. In what was read, ``q`` is NaN in these rows but for
             external axes.
@@ -54,7 +54,7 @@ class RobotRows:
     robot: str  # name of the robot
     q: Array  # joint positions of the model in [rad] or [m], shape (N, n)
     times: Array | None = None
-    qd: Array | None = None  # joint speeds in [rad/s] or [m/s], shape (N, n); None where the format has none
+    qd: Array | None = None  # joint velocities in [rad/s] or [m/s], shape (N, n); None where the format has none
     process: NDArray[np.bool_] | None = None
     marks: tuple[int, ...] = ()
     stops: tuple[int, ...] = ()  # rows at which its tool stops on its path

@@ -75,7 +75,7 @@ class Check:
 
     @property
     def severity(self) -> float:
-        """Grows with its excess over others of its kind."""
+        """Number by which checks of one kind are ranked: it grows with the excess over the limit."""
         return self.kind.severity(self.value, self.limit)
 
     def __repr__(self) -> str:

@@ -20,7 +20,7 @@ class Quantity(float):
 
     @property
     def si(self) -> float:
-        """The quantity in SI units; a division, as it rounds once only."""
+        """The quantity in SI units, by one division, which rounds only once."""
         return self / MM
 
     @classmethod

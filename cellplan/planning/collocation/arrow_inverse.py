@@ -64,10 +64,10 @@ class ArrowInverse:
         self._S_factor, _ = eliminated(S, S[:, :0])
 
     def velocities(self, b: Array) -> tuple[Array, Array]:
-        """Smallest weighted joint speeds for twists, shape (6, tasks, batch).
+        """Smallest weighted joint velocities for twists, shape (6, tasks, batch).
 
         Returns:
-            Speeds of the own joints, shape (n, tasks, batch), and of the shared ones, shape (m, batch).
+            Velocities of the own joints, shape (n, tasks, batch), and of the shared ones, shape (m, batch).
         """
         y, shared = self._multipliers(b)
         return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
@@ -83,7 +83,7 @@ class ArrowInverse:
         return self._moved_by(y)
 
     def _moved_by(self, y: Array) -> tuple[Array, Array]:
-        """Speeds ``W^-1 J^T y`` of the own joints and of the shared ones, for multipliers (6, tasks, batch)."""
+        """Velocities ``W^-1 J^T y`` of the own joints and of the shared ones, for multipliers (6, tasks, batch)."""
         shared = np.einsum("imtb,itb->mb", self._following_C, y) / self._coupling_weights
         return np.einsum("intb,itb->ntb", self._mobile_A, y), shared
 
@@ -96,7 +96,7 @@ class ArrowInverse:
         return np.einsum("jitb,jtb->itb", self._D_factor, u), shared
 
     def twists(self, local: Array, shared: Array) -> Array:
-        """Tool twists that joint speeds give, ``J q_dot``, shape (6, tasks, batch)."""
+        """Tool twists that joint velocities give, ``J q_dot``, shape (6, tasks, batch)."""
         return np.einsum("intb,ntb->itb", self._A, local) + np.einsum("imtb,mb->itb", self._C, shared)
 
 

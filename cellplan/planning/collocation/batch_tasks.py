@@ -210,7 +210,7 @@ class Linearisation:
         self.errors = errors
 
     def velocities(self, drift: Array | None = None) -> Array:
-        r"""Joint speeds ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, batch).
+        r"""Joint velocities ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, batch).
 
         The drift has the shape (nq,) or (nq, batch).
         """

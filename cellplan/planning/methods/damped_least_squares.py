@@ -1,4 +1,4 @@
-"""Damped least squares: near a singularity, part of the desired twist is given up for moderate joint speeds."""
+"""Damped least squares: near a singularity, part of the desired twist is given up for moderate joint velocities."""
 
 from collections.abc import Callable
 from typing import Final

@@ -8,7 +8,7 @@ from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 
 def filtered_inverse(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
-    r"""Joint speeds ``u_I = Theta v`` ([Vargas2012]_ Eq. 35), with ``v`` the desired twist and its feedback."""
+    r"""Joint velocities ``u_I = Theta v`` ([Vargas2012]_ Eq. 35), with ``v`` the desired twist and its feedback."""
 
     def law(theta: Array, _J: Array) -> Array:
         return theta

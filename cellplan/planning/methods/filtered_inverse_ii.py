@@ -8,7 +8,7 @@ from cellplan.planning.tracking.problem import StepResult, TrackingProblem
 
 
 def filtered_inverse_ii(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
-    r"""Joint speeds ``u_II = Theta Theta^T J^T v`` ([Vargas2012]_ Eq. 36), ``v`` the desired twist with feedback.
+    r"""Joint velocities ``u_II = Theta Theta^T J^T v`` ([Vargas2012]_ Eq. 36), ``v`` the desired twist with feedback.
 
     ``J u_II = P P^T v`` with ``P = J Theta`` (Eq. 37): however bad ``Theta`` is, the error is never driven up.
     """

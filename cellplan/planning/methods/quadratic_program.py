@@ -11,7 +11,7 @@ from cellplan.planning.methods.support.qp_engine import nearest_to_origin
 from cellplan.planning.methods.support.speed_bounds import JointBounds, VelocityBounds
 from cellplan.planning.tracking.problem import FirstOrder, StepResult, TrackingProblem
 
-STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint speeds: beyond it digits are lost
+STEEPEST: Final = 1e10  # largest ratio of the tasks' weight to that of joint velocities: beyond it digits are lost
 
 
 def quadratic_program(problem: TrackingProblem) -> Callable[[int, Array], StepResult]:
@@ -63,7 +63,7 @@ def bounded_velocities(
         slack_weight: ``rho``.
 
     Returns:
-        Joint speeds within the bounds to the last bit, shape (nq,).
+        Joint velocities within the bounds to the last bit, shape (nq,).
 
     Raises:
         NoSolutionError: The program could not be solved.

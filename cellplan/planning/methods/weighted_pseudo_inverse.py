@@ -1,4 +1,4 @@
-"""Weighted, damped pseudo-inverse: the smallest weighted joint speeds that give the desired tool twists."""
+"""Weighted, damped pseudo-inverse: the smallest weighted joint velocities that give the desired tool twists."""
 
 from collections.abc import Callable
 from typing import Final
@@ -31,7 +31,7 @@ def weighted_pseudo_inverse(problem: TrackingProblem) -> Callable[[int, Array], 
 
 
 def damped_velocities(inverse: WeightedInverse, xdot: Array, damping: float | None) -> Array:
-    """Joint speeds with the damping of [Nicolato2007]_ Eq. 2.12.
+    """Joint velocities with the damping of [Nicolato2007]_ Eq. 2.12.
 
     With ``s`` the smallest singular value of ``J W^-1/2`` and ``eps`` the singular region,
     ``lambda^2 = (1 - (s / eps)^2) lambda_max^2`` below ``eps`` and 0 above it, so damping is nil away from
@@ -42,7 +42,7 @@ def damped_velocities(inverse: WeightedInverse, xdot: Array, damping: float | No
         damping: Largest damping factor; None for the program's choice, 0 for none.
 
     Returns:
-        Joint speeds in [rad/s] or [m/s], shape (nq,).
+        Joint velocities in [rad/s] or [m/s], shape (nq,).
 
     Raises:
         NoSolutionError: Without damping, at a singularity.

@@ -46,7 +46,7 @@ class GivenPath:
         return self.spline.at(shares, derivative) / self.end**derivative
 
     def velocities(self, sigma: Array) -> Array:
-        """Speeds of all joints of the cell, those of the others zero, shape (nq, N)."""
+        """Velocities of all joints of the cell, those of the others zero, shape (nq, N)."""
         velocities = np.zeros((self.joint_count, len(sigma)))
         velocities[self.columns] = self.at(sigma, 1).T
         return velocities

@@ -37,7 +37,7 @@ class FirstOrder:
     twist: Array  # reference tool twists relative to the part, shape (m,)
     error: Array  # pose errors, desired minus actual, shape (m,)
     weights: Array  # joint weights, the diagonal of W, shape (nq,)
-    secondary: Array | None  # joint speeds that the secondary goals ask for, shape (nq,); None when there are none
+    secondary: Array | None  # joint velocities that the secondary goals ask for, shape (nq,); None when there are none
     bounds: tuple[Array, Array] | None = None
 
     def bounded(self, null_space_projection: Array, *, velocities: Array) -> Array:
@@ -47,7 +47,7 @@ class FirstOrder:
 
         Args:
             null_space_projection: What the tasks leave of the secondary goals, shape (nq,).
-            velocities: Joint speeds that the tasks need, shape (nq,).
+            velocities: Joint velocities that the tasks need, shape (nq,).
         """
         if self.bounds is None:
             return null_space_projection

@@ -1,4 +1,4 @@
-r"""Secondary goals: the joint speeds that would serve them best, before the tasks are given their due.
+r"""Secondary goals: the joint velocities that would serve them best, before the tasks are given their due.
 
 A goal is a function ``w(q)`` that is to grow ([Ribeiro2010]_ Eq. D.44). Its pull is ``qdot_0 = k_0 W^{-1} grad w`` with
 the joint weights W, and of it the tasks leave ``(I - J# J) qdot_0`` with ``J# = W^-1 J^T (J W^-1 J^T)^-1`` (Eq. D.43).
@@ -93,7 +93,7 @@ class SecondaryGoals:
         return np.concatenate([self._rests - self._length, self._rests, self._rests + self._length])
 
     def velocities(self, t: Array, stance: Stance, *, step: float) -> Array:
-        r"""Joint speeds that the goals ask for at times in [s], shape of ``stance.q``, in [rad/s] or [m/s].
+        r"""Joint velocities that the goals ask for at times in [s], shape of ``stance.q``, in [rad/s] or [m/s].
 
         The gain of each goal is taken as in an implicit step of length ``h``, with the curvature ``c`` of ``-w``,
 
@@ -124,7 +124,7 @@ class SecondaryGoals:
         return x * x * (3.0 - 2.0 * x)
 
     def bounds(self, q: Array) -> tuple[Array, Array]:
-        """Lowest and highest joint speeds that a goal may lead to at a configuration, shape (nq,) each."""
+        """Lowest and highest joint velocities that a goal may lead to at a configuration, shape (nq,) each."""
         return (
             np.maximum(-self._limits, (self._lower - q) / BRAKING),
             np.minimum(self._limits, (self._upper - q) / BRAKING),
@@ -139,13 +139,13 @@ def rests_of(cell: Cell, schedule: Schedule) -> Array:
 
 
 def share_within(velocities: Array, extra: Array, *, lowest: Array, highest: Array) -> Array:
-    """Largest share of extra joint speeds, at most 1, that takes no joint beyond its bounds.
+    """Largest share of extra joint velocities, at most 1, that takes no joint beyond its bounds.
 
     A joint that is beyond them already, on behalf of the tasks, is not taken farther.
 
     Args:
-        velocities: Joint speeds that the tasks need, shape (..., nq).
-        extra: Joint speeds to add, shape (..., nq).
+        velocities: Joint velocities that the tasks need, shape (..., nq).
+        extra: Joint velocities to add, shape (..., nq).
         lowest: Lowest allowed speeds, shape (..., nq).
         highest: Highest allowed speeds, shape (..., nq).
 

@@ -36,7 +36,7 @@ class WeightedInverse:
         self.is_singular = bool(self._s_squared[0] <= ROUNDING * self._s_squared[-1])
 
     def velocities(self, xdot: Array, lambda_squared: float) -> Array:
-        r"""Joint speeds ([Ribeiro2010]_ Eqs. D.28-D.30, damped as in [Nicolato2007]_ Eq. 2.11).
+        r"""Joint velocities ([Ribeiro2010]_ Eqs. D.28-D.30, damped as in [Nicolato2007]_ Eq. 2.11).
 
         .. math:: \dot q = W^{-1} J^T (J W^{-1} J^T + \lambda^2 I)^{-1} \dot x
 
@@ -45,19 +45,19 @@ class WeightedInverse:
             lambda_squared: Square of the damping factor; above 0 where a row is lost.
 
         Returns:
-            Speeds in [rad/s] or [m/s], shape (nq,).
+            Velocities in [rad/s] or [m/s], shape (nq,).
         """
         return self._JW.T @ (self._U @ ((self._U.T @ xdot) / (self._s_squared + lambda_squared)))
 
     def null_space_projection(self, velocities: Array) -> Array:
-        r"""What of given joint speeds moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
+        r"""What of given joint velocities moves no task ([Ribeiro2010]_ Eq. D.43), projected in the metric of W.
 
         .. math:: (I - J^\# J) \dot q_0
 
         Damping has no place here: it would let the speeds leak into the tasks. Lost rows count as no task.
 
         Args:
-            velocities: Any joint speeds, shape (nq,).
+            velocities: Any joint velocities, shape (nq,).
         """
         significant = self._s_squared > ROUNDING * self._s_squared[-1]
         U = self._U[:, significant]

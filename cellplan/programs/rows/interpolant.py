@@ -1,4 +1,4 @@
-r"""The interpolant of exported rows: cubic Hermite through the rows, with central differences as their speeds.
+r"""The interpolant of exported rows: cubic Hermite through the rows, with central differences as their velocities.
 
 Between two rows, :math:`h` apart, with :math:`u` from 0 to 1,
 
@@ -81,7 +81,7 @@ def resting(q: Array) -> Flags:
 
 
 def row_velocities(times: Array, q: Array, *, rests: Flags, lower: Array, upper: Array) -> Array:
-    """Speeds of rows: central differences, zero at rests, and such that no curve between rows leaves the limits.
+    """Velocities of rows: central differences, zero at rests, and such that no curve between rows leaves the limits.
 
     The central difference of uneven rows is the derivative of the parabola through three of them. Where the curve
     would pass a limit between two rows that keep it, the speeds at both are lowered until it is monotone there.

@@ -52,7 +52,7 @@ class Engine:
         self._parts: dict[tuple[int, int], Engine] = {}
 
     def __reduce__(self) -> tuple[type["Engine"], tuple[tuple[CollisionBody, ...]]]:
-        """Leave FCL's own objects behind; the other side builds them anew."""
+        """State without FCL's own objects, which another process builds anew."""
         return Engine, (self.bodies,)
 
     def part(self, other: int, whole: int, pieces: Callable[[CollisionBody], Sequence[CollisionBody]]) -> "Engine":
@@ -150,9 +150,9 @@ class Engine:
 
 
 def nearest_triangle(engine: Engine, mesh: int, other: int, poses: BodyPoses, *, sample: int) -> tuple[int, Array]:
-    """The triangle of a mesh that is nearest to another body, and the way from it to that body in [m], shape (3,).
+    """The triangle of a mesh that is nearest to another body, and the vector to that body in [m], shape (3,).
 
-    Where it is an edge that is nearest, any of its triangles. The way is zero between bodies that touch: FCL's nearest
+    Where an edge is nearest, it is any of its triangles. The vector is zero between bodies that touch: FCL's nearest
     points are none there.
     """
     engine.queries.distances += 1

@@ -16,7 +16,7 @@ CACHED_ROWS: Final = 16_384  # [-] configurations whose displacements are kept: 
 
 
 class ScrewChain:
-    """The links of one placed robot; it keeps the displacements that it was asked for last."""
+    """The links of one placed robot; the displacements that were computed last are cached."""
 
     def __init__(self, robot: Robot) -> None:
         """Take the joint axes at the reference configuration, followers after driven joints."""
@@ -32,7 +32,7 @@ class ScrewChain:
         self._last: tuple[Array, Array] | None = None  # positions and read-only displacements
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the displacements behind; the other side works them out anew."""
+        """State without the cached displacements, which another process computes anew."""
         return self.__dict__ | {"_last": None}
 
     def link_displacements(self, q: Array) -> Array:
@@ -70,7 +70,7 @@ class ScrewChain:
         return self.link_displacements(q)[:, self._flange_link + 1] @ self._X_BT
 
     def axis_points(self, q: Array) -> Array:
-        """The point that stands for each driven joint's axis, carried along, in the world, shape (N, n, 3)."""
+        """Reference point of each driven joint's axis, moved with its link, in the world, shape (N, n, 3)."""
         D = self.link_displacements(q)[:, 1 : self._n + 1]
         points = np.array([axis.point_B for axis in self._axes[: self._n]])
         return (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]

@@ -160,9 +160,9 @@ class Layouts:
 
 
 def enough_nodes(schedule: Schedule, fewest: int) -> int:
-    """About how many nodes follow the desired motion of all tools: the more, the more it does between the knots.
+    """Number of nodes, roughly, that resolve the desired motion of all tools.
 
-    Nodes are doubled until the desired twists are nearly straight from one to the next, up to some between two knots.
+    It is doubled until the desired twists are nearly linear between nodes, up to ``PER_KNOT`` between two knots.
 
     Args:
         schedule: The tasks on the common clock.

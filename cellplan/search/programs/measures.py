@@ -123,7 +123,7 @@ class Measures:
         return Missed(violations=np.concatenate(violations), allowed=np.concatenate(allowed))
 
     def values(self, kind: MeasureKind, subjects: Indices, nodes: Indices) -> Array:
-        """What rows of a kind are about: lacks of margins and distances, shares of speeds; NaN where not measured."""
+        """Measures of a kind: violations of margins and distances, shares of speeds; NaN where not measured."""
         of_nodes = {
             MeasureKind.LOWER_LIMIT: self.lower,
             MeasureKind.UPPER_LIMIT: self.upper,

@@ -32,8 +32,8 @@ class Demands:
         duration: Cycle in [s] that the limits of speed and acceleration must allow; None where any will do. The
             objectives clearance and change need one.
         singular: Least singular values of the arms in [m] and [rad], shape (A,), see ``Problem``; None for any.
-        beyond: Distances in [m] that pairs keep beyond all that, as something that is not known may take as much away,
-            shape (pairs,); None for nothing.
+        beyond: Further distances in [m] that pairs keep, as uncertainties may take as much away, shape (pairs,); None
+            for none.
     """
 
     objective: Objective  # what is improved
@@ -54,9 +54,9 @@ class Demands:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reserve:
-    """By how much more than demanded the rows of a program ask for, so that what a step bends does not break a demand.
+    """Reserves that the rows of a program add to the demands, so that the curvature along a step breaks none.
 
-    Half of it counts as kept at a point.
+    Half of a reserve counts as met at a point.
     """
 
     margin: float = float(np.radians(0.15))  # in [rad] or [m]

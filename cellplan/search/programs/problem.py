@@ -98,7 +98,7 @@ class Problem(Varied, Protocol):
 
         Args:
             x: The values, shape (n,).
-            start: A start posture near the right one, shape (nq,); what variables set of it counts for nothing.
+            start: A start posture near the right one, shape (nq,); entries that variables set are ignored.
             near: A point nearby, which makes it quicker.
         """
 

@@ -91,7 +91,7 @@ class LinearProgram:
         """The best step; None where the solver finds none.
 
         Args:
-            corrections: Added to the lacks of all rows, shape (M,): what a step was seen to miss beyond its rows.
+            corrections: Added to the violations of all rows, shape (M,): what a step was seen to miss beyond its rows.
         """
         count, violations = len(self.box[0]), self._stacked([row.violations for row in self.rows])
         gradients = np.concatenate([np.zeros((0, count)), *(row.gradients for row in self.rows)])

@@ -19,7 +19,7 @@ LEAST_LOAD: Final = 0.5  # [-] shares of limits of a retimed motion from which o
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ConstraintRows:
-    """Rows ``lack + gradient z <= aim t``, of a step z in usual steps of the variables and the objective t."""
+    """Rows ``violation + gradient z <= aim t``, of a step z in usual steps of the variables and the objective t."""
 
     kind: MeasureKind  # what they are about
     subjects: Indices  # columns of joints, or numbers of pairs, shape (M,)
@@ -27,8 +27,8 @@ class ConstraintRows:
     violations: (
         Array  # by how much the demand and the room are missed now, in usual units, negative where kept, shape (M,)
     )
-    gradients: Array  # derivatives of the lacks by z, shape (M, n)
-    allowed: Array  # what of the lacks counts as kept at a point, shape (M,)
+    gradients: Array  # derivatives of the violations by z, shape (M, n)
+    allowed: Array  # violations that count as met at a point, shape (M,)
     units: Array  # usual units of what is measured, see ``Measures.values``, shape (M,)
     aim: float = 0.0  # 1 where the row bounds the objective, 0 where it must be kept
 
@@ -39,7 +39,7 @@ class ConstraintRows:
         return self.of(highest > (float((self.violations - reach).max(initial=-np.inf)) if self.aim else 0.0))
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
-        """By how much more than the rows say a step z was seen to change the lacks, shape (M,); 0 where not seen."""
+        """Change of the violations by a step z beyond what the rows predict, shape (M,); 0 where it was not seen."""
         before, after = (linear.values(self.kind, self.subjects, self.nodes) for linear in (here, there))
         return np.nan_to_num((after - before) / self.units - self.gradients @ z)
 

@@ -61,7 +61,7 @@ class Network:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NetworkVelocities:
-    """Speeds of all joints that keep every circuit closed."""
+    """Velocities of all joints that keep every circuit closed."""
 
     velocities: Mapping[str, float]  # by joint name, in [rad/s] or [m/s]; the imposed ones as given
     freedom: int  # how many of the sought speeds could still be chosen; 0 when the imposed ones decide all

@@ -54,7 +54,7 @@ class PreparedSearch:
     Attributes:
         unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
             with; None where no path varies.
-        found_start: The start posture of the given layout where it was found before all else, shape (nq,).
+        solved_start: The start posture of the given layout where a solve finds it first, shape (nq,); None otherwise.
     """
 
     request: LayoutRequest  # what is searched for
@@ -239,7 +239,7 @@ def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object
 
 
 def _with_solved_start(ready: PreparedSearch) -> PreparedSearch:
-    """The same with the start posture that a solve finds as what is given; unchanged where it finds none."""
+    """The search with the start posture that a solve finds as the given one; unchanged where there is none."""
     try:
         start = ready.given_start
     except NoSolutionError:

@@ -98,7 +98,7 @@ class FilteredMotion:
     def _sub_step(
         self, tasks: FirstOrder, xdot: Array, moves: Array, *, longest: float, step: float
     ) -> tuple[float, Array]:
-        """Let the filter settle over a sub-step; its share of the step and the joint speeds, shape (nq,).
+        """Let the filter settle over a sub-step; its share of the step and the joint velocities, shape (nq,).
 
         The sub-step is halved while a joint would move too far or the feedback would overshoot.
         """
@@ -130,7 +130,7 @@ class FilteredMotion:
 
 
 def _besides(tasks: FirstOrder) -> Array:
-    """Joint speeds for the secondary goals in the null space of the tasks, shape (nq,)."""
+    """Joint velocities for the secondary goals in the null space of the tasks, shape (nq,)."""
     if tasks.secondary is None:
         return np.zeros_like(tasks.weights)
     return WeightedInverse(tasks.J, tasks.weights).null_space_projection(tasks.secondary)

@@ -18,7 +18,7 @@ BRAKING_MARGIN: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VelocityBounds:
-    """Lowest and highest joint speeds in [rad/s] or [m/s], shape (nq,) each; the lower never above the upper."""
+    """Lowest and highest joint velocities in [rad/s] or [m/s], shape (nq,) each; the lower never above the upper."""
 
     lower: Array
     upper: Array
