@@ -10,6 +10,7 @@ from cellplan.files.schema import errors_schema, json_schema, robot_table_schema
 from cellplan.files.schema.json_schemas import entry_title
 from cellplan.jobs.layout.record import layout_schema
 from cellplan.jobs.repair.record import advice_schema
+from cellplan.report.record.figures import QUANTITIES
 from cellplan.report.record.schema import report_schema, series_schema
 
 FOLDER = Path(__file__).resolve().parent / "reference"
@@ -192,7 +193,23 @@ def report_reference() -> str:
     parts = [record_section(name, schema["$defs"][name]) for name in names]
     curves = [record_section(name, form) for name, form in series_schema()["$defs"].items()]
     worst = record_section("SummaryRecord", {**summary, "properties": fields})
-    return "".join([REPORT_INTRODUCTION, *parts, worst, SERIES_INTRODUCTION, *curves, STEPS])
+    return "".join([REPORT_INTRODUCTION, *parts, figures_section(), worst, SERIES_INTRODUCTION, *curves, STEPS])
+
+
+def figures_section() -> str:
+    """The quantities in the table of figures of a report."""
+    head = """
+## Figures
+
+What was measured stands once, in `figures`: by phase, by quantity, and by what it was measured of, which is a robot, a
+joint, a pair of bodies, a task, or `all`. Checks are figures beside their limits. `parts_per_h`, `load_ratio` and
+`share_above_250_mm_s` need the cycle of the whole program: they stand in the records of `cellplan fastest`.
+
+| quantity | over several phases | meaning |
+|---|---|---|
+"""
+    rows = (f"| `{key}` | {it.over_phases.__name__} | {it.meaning} |\n" for key, it in QUANTITIES.items())
+    return head + "".join(rows)
 
 
 def layout_reference() -> str:

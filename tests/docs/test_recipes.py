@@ -89,7 +89,6 @@ FIGURE = {
     "MappingProxyType({\n": '"travel_s": Shown("travel<br>s", small, "travel s", 1.0, "t"),',
     "KEY: Final = (\n": '"travel_s",',
     "velocity_ratio(use)\n": '        yield "travel_s", use.joint, use.travel / use.velocity_limit\n',
-    "if ratio is None else ratio\n": '            yield "travel_s", joint, use["travel"] / use["velocity_limit"]\n',
 }  # what is written into the table of figures, by what it stands behind
 KIND = '''"""How far each joint of a cell travels: the work, and its record, text, page and tables."""
 

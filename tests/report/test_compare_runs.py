@@ -17,7 +17,7 @@ def trees(sound: Path, tmp_path: Path) -> tuple[Path, Path]:
     report, series = tmp_path / "old/pair/report.json", tmp_path / "old/pair/series.json"
     record = json.loads(report.read_text(encoding="utf-8"))
     record["series"] = json.loads(series.read_text(encoding="utf-8"))
-    del record["series"]["schema"], record["phases"]
+    del record["series"]["schema"], record["figures"]
     record["caution"] = "old words"
     report.write_text(json.dumps(record), encoding="utf-8")
     series.unlink()

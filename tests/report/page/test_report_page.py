@@ -45,6 +45,9 @@ def test_every_key_stands_on_the_page(repository: Path, reports: list[Any]) -> N
     named = {word for code in re.findall(r"`([^`\n]+)`", page) for word in re.split(r"[.\s]+", code)}
     cell_names = {name for robot, uses in reports[0]["joints"].items() for name in (robot, *uses)}
     cell_names |= set(reports[0]["tasks"])
+    for report in reports:
+        for phase, quantities in report["figures"].items():
+            cell_names |= {phase, *(subject for subjects in quantities.values() for subject in subjects)}
 
     unnamed = {key for report in reports for key in keys(report, cell_names)} - named
 
