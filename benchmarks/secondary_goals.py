@@ -20,7 +20,7 @@ from cellplan.model.motion.motion import Motion
 from cellplan.model.settings.solver import SecondaryEntry
 from cellplan.model.solver import Integrator
 from cellplan.planning.path.build import build_toolpath
-from cellplan.planning.refine_motion import plan_within_accuracy
+from cellplan.planning.plan_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import schedule_tasks
 from cellplan.planning.tracking.motion_task import MotionTask
 

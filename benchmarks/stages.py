@@ -55,7 +55,7 @@ STAGES: dict[str, dict[str, tuple[str, ...]]] = {  # stage, module, functions
         "cellplan.report.plots.rendering": ("pictures",),
     },
     "picture of the worst instant, floor plan": {
-        "cellplan.runs.drawings.cell_drawings": ("phase_drawings", "phase_floor_plan"),
+        "cellplan.runs.drawings.picture": ("phase_drawings", "phase_floor_plan"),
     },
     "report.json": {
         "cellplan.report.record.run": ("run_record",),

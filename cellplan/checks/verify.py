@@ -24,10 +24,9 @@ from cellplan.checks.tools.between_checks import (
     check_task_between,
     with_between,
 )
-from cellplan.checks.tools.closure import check_closure, closure_accuracy
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
-from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.checks.tools.tracking import check_accuracy, check_closure, closure_accuracy, part_poses, task_accuracy
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell, stacked_positions

@@ -22,14 +22,12 @@ from cellplan.planning.timing.schedule import clock_paths
 from cellplan.report.record.common import Record
 from cellplan.report.record.sections.tasks import direction_text
 from cellplan.report.text.columns import Row, aligned
-from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import moved_start_lines
 from cellplan.report.text.notes import reaches_nowhere
-from cellplan.report.text.run import left_out_lines
+from cellplan.report.text.run import count_text, failure_lines, left_out_lines
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
-from cellplan.runs.plan.path_depths import depths_on_paths
 from cellplan.runs.plan.program_faults import refuse_hanging_parts, refuse_sunk_parts, refuse_unnamed_supports
-from cellplan.runs.plan.start import chosen_start
+from cellplan.runs.plan.start import chosen_start, depths_on_paths
 from cellplan.scene.scene import Scene
 
 MORE = "left_out of check --json"  # where the pairs stand that were not checked in full

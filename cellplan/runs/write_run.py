@@ -14,8 +14,7 @@ from cellplan.files.run.stored import CLOCK
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Program
 from cellplan.model.progress import Progress, silent
-from cellplan.report.page.links import VIEW_PAGE
-from cellplan.report.page.render import PageFiles, overview_page, report_page
+from cellplan.report.page.render import VIEW_PAGE, PageFiles, overview_page, report_page
 from cellplan.report.page.view import unmade_view_page
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
@@ -23,7 +22,7 @@ from cellplan.report.record.common import Provenance, Record, as_json
 from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series_json
 from cellplan.report.record.summary import summary_record
-from cellplan.runs.drawings.cell_drawings import FLOOR_PLAN, STILL, DepictedPhase, phase_drawings, program_drawings
+from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, DepictedPhase, phase_drawings, program_drawings
 from cellplan.runs.solution import Run, Solution
 
 ENGINES: Final = (

@@ -13,9 +13,16 @@ from cellplan.report.record.common import Provenance
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
 from cellplan.report.still.picture import StillPicture
-from cellplan.runs.drawings.cell_drawings import STILL, DepictedPhase, phase_drawings, program_drawings
 from cellplan.runs.drawings.instant import worst_instant
-from cellplan.runs.drawings.picture import MARKED, materials, still_picture
+from cellplan.runs.drawings.picture import (
+    MARKED,
+    STILL,
+    DepictedPhase,
+    materials,
+    phase_drawings,
+    program_drawings,
+    still_picture,
+)
 from cellplan.runs.gate.compare_drawings import foreign_piece, is_same_drawing
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")

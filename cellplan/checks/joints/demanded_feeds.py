@@ -13,7 +13,7 @@ from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task.process_times import fixed_rests, process_span
+from cellplan.model.task.clocked_path import fixed_rests, process_span
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 from cellplan.model.units import MM
 from cellplan.scene.scene import Scene

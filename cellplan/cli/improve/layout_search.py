@@ -18,8 +18,7 @@ from cellplan.files.run.folder import refuse_unless_replaceable
 from cellplan.guard import processors
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.result import layout_lines
-from cellplan.jobs.layout.search import refuse_search, search_layout
-from cellplan.jobs.layout.workers import layout_workers
+from cellplan.jobs.layout.search import layout_workers, refuse_search, search_layout
 from cellplan.jobs.repair.record import SCHEMA
 from cellplan.jobs.repair.repair import repair
 from cellplan.jobs.repair.result import advice_lines, write_repair

@@ -66,8 +66,7 @@ def verify(options: VerifyOptions) -> Result:
 def _verified_run(options: VerifyOptions) -> Result:
     """Verify a run."""
     from cellplan.cli.next_steps import export_line
-    from cellplan.report.text.failures import count_text
-    from cellplan.report.text.run import figure_lines, motion_text, read_record
+    from cellplan.report.text.run import count_text, figure_lines, motion_text, read_record
     from cellplan.runs.gate.open_gate import open_gate
 
     with progress_listener(quiet=options.quiet) as progress:

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from cellplan.cache import key_of
+from cellplan.cache import Key, keep, key_of, recall
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.cache import keep_mesh, recall_mesh
 from cellplan.geometry.mesh.formats.collada_file import parse_collada
 from cellplan.geometry.mesh.formats.polygons import Triangles
 from cellplan.geometry.mesh.formats.stl_obj import parse_mesh, require_likely_count, unknown_format
@@ -47,7 +46,6 @@ __all__ = [
     "tessellate",
     "unknown_format",
 ]
-
 MESH_UNITS: Final[Mapping[str, float]] = {"mm": 1e-3, "m": 1.0, "inch": 0.0254}  # [m]
 FORMATS: Final = frozenset({".stl", ".obj", ".ply", ".dae"})
 MAX_BYTES: Final = 100_000_000
@@ -56,6 +54,33 @@ MAX_EXTENT: Final = 20.0  # [m] larger ones as well
 FLAT_FRACTION: Final = 1e-6  # [-] of the extent: thinner than this is a sheet without inside
 CORNER_LAGS: Final = (1, 2, 3)  # places between two of the four triangles at an edge that two solids share
 CREASE: Final = np.radians(30.0)  # [rad] sharper edges stay edges when normals are smoothed
+
+
+def recall_mesh(key: Key | None, *, source: str) -> Mesh | None:
+    """The mesh that was kept under a key; None when there is none, or one that cannot be a mesh."""
+    arrays = recall(key)
+    if arrays is None or len(arrays) != 3 or not _is_mesh(*arrays):
+        return None
+    vertices, faces, is_closed = arrays
+    return Mesh(
+        vertices=vertices.astype(np.float64), faces=faces.astype(np.int64), source=source, is_closed=bool(is_closed)
+    )
+
+
+def keep_mesh(key: Key | None, mesh: Mesh) -> None:
+    """Keep a mesh, but not where it came from: files with other names may hold the same."""
+    keep(key, (mesh.vertices, mesh.faces, np.array(mesh.is_closed)))
+
+
+def _is_mesh(vertices: NDArray[np.generic], faces: NDArray[np.generic], is_closed: NDArray[np.generic]) -> bool:
+    """Whether the arrays have the types and shapes of a mesh, and every triangle has its corners."""
+    types = [array.dtype.name for array in (vertices, faces, is_closed)]
+    if types != ["float64", "int64", "bool"] or is_closed.shape != ():
+        return False
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not faces.size:
+        return False
+    is_in_range = bool(np.all((faces.astype(np.int64) >= 0) & (faces.astype(np.int64) < len(vertices))))
+    return is_in_range and bool(np.all(np.isfinite(vertices.astype(np.float64))))
 
 
 def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:

@@ -5,8 +5,9 @@ from concurrent.futures import Executor
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cellplan.jobs.layout.finish.finish import CandidateResult, Finish, certified_cell
 from cellplan.jobs.layout.given_layout import Given, given_layout
@@ -18,7 +19,6 @@ from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared
 from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, Proposals, is_candidate, proposals_of
 from cellplan.jobs.layout.trials.searched import read_attempts, searched_cell
 from cellplan.jobs.layout.trials.trial import evaluate
-from cellplan.jobs.layout.workers import layout_workers
 from cellplan.model.cell.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
@@ -32,6 +32,7 @@ from cellplan.study.workers import Limits, Workers
 BUDGET: Final = 60.0  # [s] of a search that does not say where to end
 CANDIDATES: Final = 4  # [-] layouts that are finished until one passes
 TRIAL_LIMIT: Final = 900.0  # [s] of the processor for one trial
+TRIAL: Final = "cellplan.jobs.layout.trials.trial"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -238,3 +239,19 @@ def _value(trial: StudyTrial, figure: str, sign: float) -> float:
     """The figure of a trial that is compared; without one it comes last."""
     value = trial.figures.get(figure)
     return float(value) if isinstance(value, int | float) else sign * float("inf")
+
+
+def layout_workers(count: int, request: LayoutRequest) -> Workers:
+    """Worker processes, for a ``with`` statement; they make the cell ready while the caller goes on.
+
+    Where the first conforming layout ends the search, mostly the first trial is the last one: one process begins, with
+    that trial.
+    """
+    is_one = request.objective is Objective.CONFORMING
+    first = partial(_call, "evaluate_first" if is_one else "prepared", request.anywhere)
+    return Workers(count, modules=(TRIAL,), first=first, at_once=1 if is_one else None)
+
+
+def _call(name: str, *arguments: object) -> Any:
+    """Call a function of the trials, which only the worker imports."""
+    return getattr(import_module(TRIAL), name)(*arguments)

@@ -22,7 +22,7 @@ from cellplan.model.report.rehearsal import (
 )
 from cellplan.model.report.report import CAUTION, TaskAccuracy
 from cellplan.report.record.common import AXES, Provenance, Record, check_record, entry_record, number
-from cellplan.report.record.sections.idle import missing_moves
+from cellplan.report.record.phases import missing_moves
 from cellplan.report.record.sections.tasks import BETWEEN_ROWS
 
 SCHEMA = "cellplan.rehearsal/1"

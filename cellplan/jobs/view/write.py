@@ -21,7 +21,7 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import CAUTION
 from cellplan.planning.transfer.best_try import BlockedTransferError
-from cellplan.report.page.links import VIEW_PAGE
+from cellplan.report.page.render import VIEW_PAGE
 from cellplan.report.page.view import is_view_page
 from cellplan.report.record.common import Record
 from cellplan.runs.gate.stored_cell import load_stored_cell

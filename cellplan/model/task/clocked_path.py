@@ -1,6 +1,7 @@
 """Clocked path: the desired motion of one tool at any time, and the times at which it is not smooth."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -10,13 +11,13 @@ from cellplan.errors import InputError
 from cellplan.geometry.curves.arc_length import QuickParameters
 from cellplan.geometry.curves.curve import Interval
 from cellplan.geometry.transforms import Array, rotation_about
-from cellplan.model.task.process_times import fixed_rests, leaves_at, ramp_shares
 from cellplan.model.task.task import TIME_TOLERANCE, Task, TimeLawKind
 from cellplan.model.task.time_law import advance, reached_at, stand_off
 from cellplan.model.task.toolpath import TOOL_Z, Toolpath
 
 SAME_PLACE: Final = 1e-12  # [-] of the whole length: knots nearer to a stop lie on it
 MOST_BREAKS: Final = 2_000_000  # smooth stretches of a motion; integration over more of them takes too long
+Spans = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -194,3 +195,39 @@ def distinct(times: Array) -> Array:
     """Times in increasing order, one for those that are nearer to each other than rounding, shape (n,)."""
     ordered = np.sort(times)
     return ordered[np.diff(ordered, prepend=-np.inf) > TIME_TOLERANCE]
+
+
+def leaves_at(task: Task, corners: Array) -> float:
+    """Time in [s] at which a tool leaves the end of its path: after the delay of its process, and a dwell.
+
+    Args:
+        corners: Times in [s] at which the stretches of its path begin, and the one at which the last ends; so below.
+    """
+    return float(corners[-1]) + task.off_delay + task.dwell
+
+
+def process_span(task: Task, corners: Array) -> tuple[float, float]:
+    """Times in [s] between which a process is on; without one, those at which the path starts and ends."""
+    return task.start, float(corners[-1]) + task.off_delay
+
+
+def fixed_rests(task: Task, corners: Array) -> Spans:
+    """Stretches of time in [s] that a retimed program keeps: the delays of a process, and a dwell."""
+    on, off = process_span(task, corners)
+    ends = (on, float(corners[0])), (float(corners[-1]), off), (off, leaves_at(task, corners))
+    return tuple((begin, end) for begin, end in ends if end - begin > TIME_TOLERANCE)
+
+
+def demanded_spans(task: Task, corners: Array) -> Spans:
+    """Stretches of time in [s] in which the feed of a process is demanded: between its ramps."""
+    if task.process is None:
+        return ()
+    ramp = task.process.ramp_s
+    spans = ((begin + ramp, end - ramp) for begin, end in pairwise(corners.tolist()))
+    return tuple((begin, end) for begin, end in spans if end - begin > TIME_TOLERANCE)
+
+
+def ramp_shares(task: Task, corners: Array) -> Array:
+    """Share of the time of each stretch that a ramp of its time law takes, shape (corners - 1,)."""
+    duration = np.diff(corners)
+    return np.full(len(duration), task.time_law.ramp) if task.process is None else task.process.ramp_s / duration

@@ -28,8 +28,7 @@ from cellplan.planning.collocation.start_offset import start_offset
 from cellplan.planning.collocation.windows import Panel, Window, windows_between
 from cellplan.planning.euler.cycle_closing import SAME_POSE, drift_pace
 from cellplan.planning.tracking.given_path import GivenPath
-from cellplan.planning.tracking.locked_joints import locked_since
-from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.planning.tracking.motion_task import MotionTask, locked_since
 from cellplan.scene.kinematics.batched import CACHE_BLOCK
 
 SETTLING_STEPS: Final = 20  # of the clock, in which a tool that starts within its tolerance comes to its path

@@ -13,8 +13,7 @@ from cellplan.geometry.transforms import Array, rotation_vector
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.settings.task import ProcessEntry
-from cellplan.model.task.clocked_path import ClockedPath
-from cellplan.model.task.process_times import demanded_spans, leaves_at, ramp_shares
+from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, leaves_at, ramp_shares
 from cellplan.model.task.task import TIME_TOLERANCE, Task
 from cellplan.model.task.time_law import peak_rate, reached_at, stand_off
 from cellplan.model.task.toolpath import Toolpath

@@ -46,3 +46,12 @@ class MotionTask:
 def closures(cell: Cell, moving: Sequence[str]) -> tuple[Grasp, ...]:
     """Grasps of the further holders that move; where the part stands still, so do all its holders."""
     return tuple(grasp for grasp in cell.closures if grasp.robot in moving)
+
+
+def locked_since(cell: Cell) -> Array:
+    """Time in [s] from which each joint stays where it is, inf for those that do not fail, shape (nq,)."""
+    since = np.full(cell.joint_count, np.inf)
+    for lock in cell.motion.locked:
+        index = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)
+        since[index] = min(since[index], lock.since)
+    return since

@@ -14,8 +14,7 @@ from cellplan.model.cell.cell import Cell, Grasp, Relation
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian, pose_errors
 from cellplan.planning.tracking.given_path import GivenRows
 from cellplan.planning.tracking.joint_weights import JointWeights
-from cellplan.planning.tracking.locked_joints import locked_since
-from cellplan.planning.tracking.motion_task import MotionTask
+from cellplan.planning.tracking.motion_task import MotionTask, locked_since
 from cellplan.planning.tracking.secondary_goals import SecondaryGoals, Stance, rests_of, share_within
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows
 from cellplan.scene.kinematics.pinocchio_model import CellState, CombinedModel

@@ -18,8 +18,7 @@ from cellplan.checks.tools.between_checks import (
     check_task_between,
     with_between,
 )
-from cellplan.checks.tools.closure import check_closure, closure_accuracy
-from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.checks.tools.tracking import check_accuracy, check_closure, closure_accuracy, part_poses, task_accuracy
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule

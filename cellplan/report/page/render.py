@@ -9,8 +9,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Annotated, Final, TypedDict, Unpack
+from urllib.parse import quote
 
 import jinja2
 from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined, Template
@@ -21,7 +22,6 @@ from cellplan.model.report.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.first_screen import MAX_SPEEDS, not_judged, process_speeds, worst_instant
-from cellplan.report.page.links import FLOOR_PLAN, STILL, Links, file_links, view_link
 from cellplan.report.page.time_line import task_times, time_line
 from cellplan.report.page.times import TimeLinks, page_begin, phase_begins
 from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
@@ -34,6 +34,11 @@ from cellplan.report.record.sections.tasks import direction_text
 from cellplan.report.text.method import method_lines
 from cellplan.report.text.notes import grip_notes, left_out_notes, open_surface_notes
 
+Links = list[tuple[str, str]]  # text and address
+TABLES: Final = {"tables": "Joint tables", "rejected": "Joint tables of a failed run, not for use"}
+STILL: Final = "still.svg"  # picture of the worst instant, beside the page
+FLOOR_PLAN: Final = "floor_plan.svg"  # likewise
+VIEW_PAGE: Final = "view.html"  # the 3-D page in a run folder
 MODES: Final = {
     "simultaneous": "all robots move",
     "pairwise": "the positioner and one operator move at a time",
@@ -49,6 +54,41 @@ PACKAGE: Final = TEMPLATES.parents[
     2
 ]  # the template of a kind of result stands beside its job: jobs/fastest/fastest.html
 OPTIONS: Final = ("autoescape", "trim_blocks", "lstrip_blocks", "keep_trailing_newline", "optimized")
+
+
+def file_links(
+    tables: Collection[str], plots: Iterable[str], files: Iterable[str], *, phase: str | None
+) -> dict[str, Links]:
+    """Links to the files of a run by what they are.
+
+    Args:
+        tables: Names of the joint tables in the run folder.
+        plots: Names of the plots in the folder of the page.
+        files: Names of other files in that folder.
+        phase: Phase of the page, which lies in a folder of its own; None for the page in the run folder.
+    """
+    up = _up(phase)
+    groups = {title: _tables(tables, folder, up) for folder, title in TABLES.items()}
+    of_the_run = [(name, f"{up}{name}") for name in ("cell.yaml", "manifest.json")]
+    groups["Results"] = [*((name, name) for name in files), *of_the_run]
+    groups["Plots"] = [(PurePosixPath(name).stem.replace("_", " "), f"plots/{quote(name)}") for name in plots]
+    return {title: links for title, links in groups.items() if links}
+
+
+def view_link(phase: str | None) -> str:
+    """Address of the 3-D page of a run, seen from the page of a phase, or from the page in the run folder."""
+    return f"{_up(phase)}{VIEW_PAGE}"
+
+
+def _up(phase: str | None) -> str:
+    """The way from the folder of a page to the run folder, to be put before a name."""
+    return "../" if phase is not None else ""
+
+
+def _tables(files: Collection[str], folder: str, up: str) -> Links:
+    """The tables in one folder."""
+    names = sorted(name for name in files if PurePosixPath(name).parent == PurePosixPath(folder))
+    return [(PurePosixPath(name).stem, f"{up}{quote(name)}") for name in names]
 
 
 class PageFiles(TypedDict, total=False):

@@ -1,10 +1,12 @@
-"""Phases of the program in the record of a run."""
+"""Phases of the program in the record of a run, its clock, and robots and moves that are not part of it."""
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Final, TypedDict
 
 from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.idle import not_in_program
 from cellplan.model.motion.plan import Phase
+from cellplan.model.report.report import Report
 from cellplan.report.record.common import Number, Record, number
 
 AT: Final = "at_s"  # ends the key of an instant, which counts from the begin of its phase
@@ -84,3 +86,25 @@ def clock_from(cell: Cell) -> str:
         return TASKS
     steps = duration / cell.motion.step
     return GIVEN if abs(steps - round(steps)) <= STEP_TOL * max(steps, 1.0) else NEXT_STEP
+
+
+class IdleRecord(TypedDict):
+    """Idle robots and missing moves."""
+
+    idle: list[str]
+    not_in_program: list[str]
+
+
+def idle_record(cell: Cell, report: Report) -> IdleRecord:
+    """Idle robots of one run, and moves that its program does not contain."""
+    return {"idle": list(report.idle), "not_in_program": missing_moves(cell, {None: report.tasks})}
+
+
+def missing_moves(cell: Cell, runs: Mapping[str | None, Iterable[str]]) -> list[str]:
+    """Lines on moves that the programs of several runs do not contain, each with the name of its run.
+
+    Args:
+        runs: Names of its tasks, by the name of the run.
+    """
+    lines = {run: not_in_program(cell, tuple(tasks)) for run, tasks in runs.items()}
+    return [f"{run}: {line}" if run else line for run, line in lines.items() if line]

@@ -18,7 +18,7 @@ from cellplan.report.record.common import (
     status,
 )
 from cellplan.report.record.figures import FiguresRecord, figures_record
-from cellplan.report.record.phases import PhaseRecord, clock_from, phases_record
+from cellplan.report.record.phases import PhaseRecord, clock_from, idle_record, phases_record
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, accelerations_record
 from cellplan.report.record.sections.clearance import (
     ClosestPair,
@@ -34,7 +34,6 @@ from cellplan.report.record.sections.clearance import (
     exclusions_record,
     left_out_record,
 )
-from cellplan.report.record.sections.idle import idle_record
 from cellplan.report.record.sections.joints import (
     JointRecord,
     LockedJointRecord,

@@ -18,11 +18,10 @@ from cellplan.report.record.common import (
     status,
 )
 from cellplan.report.record.figures import Fold, figures_record
-from cellplan.report.record.phases import AT, clock_from, in_phase, phase_key, phases_record
+from cellplan.report.record.phases import AT, clock_from, in_phase, missing_moves, phase_key, phases_record
 from cellplan.report.record.run import SCHEMA, HeadRecord
 from cellplan.report.record.sections.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
 from cellplan.report.record.sections.clearance import clearance_record, left_out_record
-from cellplan.report.record.sections.idle import missing_moves
 from cellplan.report.record.sections.joints import joints_record, repeatability_record, with_worst_time
 from cellplan.report.record.sections.payload import hardest_loads, loads_record
 from cellplan.report.record.sections.rests_on import open_surfaces_record, rests_on_record

@@ -2,9 +2,11 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Final
 
+from cellplan.model.report.check_kinds import CHECK_KINDS
 from cellplan.model.report.left_out import NOTHING_LEFT_OUT, TITLES, LeftOutKind
 from cellplan.model.solver import METHODS
 from cellplan.report.record.common import Record
@@ -12,10 +14,11 @@ from cellplan.report.record.numbers import fixed, floored, percent, plain, secon
 from cellplan.report.record.phases import instant_text
 from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.columns import Row, aligned
-from cellplan.report.text.failures import count_text, failure_lines
 from cellplan.report.text.method import DEFAULT_METHOD, moved_start_lines, no_accurate_mode
 from cellplan.report.text.notes import accuracy_note, clock_note, grip_notes, open_surface_notes
 from cellplan.report.text.skew import skew_row
+
+MOST_OF_A_GROUP: Final = 8  # [-] failed checks that are shown; further ones are counted
 
 
 def read_record(folder: Path) -> Record:
@@ -304,3 +307,30 @@ def _world_rows(accelerations: Record) -> Iterator[Row]:
 def _figure(point: Record, what: str) -> tuple[str, str]:
     """Figure of a point, and when it is reached."""
     return f"{small(point['peak_acceleration_m_s2'])} m/s2", f"{what} {instant_text(point, 'peak_acceleration_at_s')}"
+
+
+def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
+    """A line for each failed check below a heading for each group; nothing if all checks passed.
+
+    Args:
+        more: Where the checks stand that are not shown.
+    """
+    groups: dict[str, list[str]] = {}
+    for check in checks:
+        if not check["passed"]:
+            phase = f"{check['phase']}: " if check.get("phase") else ""
+            groups.setdefault(CHECK_KINDS[check["name"]].heading, []).append(f"{phase}{check['message']}")
+    for title, messages in groups.items():
+        yield f"  {title}: {len(messages)} failed"
+        yield from (f"    FAILED {message}" for message in messages[:MOST_OF_A_GROUP])
+        if len(messages) > MOST_OF_A_GROUP:
+            yield f"    and {len(messages) - MOST_OF_A_GROUP} more, all in {more}"
+
+
+def count_text(checks: Iterable[Record]) -> str:
+    """How many checks passed or failed."""
+    outcomes = [bool(check["passed"]) for check in checks]
+    failed = outcomes.count(False)
+    if failed:
+        return f"{failed} of {len(outcomes)} checks failed"
+    return f"{len(outcomes)} checks passed" if len(outcomes) != 1 else "1 check passed"

@@ -1,7 +1,7 @@
 """The picture of the instant that decides the verdict of a run: what stands where at it, and what matters."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,15 @@ from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Report
 from cellplan.model.task.task import Frame
 from cellplan.model.units import MM
+from cellplan.report.floor_plan.sheet import floor_plan_svg
 from cellplan.report.plots.palette import robot_colours
 from cellplan.report.record.numbers import floored
 from cellplan.report.still.facets import facets
 from cellplan.report.still.picture import Colour, ShownLine, ShownName, ShownSolid, StillPicture
 from cellplan.report.still.shading import mixed
 from cellplan.report.still.sheet import still_svg
-from cellplan.runs.drawings.instant import Instant, heading, is_exact, worst_instant
+from cellplan.runs.drawings.floor_plan import floor_plan, schedule_paths, swept_state
+from cellplan.runs.drawings.instant import Instant, graver, heading, is_exact, worst_instant
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, scene_bodies
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -40,6 +42,8 @@ GREYS: Final = {
 ROBOT: Final = "robot "  # begins the name of the colour of a robot; the space keeps it apart from all others
 MUTED: Final = "muted "  # the same of a robot that does not matter here
 MUTING: Final = 0.62  # [-]
+STILL: Final = "still.svg"
+FLOOR_PLAN: Final = "floor_plan.svg"
 
 
 def run_still(cell: Cell, schedule: Schedule, report: Report) -> str:
@@ -245,3 +249,31 @@ def _floor(cell: Cell) -> float | None:
         if isinstance(thing.shape, HalfSpace) and thing.X_WS[2, 2] > 1.0 - 1e-6
     ]
     return max(heights) if heights else None
+
+
+class DepictedPhase(NamedTuple):
+    """What is drawn of one phase: the cell as it is in it, its tasks and what was found."""
+
+    cell: Cell
+    schedule: Schedule
+    report: Report
+
+
+def phase_drawings(phase: DepictedPhase) -> dict[str, str]:
+    """The drawings of one phase, by file name."""
+    return {STILL: run_still(*phase), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
+
+
+def program_drawings(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, str]:
+    """The drawings of a program with several phases: the picture of the one that decides, and all of its motion."""
+    worst = min(phases, key=lambda phase: graver(worst_instant(phase.report, phase.cell)))
+    return {STILL: run_still(*worst), FLOOR_PLAN: _floor_plan(cell, phases)}
+
+
+def _floor_plan(cell: Cell, phases: Sequence[DepictedPhase]) -> str:
+    """The floor plan at the begin of the first phase, with what all phases sweep."""
+    motions = [phase.report.q for phase in phases]
+    paths = {name: points for phase in phases for name, points in schedule_paths(phase.schedule).items()}
+    whole = sum(phase.report.cycle_time for phase in phases)
+    start = {name: q[0] for name, q in motions[0].items()}
+    return floor_plan_svg(floor_plan(cell, start, motions, paths, state=swept_state(whole)))

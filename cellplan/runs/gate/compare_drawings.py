@@ -8,7 +8,7 @@ from cellplan.files.input.findings import shown
 from cellplan.files.run.stored import StoredRun
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.verified_run import VerifiedMotion
-from cellplan.runs.drawings.cell_drawings import DepictedPhase, phase_drawings, program_drawings
+from cellplan.runs.drawings.picture import DepictedPhase, phase_drawings, program_drawings
 from cellplan.runs.gate.picture_text import PIECE, unbalanced
 
 CellDrawings = Mapping[str, Mapping[str, str]]

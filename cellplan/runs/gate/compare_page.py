@@ -14,7 +14,7 @@ from cellplan.report.record.common import Provenance, Record
 from cellplan.report.record.phases import has_phases
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record
-from cellplan.runs.drawings.cell_drawings import FLOOR_PLAN, STILL
+from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL
 from cellplan.runs.gate.compare_drawings import CellDrawings, foreign_drawings, stored_drawings
 from cellplan.runs.gate.compare_report import PLANNER_KEYS
 from cellplan.runs.gate.equal_text import first_difference

@@ -20,9 +20,8 @@ from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.planning.modes import homeless
 from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.phases import has_phases
+from cellplan.report.record.phases import has_phases, missing_moves
 from cellplan.report.record.run import run_record
-from cellplan.report.record.sections.idle import missing_moves
 from cellplan.report.record.series import series
 from cellplan.report.record.summary import summary_record
 from cellplan.runs.gate.compare_drawings import drawings_again, other_drawings

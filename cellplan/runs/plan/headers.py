@@ -10,8 +10,8 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.idle import not_in_program
 from cellplan.model.motion.plan import NOT_IN_PROGRAM, Phase
 from cellplan.model.report.report import Report
+from cellplan.report.record.phases import missing_moves
 from cellplan.report.record.sections.accelerations import table_line
-from cellplan.report.record.sections.idle import missing_moves
 from cellplan.report.record.sections.rests_on import zero_text
 
 

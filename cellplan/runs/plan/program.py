@@ -13,7 +13,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Clock, ClockTable, JointTable, Motion, Schedule
 from cellplan.model.motion.plan import Hold, Interval, Phase, Plan, rows_of
-from cellplan.model.task.process_times import fixed_rests
+from cellplan.model.task.clocked_path import fixed_rests
 from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import TIME_DECIMALS, retimed_schedule, schedule_tasks

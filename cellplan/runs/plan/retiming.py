@@ -17,8 +17,7 @@ from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.settings.units import si_or_none
-from cellplan.model.task.clocked_path import ClockedPath
-from cellplan.model.task.process_times import fixed_rests
+from cellplan.model.task.clocked_path import ClockedPath, fixed_rests
 from cellplan.model.task.task import Task
 from cellplan.planning.timing.fixed_rates import FixedRate
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer

@@ -14,7 +14,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.task import TIME_TOLERANCE
 from cellplan.planning.modes import standing
-from cellplan.planning.refine_motion import plan_within_accuracy
+from cellplan.planning.plan_motion import plan_within_accuracy
 from cellplan.planning.timing.schedule import schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene

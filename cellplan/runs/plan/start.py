@@ -2,22 +2,27 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
 from cellplan.checks.clearance.mounting import CURES, check_mounting
+from cellplan.checks.clearance.standoff import check_standoffs, standoff_on
+from cellplan.checks.clearance.tool_depth import AXIS_COMPONENTS, check_depths, path_depth
 from cellplan.errors import StartNotFoundError
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Check
 from cellplan.model.task.clocked_path import ClockedPath
+from cellplan.model.task.task import Frame
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.start.search import StartChoice, choose_start
-from cellplan.runs.plan.path_depths import depths_on_paths
 from cellplan.scene.bodies import Kind
 from cellplan.scene.grips import closed_depth
 from cellplan.scene.mounting import Mount, MountedPair
 from cellplan.scene.scene import Scene
+
+POSES: Final = 1001  # [-] poses of each path at which the depth of the tool's axis is computed
 
 
 def chosen_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Progress = silent) -> StartChoice:
@@ -92,3 +97,21 @@ def _mounting_key(cell: Cell, name: str, bodies: list[str]) -> str:
     if any(other.name == robot for other in cell.robots):
         return f"robots.{robot}.base"
     return "part.at" if bodies[0] == "part" else f"environment.{bodies[0]}"
+
+
+def depths_on_paths(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> list[Check]:
+    """Checks of those tools that would stand too deep in the part, or off it, on the desired path."""
+    depths = [path_depth(cell, cell.task(name), toolpath.spread(POSES)) for name, toolpath in toolpaths.items()]
+    checks = check_depths(cell, [depth for depth in depths if depth is not None])
+    tips = [
+        standoff_on(cell, cell.task(name), path.spread(POSES))
+        for name, path in toolpaths.items()
+        if _on_part(cell, name)
+    ]
+    return [check for check in (*checks, *check_standoffs(cell, tips)) if not check.passed]
+
+
+def _on_part(cell: Cell, name: str) -> bool:
+    """Whether a task says where on the part the tip is, all along its path."""
+    task = cell.task(name)
+    return task.relative_to is Frame.PART and set(AXIS_COMPONENTS) <= set(task.axes)

@@ -17,8 +17,8 @@ from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
 from cellplan.scene.kinematics.batched import Placement
+from cellplan.search.kernel.derivatives import keep_freed_memory
 from cellplan.search.kernel.job import Job, Layouts
-from cellplan.search.kernel.memory import keep_freed_memory
 
 AT_ONCE: Final = 256  # candidates side by side: enough for NumPy, and the arrays of one node stay in the cache
 START_TOL: Final = 1e-6  # [m] and [rad] up to which a tool counts as at the start of its path

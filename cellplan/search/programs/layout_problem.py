@@ -11,13 +11,12 @@ from cellplan.geometry.frozen import derive
 from cellplan.model.cell.cell import joint_at
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.robot.robot import JointLimits
-from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.near_pairs import PairsAtNodes, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 
 
@@ -99,3 +98,42 @@ class LayoutProblem:
     def joint_names(self, column: int) -> tuple[str, str]:
         """See ``Problem``."""
         return joint_at(self.job.cell, column)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairsAtNodes:
+    """Near pairs and the nodes that their keys are."""
+
+    near: LayoutDistances  # the pairs
+    nodes: Indices  # the nodes, shape (K,)
+
+    @classmethod
+    def of(cls, distances: Distances) -> "PairsAtNodes":
+        """Those that distances came from.
+
+        Raises:
+            TypeError: The distances are not those of ``distances_at``.
+        """
+        if not isinstance(distances.detail, PairsAtNodes):
+            raise TypeError("distance_derivatives: expected distances of this problem")
+        return distances.detail
+
+
+def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, within: float) -> Distances:
+    """Pairs of bodies that are less than a distance beyond what is demanded of any.
+
+    Args:
+        x: Variables of the layout, shape (n,).
+        q: Joint positions at all nodes in [rad] or [m], shape (N, nq).
+        nodes: The nodes that are asked for, shape (K,).
+        within: The distance in [m].
+    """
+    near = bodies.near(x, q[nodes], within + bodies.most_demanded)
+    return Distances(
+        pairs=near.pairs,
+        nodes=nodes[near.keys],
+        values=near.distances,
+        demands=near.demands,
+        within_robot=near.within_robot,
+        detail=PairsAtNodes(near=near, nodes=nodes),
+    )

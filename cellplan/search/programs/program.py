@@ -4,14 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+import daqp
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.search.programs.measures import IN_RESERVE
 from cellplan.search.programs.objective import Demands, Objective, Reserve
 from cellplan.search.programs.rows import ConstraintRows, Linear
-from cellplan.search.programs.solver import ProgramSolution, least
 
+SOLVED: Final = 1  # exit flag of daqp
+UNBOUNDED: Final = 1e30  # [-] no bound
+PROVED: Final = 1e-6  # [-] by which an answer may miss a row of length 1
 DEAREST: Final = 1e4  # [-] price of slack
 HIGHER: Final = 10.0  # [-] factor of the price
 SPARED: Final = 0.1  # [-] share of what could be mended that a price may leave
@@ -21,6 +24,51 @@ CURVATURE: Final = 0.75  # [-] of the time: second derivative of c^(-1/2) by a r
 SLOWER: Final = -0.4  # [-] least relative change of a square in one step
 FASTER: Final = 0.6  # [-] largest one
 FARTHEST: Final = 1e6  # [-] by which the objective of one step may change
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramSolution:
+    """The least point of a program."""
+
+    at: Array  # the point, shape (n,)
+    multipliers: Array  # how fast the least value falls as a row's bound rises, shape (M,), none negative
+    of_bounds: Array  # the same of the bounds of the variables, negative at lower ones, shape (n,)
+
+
+def least(
+    cost: Array, weights: Array, rows: Array, highest: Array, bounds: tuple[Array, Array]
+) -> ProgramSolution | None:
+    """Minimise ``cost x + 1/2 sum weights x^2`` under ``rows x <= highest`` and bounds.
+
+    Args:
+        cost: Shape (n,).
+        weights: Positive, shape (n,).
+        rows: Shape (M, n).
+        highest: Shape (M,).
+        bounds: Lower and upper ones, shape (n,) each.
+
+    Returns:
+        The point; None where the solver finds none.
+    """
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths = np.where(lengths > 0.0, lengths, 1.0)
+    scaled, top = np.ascontiguousarray(rows / lengths[:, None]), highest / lengths
+    lower, upper = bounds
+    at, _, flag, info = daqp.solve(
+        np.diag(weights),
+        np.ascontiguousarray(cost),
+        scaled,
+        np.concatenate([upper, top]),
+        np.concatenate([lower, np.full(len(top), -UNBOUNDED)]),
+        np.zeros(len(cost) + len(top), dtype=np.intc),
+    )
+    solution = np.asarray(at)
+    if flag != SOLVED or not np.all(scaled @ solution - top <= PROVED * (1.0 + np.linalg.norm(solution))):
+        return None
+    multipliers = np.asarray(info["lam"])
+    return ProgramSolution(
+        at=solution, multipliers=multipliers[len(cost) :] / lengths, of_bounds=multipliers[: len(cost)]
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -25,7 +25,7 @@ from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.screws import Directions, TaskScrews
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
-from cellplan.search.programs.near_pairs import PairsAtNodes, distances_at
+from cellplan.search.programs.layout_problem import PairsAtNodes, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.variables import PathVariables

@@ -9,8 +9,7 @@ import trimesh
 from cellplan.cache import keep, key_of
 from cellplan.cache.store import forget
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.cache import recall_mesh
-from cellplan.geometry.mesh.load import read_mesh
+from cellplan.geometry.mesh.load import read_mesh, recall_mesh
 from cellplan.geometry.shapes import Mesh
 
 pytestmark = pytest.mark.usefixtures("cache_folder")

@@ -9,11 +9,11 @@ from builders.random_cells import carried, moved, random_cell, random_pose, shar
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, rotation_vector
-from cellplan.model.cell.cell import Grasp, Mode
+from cellplan.model.cell.cell import Grasp, LockedJoint, Mode
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.task.task import Frame
 from cellplan.planning.modes import plan_phases
-from cellplan.planning.tracking.motion_task import MotionTask, closures
+from cellplan.planning.tracking.motion_task import MotionTask, closures, locked_since
 from cellplan.planning.tracking.problem import TrackingProblem
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -125,3 +125,19 @@ def test_the_part_cannot_be_carried_while_it_is_to_rest():
         "the positioner 'holder'; choose another mode or leave the task out"
     )
     assert plan_phases(cell, only="task_op0").program[0].moving == ("op0",)
+
+
+def test_each_joint_stands_still_from_its_earliest_instant_on() -> None:
+    cell = random_cell(1, operators=2)
+    locks = (
+        LockedJoint(robot="op1", joint="j2", since=0.7),
+        LockedJoint(robot="op1", joint="j2", since=0.4),
+        LockedJoint(robot="holder", joint="j0", since=0.0),
+    )
+
+    since = locked_since(replace(cell, motion=replace(cell.motion, locked=locks)))
+
+    assert since[cell.columns("op1").start + 2] == 0.4
+    assert since[0] == 0.0
+    assert np.isinf(since).sum() == cell.joint_count - 2
+    assert np.all(np.isinf(locked_since(cell)))

@@ -10,8 +10,7 @@ from urllib.parse import unquote
 import pytest
 
 from cellplan.cli.main import run
-from cellplan.report.page.links import file_links
-from cellplan.report.page.render import page_scripts
+from cellplan.report.page.render import file_links, page_scripts
 
 
 class Parts(HTMLParser):

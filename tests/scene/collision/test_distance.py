@@ -14,7 +14,7 @@ from cellplan.geometry.transforms import pose
 from cellplan.scene.collision.bodies import BodyPoses, CollisionBody, checked_poses, prepare
 from cellplan.scene.collision.distance import Reading, first_touching, measure, quick_reading
 from cellplan.scene.collision.engine import Engine
-from cellplan.scene.collision.hulls import convex_hull
+from cellplan.scene.collision.hull_cache import convex_hull
 from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.separation import heights
 from cellplan.scene.scene import Scene

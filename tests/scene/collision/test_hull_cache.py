@@ -9,10 +9,9 @@ import pytest
 from cellplan.cache import key_of
 from cellplan.cache.store import forget
 from cellplan.errors import InputError
-from cellplan.geometry.mesh.cache import keep_mesh
+from cellplan.geometry.mesh.load import keep_mesh
 from cellplan.geometry.shapes import Mesh
-from cellplan.scene.collision.hull_cache import hull_of, keep_hulls, without_hull
-from cellplan.scene.collision.hulls import convex_hull
+from cellplan.scene.collision.hull_cache import convex_hull, hull_of, keep_hulls, without_hull
 
 pytestmark = pytest.mark.usefixtures("cache_folder")
 

@@ -15,7 +15,7 @@ from cellplan.geometry.mesh.load import (
 )
 from cellplan.geometry.shapes import Mesh, Sphere, support
 from cellplan.geometry.transforms import rotation_from_rpy
-from cellplan.scene.collision.hulls import convex_hull
+from cellplan.scene.collision.hull_cache import convex_hull
 
 TURN = rotation_from_rpy([0.3, -0.7, 1.1])
 

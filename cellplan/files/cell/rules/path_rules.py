@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.files.cell.rules.as_listed import holders_as_written, operators_as_written
+from cellplan.files.cell.rules.rules import holders_as_written, operators_as_written
 from cellplan.files.input.findings import Finding, KeyPath, listed, unknown_name
 from cellplan.files.robots.rules import configuration_findings
 from cellplan.files.schema.joint_path import JointPathEntry

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from cellplan.files.cell.rules.as_listed import holders_as_written, operators_as_written
+from cellplan.files.cell.rules.rules import holders_as_written, operators_as_written
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, unknown_name
 from cellplan.files.robots.rules import configuration_findings
 from cellplan.files.schema.partial import ValidEntries

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-from cellplan.files.cell.rules.as_listed import holders_as_written, operators_as_written
 from cellplan.files.cell.rules.solver_rules import accurate_findings, feedback_findings
 from cellplan.files.input.findings import Finding, KeyPath, unknown_name
 from cellplan.files.schema.partial import ValidEntries
@@ -208,3 +207,22 @@ def _end(
             f"{path.duration:g} s of {path.source} = {end:g}"
         )
         yield document.finding(place, text)
+
+
+def holders_as_written(document: YamlDocument) -> Iterator[tuple[KeyPath, str]]:
+    """Robots that hold the part, also of a part that is wrong in other ways."""
+    part = document.root.get("part")
+    grasps = part.get("held_by") if isinstance(part, dict) else None
+    for index, grasp in enumerate(grasps if isinstance(grasps, tuple) else ()):
+        robot = grasp.get("robot") if isinstance(grasp, dict) else None
+        if isinstance(robot, str):
+            yield ("part", "held_by", index, "robot"), robot
+
+
+def operators_as_written(document: YamlDocument) -> Iterator[tuple[str, KeyPath, str]]:
+    """Robots of the tasks, also of tasks that are wrong in other ways."""
+    tasks = document.root.get("tasks")
+    for name, task in tasks.items() if isinstance(tasks, dict) else ():
+        robot = task.get("robot") if isinstance(task, dict) else None
+        if isinstance(robot, str):
+            yield name, ("tasks", name, "robot"), robot

@@ -11,8 +11,7 @@ from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import listed, shown
 from cellplan.files.robots.urdf.document.document import UrdfLink, UrdfMesh, UrdfSolid
 from cellplan.files.robots.urdf.document.packages import Packages, is_file
-from cellplan.files.robots.urdf.document.remarks import Remarks
-from cellplan.files.robots.urdf.document.xml import Element
+from cellplan.files.robots.urdf.document.xml import Element, Remarks
 from cellplan.files.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.geometry.mesh.load import FORMATS, is_flat, read_mesh, unknown_format
 from cellplan.geometry.shapes import Mesh, Solid

@@ -9,9 +9,8 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.files.input.findings import listed, shown
 from cellplan.files.robots.urdf import XACRO_SUFFIX
-from cellplan.files.robots.urdf.document.remarks import Remarks
 from cellplan.files.robots.urdf.document.xacro import XacroSettings, read_elements
-from cellplan.files.robots.urdf.document.xml import Element
+from cellplan.files.robots.urdf.document.xml import Element, Remarks
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot.robot import RobotModel
 

@@ -12,8 +12,7 @@ from cellplan.programs.elements.handshake import HandshakeStep, handshake_steps,
 from cellplan.programs.elements.joints import Axes, from_numbers
 from cellplan.programs.elements.pages import read_programs
 from cellplan.programs.elements.text import Statement
-from cellplan.programs.formats.krl.names import WHOLE
-from cellplan.programs.formats.krl.text import KrlModule, read_module
+from cellplan.programs.formats.krl.text import WHOLE, KrlModule, read_module
 
 MOST_ADVANCE: Final = 5  # motions that a controller can read ahead
 _SETUP: Final = ("INITMOV", "ADVANCE", "TOOL", "BASE")  # what is set once before the first motion

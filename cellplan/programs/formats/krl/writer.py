@@ -13,8 +13,8 @@ from cellplan.programs.elements.handshake import HandshakeStep
 from cellplan.programs.elements.joints import Axes
 from cellplan.programs.elements.pages import PagedProgram, program_paths, render_programs, require_six_axes, robots_of
 from cellplan.programs.elements.text import comment, fixed, joined
-from cellplan.programs.formats.krl.names import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
 from cellplan.programs.formats.krl.reader import read_krl
+from cellplan.programs.formats.krl.text import AXES, EXTERNAL, MODULES, POINT, WHOLE, require_numbers
 
 DECIMALS: Final = 5
 PAGE: Final = 1000  # rows; public programs are split at 1400 to 2500 lines

@@ -11,11 +11,10 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.robots.urdf import XACRO_SUFFIX
-from cellplan.files.robots.urdf.document.remarks import Remarks
 from cellplan.files.robots.urdf.document.spelling import check_spelling, unused_names
 from cellplan.files.robots.urdf.document.stated_limits import UrdfLimit, read_limit, without_slips_of_unit
 from cellplan.files.robots.urdf.document.xacro import XacroSettings, read_elements
-from cellplan.files.robots.urdf.document.xml import Element, origin_of
+from cellplan.files.robots.urdf.document.xml import Element, Remarks, origin_of
 from cellplan.geometry.shapes import Box, Capsule, Cylinder, Sphere
 from cellplan.geometry.transforms import Array
 

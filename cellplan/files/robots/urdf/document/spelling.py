@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import Final
 
 from cellplan.files.input.findings import did_you_mean
-from cellplan.files.robots.urdf.document.remarks import Remarks
-from cellplan.files.robots.urdf.document.xml import Element
+from cellplan.files.robots.urdf.document.xml import Element, Remarks
 
 MOST_EXTRA: Final = 2  # characters by which a misspelt name is longer or shorter
 CHILDREN: Final = {

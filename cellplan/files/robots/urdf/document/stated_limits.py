@@ -8,8 +8,7 @@ import numpy as np
 
 from cellplan.files.input.findings import listed
 from cellplan.files.robots.limits import LIMIT_TOL, StatedLimits, tightest
-from cellplan.files.robots.urdf.document.remarks import Remarks
-from cellplan.files.robots.urdf.document.xml import Element
+from cellplan.files.robots.urdf.document.xml import Element, Remarks
 from cellplan.model.units import joint_unit
 
 TWO_TURNS: Final = 4.0 * np.pi  # [rad] limits beyond two turns each way are rare

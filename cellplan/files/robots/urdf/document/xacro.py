@@ -24,8 +24,7 @@ from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.robots.urdf import XACRO_SUFFIX
 from cellplan.files.robots.urdf.document.expressions import REFUSED_SYMBOLS, evaluated
 from cellplan.files.robots.urdf.document.packages import Packages
-from cellplan.files.robots.urdf.document.remarks import Remarks
-from cellplan.files.robots.urdf.document.xml import MAX_BYTES, MAX_DEPTH, Element, parse_xml, read_xml
+from cellplan.files.robots.urdf.document.xml import MAX_BYTES, MAX_DEPTH, Element, Remarks, parse_xml, read_xml
 
 INSTALL: Final = 'pip install "cellplan[xacro]"'
 PACKAGE: Final = "/:package:/"  # begins the path of a file in a package, until the file is read

@@ -1,5 +1,6 @@
 """URDF text as a tree of elements that know their line, and the typed reading of their attributes."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -160,3 +161,26 @@ class _Builder:
     def _end(self, _tag: str) -> None:
         """An element closes."""
         self._open.pop()
+
+
+class Remarks:
+    """Gathers remarks; of each kind the first one is kept and the others are counted."""
+
+    def __init__(self) -> None:
+        """Start with none."""
+        self._first: dict[str, str] = {}
+        self._count: Counter[str] = Counter()
+
+    def add(self, kind: str, text: str, element: Element | None = None) -> None:
+        """Note something; ``kind`` says which remarks are the same but for their place."""
+        place = f"{element.file}:{element.line}: " if element is not None else ""
+        self._first.setdefault(kind, place + text)
+        self._count[kind] += 1
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """One line for each kind, in the order of their first occurrence."""
+        return tuple(
+            text + (f" (and {self._count[kind] - 1} more)" if self._count[kind] > 1 else "")
+            for kind, text in self._first.items()
+        )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cellplan.search.programs.solver import least
+from cellplan.search.programs.program import least
 
 
 @pytest.mark.parametrize("seed", range(4))
