@@ -14,8 +14,8 @@ from cellplan.errors import InputError
 from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, raise_findings, shown, unknown_name
 from cellplan.files.robots.build_controller import build_controller, controller_findings, sense_findings
+from cellplan.files.robots.build_payload import payload_findings
 from cellplan.files.robots.limits import RATES
-from cellplan.files.robots.rules import payload_findings
 from cellplan.files.schema import RobotTableDocument
 from cellplan.files.schema.messages import validate
 from cellplan.files.schema.robot import SLIDING_LIMITS, TURNING_LIMITS

@@ -7,12 +7,12 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
+from cellplan.files.robots.build_payload import payload_findings
 from cellplan.files.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
 from cellplan.files.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.transforms import Array
 from cellplan.model.robot.robot import Joint, RobotModel, configuration_in_si, start_keys
-from cellplan.model.settings.robot import PayloadEntry
 from cellplan.model.settings.units import Mm, si_or_none
 
 FARTHEST_FLANGE: Final = 10.0  # [m] from the first axis at the reference configuration: farther is a wrong unit
@@ -136,18 +136,3 @@ def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:
         bodies = tuple(replace(body, accuracy=None) for body in model.bodies)
         model = replace(model, body_accuracy=entry.bodies, bodies=bodies)
     return model if entry.payload is None else replace(model, payload=entry.payload)
-
-
-def payload_findings(
-    path: KeyPath, entry: PayloadEntry | None, turning: tuple[str, ...], document: YamlDocument
-) -> Iterator[Finding]:
-    """Limits of axes belong to the last turning joints before the flange.
-
-    Args:
-        turning: Names of the turning joints, from the base to the flange.
-    """
-    last = turning[-3:]
-    for joint in entry.axes if entry is not None else ():
-        if joint not in last:
-            text = unknown_name("one of the last turning joints", joint, last)
-            yield document.key_finding((*path, "axes", joint), text)

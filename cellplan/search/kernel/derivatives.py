@@ -11,7 +11,6 @@ are derivatives of what ``run`` gives, not of its limit.
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 import numpy as np
@@ -19,23 +18,11 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.search.kernel.jacobian_changes import JacobianChanges
 from cellplan.search.kernel.job import Job, Layouts
+from cellplan.search.kernel.run import keep_freed_memory
 from cellplan.search.kernel.screws import Directions, TaskScrews
 
-CACHE_BYTES: Final = (
-    24_000_000  # more than all arrays of one call, less than the 32 MB beyond which glibc learns nothing
-)
 BACK: Final = 2  # [-] nodes before the present one whose speeds the multistep rule of ``run`` takes
 REGULAR: Final = 1e-12  # [-] of the largest entry that keeps a matrix invertible where its rank is lost
-
-
-@cache
-def keep_freed_memory() -> None:
-    """Teach the allocator of glibc to keep what is freed: pages that are given back cost more than the arithmetic.
-
-    The largest block that was freed decides up to which size it takes blocks from its heap, and how much of that it
-    keeps. Nothing is touched, so nothing is used; other allocators do as they always do.
-    """
-    np.empty(CACHE_BYTES, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ the motion of the accurate mode up to what lies between two nodes; nothing is ce
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -17,14 +18,26 @@ from cellplan.planning.collocation.batch_tasks import Desired
 from cellplan.planning.collocation.settling import settled
 from cellplan.planning.collocation.solver import repeated
 from cellplan.scene.kinematics.batched import Placement
-from cellplan.search.kernel.derivatives import keep_freed_memory
 from cellplan.search.kernel.job import Job, Layouts
 
+CACHE_BYTES: Final = (
+    24_000_000  # more than all arrays of one call, less than the 32 MB beyond which glibc learns nothing
+)
 AT_ONCE: Final = 256  # candidates side by side: enough for NumPy, and the arrays of one node stay in the cache
 START_TOL: Final = 1e-6  # [m] and [rad] up to which a tool counts as at the start of its path
 LOST: Final = 0.05  # [m] or [rad] beside its path a predicted tool has lost it: Newton's step is no small one any more
 MOST_PASSES: Final = 20  # over all nodes
 PASSED: Final = 1e-7  # [rad] and [m] that a pass may still change
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Teach the allocator of glibc to keep what is freed: pages that are given back cost more than the arithmetic.
+
+    The largest block that was freed decides up to which size it takes blocks from its heap, and how much of that it
+    keeps. Nothing is touched, so nothing is used; other allocators do as they always do.
+    """
+    np.empty(CACHE_BYTES, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
