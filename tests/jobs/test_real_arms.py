@@ -88,7 +88,6 @@ def arms(shared_robots, tmp_path_factory):
     return solved(ARMS, shared_robots, tmp_path_factory.mktemp("arms"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [pytest.param("arms", marks=pytest.mark.slow), "turntable"])
 def test_real_arms_work_on_a_moving_part(name, request):
     solution = request.getfixturevalue(name)
