@@ -55,10 +55,6 @@ class CellCheck:
 def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent) -> CellCheck:
     """Project the paths onto the part, examine or find the start postures, and look for collisions and loads there.
 
-    Args:
-        scene: Its scene, where that is at hand.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: A path misses the part, or a given start is out of limits or off its task.
         NoSolutionError: No start posture was found.

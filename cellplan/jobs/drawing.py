@@ -19,13 +19,7 @@ SQUARE: Final = 40.0  # [mm]
 
 
 def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
-    """Outlines and paths in [mm] in the plane, with all robots at the start.
-
-    Args:
-        scene: The cell made computable.
-        start: Start configuration in [rad] or [m], shape (nq,).
-        schedule: The tasks on the common clock.
-    """
+    """Outlines and paths in [mm] in the plane, with all robots at ``start`` in [rad] or [m], shape (nq,)."""
     cell = scene.cell
     poses = scene.body_poses(start[None])
     shown = [
@@ -53,12 +47,7 @@ def drawing(scene: Scene, start: Array, schedule: Schedule) -> dict[str, Any]:
 
 
 def footprint(shape: Box | Cylinder, X_WS: Array) -> list[list[float]]:
-    """Outline in [mm] from above of an upright box or cylinder.
-
-    Args:
-        shape: The solid.
-        X_WS: Its pose in the world, shape (4, 4).
-    """
+    """Outline in [mm] from above of an upright box or cylinder at a pose in the world, shape (4, 4)."""
     corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     points = 0.5 * corners * np.array(shape.size[:2]) if isinstance(shape, Box) else shape.radius * AROUND[:, :2]
     outline: list[list[float]] = _rounded(points @ X_WS[:2, :2].T + X_WS[:2, 3])

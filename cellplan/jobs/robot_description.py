@@ -17,7 +17,6 @@ def description_record(described: RobotDescription, reach: float | None) -> dict
     """A description, with the unit in the keys.
 
     Args:
-        described: What the file says.
         reach: Largest distance of the flange from the first axis in [m]; None where it is not known.
     """
     X, model = described.X_BF, described.model

@@ -136,8 +136,6 @@ def screen_layouts(
     candidates keep what was chosen for the positioner.
 
     Args:
-        schedule: Its tasks on the common clock.
-        moving: Names of the robots that may move.
         accuracy: Largest tool error that is let pass, in [m] and [rad].
 
     Raises:

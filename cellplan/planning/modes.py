@@ -12,16 +12,10 @@ from cellplan.model.task.task import Task
 
 
 def plan_phases(cell: Cell, *, only: str | None = None) -> Plan:
-    """The phases of the cell's program, in the order of the tasks and not yet on a clock: all that its mode decides.
+    """The phases of the cell's program, of one task unless ``only`` is None, not yet on a clock: what its mode decides.
 
     Simultaneous: one phase. Part at rest: one phase in which the holders stand still. Pairwise: a phase for each task;
     what leads from one to the next is not part of the program.
-
-    Args:
-        only: Name of the only task to work on; None for all.
-
-    Raises:
-        InputError: There is no such task.
     """
     chosen = [task for task in cell.tasks if only in (None, task.name)]
     if not chosen:

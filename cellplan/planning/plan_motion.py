@@ -31,9 +31,6 @@ def plan_motion(task: MotionTask, *, progress: Progress = silent) -> Motion:
     Where collocation does not converge, Euler's steps with damping and feedback go on to the end; the checks then show
     the tool errors that result.
 
-    Args:
-        task: The tasks, the robots that move and their start; the cell's solver names the integrator.
-
     Raises:
         DivergedError: A tool lost its path.
         NoSolutionError: The method found no step, or no cycle closes.

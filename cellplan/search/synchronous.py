@@ -7,15 +7,7 @@ from cellplan.model.cell.cell import Cell, Mode, Timing
 
 
 def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> None:
-    """Refuse jobs whose motion is not one synchronous pseudo-inverse motion on the clock of the cell.
-
-    Args:
-        what: What the job is needed for, as messages name it.
-        paths: Robots that may have a given joint path.
-
-    Raises:
-        InputError: The job is another one.
-    """
+    """Refuse jobs for ``what`` but one synchronous pseudo-inverse motion; some robots may have a given joint path."""
     motion, solver = cell.motion, cell.solver
     at = cell.origin.at
     if cell.program is not None:

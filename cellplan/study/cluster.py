@@ -34,16 +34,12 @@ class Cluster(Executor):
 
     Attributes:
         is_remote: That outcomes come from other machines, so that those that count are worked out here again.
-        count: Number of trials that are begun at once.
     """
 
     is_remote = True
 
     def __init__(self, address: str) -> None:
         """Connect.
-
-        Args:
-            address: Address of the scheduler, such as ``tcp://10.0.0.5:8786``.
 
         Raises:
             InputError: Dask is not installed, the address is none or nothing answers there.

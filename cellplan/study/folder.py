@@ -30,11 +30,7 @@ def run_folder(folder: Path, number: int) -> Path:
 
 
 def refuse_unless_study(folder: Path) -> None:
-    """Refuse a folder that a study must not be written to; call it early, before any long work.
-
-    Raises:
-        InputError: The folder holds something that no study wrote, cannot be written, or is being written by a study.
-    """
+    """Refuse a folder in use, not writable or with what no study wrote; call it early, before any long work."""
     try:
         if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
             raise InputError(f"{folder}: expected a folder for the study, got something else")
@@ -52,11 +48,7 @@ def refuse_unless_study(folder: Path) -> None:
 
 
 def prepare_folder(folder: Path, *, resume: bool) -> None:
-    """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs.
-
-    Raises:
-        InputError: The folder holds something that no study wrote, cannot be written, or is being written by a study.
-    """
+    """Make the folder of a study, or empty that of an earlier one; a study that is continued keeps journal and runs."""
     refuse_unless_study(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,11 +61,7 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
 
 
 def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write the results of a study, each file whole or not at all.
-
-    Raises:
-        InputError: The folder cannot be written.
-    """
+    """Write the results of a study, each file whole or not at all."""
     for name, content in files.items():
         try:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

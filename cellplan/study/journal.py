@@ -30,7 +30,6 @@ class Journal:
         """Name the journal; it is opened by the ``with`` statement.
 
         Args:
-            folder: Folder of the study, which exists.
             header: What the study is about: a journal with another header is not continued.
 
         Raises:
@@ -59,30 +58,18 @@ class Journal:
         return self
 
     def append(self, trial: StudyTrial) -> None:
-        """Record the next trial.
-
-        Raises:
-            StudyStoppedError: The disk is full or otherwise refuses.
-        """
+        """Record the next trial."""
         self._write(self._path, trial)
         self.trials.append(trial)
         self.ahead.pop(trial.variant.number, None)
 
     def park(self, trial: StudyTrial) -> None:
-        """Record a trial before which another is missing.
-
-        Raises:
-            StudyStoppedError: The disk is full or otherwise refuses.
-        """
+        """Record a trial before which another is missing."""
         self._write(self._ahead, trial)
         self.ahead[trial.variant.number] = trial
 
     def require(self, variants: Sequence[Variant]) -> None:
-        """Refuse trials that are not those of the study, among the variants of one round.
-
-        Raises:
-            InputError: An earlier journal holds another trial in the place of one of them.
-        """
+        """Refuse trials that are not those of the study, among the variants of one round."""
         for variant in variants:
             number = variant.number
             if number < len(self.trials) and self.trials[number].variant != variant:

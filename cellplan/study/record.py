@@ -15,11 +15,7 @@ Again = Callable[[Variant], TrialOutcome]  # works out a trial a second time
 
 
 class Recorder:
-    """Records trials in their order, those that end before others meanwhile beside the journal.
-
-    Attributes:
-        journal: The journal.
-    """
+    """Records trials in their order, those that end before others meanwhile beside the journal."""
 
     def __init__(
         self,

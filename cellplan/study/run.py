@@ -23,11 +23,7 @@ class Flight:
     """
 
     def __init__(self, evaluate: Evaluate, executor: Executor, limits: Limits) -> None:
-        """Begin with none.
-
-        Args:
-            evaluate: Outcome of a variant; sent to the workers, so it must be picklable.
-        """
+        """Begin with none."""
         self._evaluate, self._executor, self._limits = packed(evaluate), executor, limits
         self._slots: int = getattr(executor, "count", BEGUN)
         self._waiting: deque[Variant] = deque()
@@ -108,11 +104,7 @@ class Flight:
 
 @contextmanager
 def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> Iterator[Iterator[TrialOutcome]]:
-    """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself.
-
-    Args:
-        evaluate: Outcome of a variant; must be picklable for more than one worker.
-    """
+    """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself."""
     if min(workers, len(variants)) <= 1:
         yield (evaluate(variant) for variant in variants)
     else:

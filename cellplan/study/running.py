@@ -27,11 +27,7 @@ class RunningState:
 
 @contextmanager
 def running(folder: Path, state: RunningState) -> Iterator[None]:
-    """Hold the folder of a study while it runs, for a ``with`` statement; not removed when the process is killed.
-
-    Raises:
-        InputError: Another study holds it, or the folder cannot be written.
-    """
+    """Hold the folder of a study while it runs, for a ``with`` statement; not removed when the process is killed."""
     path = folder / STATE
     try:
         file = path.open("a+b")
@@ -62,11 +58,7 @@ def read_state(folder: Path) -> tuple[RunningState | None, bool]:
 
 
 def require_idle(folder: Path) -> None:
-    """Refuse a folder that a running study holds.
-
-    Raises:
-        InputError: There is one.
-    """
+    """Refuse a folder that a running study holds."""
     with suppress(OSError), (folder / STATE).open("r+b") as file:
         if not _locked(file):
             raise _busy(folder)

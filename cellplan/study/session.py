@@ -46,11 +46,7 @@ class Crew(ExitStack):
     """
 
     def __init__(self, evaluate: Evaluate, workers: int | Executor, limits: Limits, size: int) -> None:
-        """Prepare.
-
-        Args:
-            workers: Number of processes, or an executor, which stays open.
-        """
+        """Prepare for a number of processes, or for an executor, which stays open."""
         super().__init__()
         self._evaluate, self._workers, self._limits, self._size = evaluate, workers, limits, size
         self._flights: dict[str, Flight] = {}

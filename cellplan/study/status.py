@@ -82,7 +82,6 @@ class StudyStatus:
         Args:
             compared: What makes one better than another; None for nothing.
             state: Its state; None once it has ended.
-            is_running: Whether it runs; else it has ended or was killed.
         """
         rate = left = None
         if state is not None and is_running:
@@ -117,11 +116,7 @@ class StudyStatus:
 
 
 def read_status(folder: Path) -> StudyStatus:
-    """The status of the study in a folder, which may be written meanwhile.
-
-    Raises:
-        InputError: There is no study.
-    """
+    """The status of the study in a folder, which may be written meanwhile."""
     lines = whole_lines(folder / JOURNAL)[1]
     try:
         header = json.loads(lines[0]) if lines else None

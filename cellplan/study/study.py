@@ -82,8 +82,6 @@ class Study:
             evaluate: Outcome of a variant, whose values are those proposed; sent to worker processes, so it must be
                 picklable. It may keep in itself what it has read, but nothing that changes a later outcome.
             workers: Number of processes; or an executor, which stays open, such as ``Workers`` begun earlier.
-            resume: Whether trials that the folder holds already are not evaluated again.
-            progress: Called with one line about the study and the fraction done.
 
         Raises:
             InputError: The folder cannot be used, or holds another study that is to be continued.
@@ -112,14 +110,7 @@ class Study:
         return Finished(trials=trials, rounds=len(trials) // self.size, stopped_by=stopped_by)
 
     def refuse(self, *, resume: bool) -> None:
-        """Refuse a folder that the study cannot be written to; call it early, before any long work.
-
-        Args:
-            resume: Whether the study in the folder is to be continued.
-
-        Raises:
-            InputError: The folder cannot be used, or holds another study that is to be continued.
-        """
+        """Refuse a folder that the study cannot be written to; call it early, before any long work."""
         refuse_unless_study(self.folder)
         Journal(self.folder, self._whole_header, resume=resume)
 

@@ -45,13 +45,7 @@ class TrialOutcome:
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any]) -> Self:
-        """The outcome of plain data.
-
-        Raises:
-            KeyError: A key is missing.
-            TypeError: A value is of another kind.
-            ValueError: The status is unknown.
-        """
+        """The outcome of plain data."""
         return cls(status=TrialStatus(record["status"]), reason=str(record["reason"]), figures=dict(record["figures"]))
 
 
@@ -89,12 +83,6 @@ class StudyTrial:
 
     @classmethod
     def from_record(cls, record: Mapping[str, Any]) -> Self:
-        """The trial of a line.
-
-        Raises:
-            KeyError: A key is missing.
-            TypeError: A value is of another kind.
-            ValueError: The status is unknown.
-        """
+        """The trial of a line."""
         variant = Variant(int(record["trial"]), dict(record["values"]))
         return cls(variant=variant, outcome=TrialOutcome.from_record(record))

@@ -33,11 +33,7 @@ class Axis:
 
 
 def read_axis(text: str) -> Axis:
-    """The axis of ``KEY=FROM:TO:STEP``, both ends included, or of ``KEY=VALUE,VALUE,…``.
-
-    Raises:
-        InputError: The text is of neither form, a value cannot be read, or the range is empty or too long.
-    """
+    """The axis of ``KEY=FROM:TO:STEP``, both ends included, or of ``KEY=VALUE,VALUE,…``."""
     address, sign, values = (part.strip() for part in text.partition("="))
     if not sign or not address or not values:
         raise InputError(f"--vary: expected {USAGE}, got {shown(text)}")
@@ -52,11 +48,7 @@ def read_axis(text: str) -> Axis:
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[Variant, ...]:
-    """All combinations of the values, the last axis first to change.
-
-    Raises:
-        InputError: There is no axis, an address occurs twice, or there are too many combinations.
-    """
+    """All combinations of the values of the axes, at least one, the last axis first to change; too many are refused."""
     if not axes:
         raise InputError(f"--vary: expected at least one key, {USAGE}")
     addresses = [axis.address for axis in axes]

@@ -125,11 +125,7 @@ def _children() -> ChildStock:
 
 
 def packed(evaluate: Evaluate) -> bytes:
-    """What an evaluator is sent to a worker as.
-
-    Raises:
-        TypeError: It cannot be sent to another process.
-    """
+    """What an evaluator is sent to a worker as."""
     try:
         payload = pickle.dumps(evaluate)
     except (AttributeError, TypeError, pickle.PicklingError) as error:
@@ -140,11 +136,7 @@ def packed(evaluate: Evaluate) -> bytes:
 
 
 def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:
-    """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost.
-
-    Raises:
-        StudyStoppedError: The evaluator says that no trial can be worked out any more.
-    """
+    """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost."""
     guard = Guard(
         file=f"trial {variant.number}",
         worker="its process",

@@ -118,11 +118,7 @@ def fastest(options: FastestOptions) -> Result:
 
 
 def _free(options: FastestOptions, text: str) -> Result:
-    """Search the shortest cycle over what the words of ``--free`` name.
-
-    Raises:
-        InputError: There is no word.
-    """
+    """Search the shortest cycle over what the words of ``--free`` name."""
     from cellplan.cli.improve.layout_search import layout_request, searched
 
     words = tuple(word.strip() for word in text.split(",") if word.strip())

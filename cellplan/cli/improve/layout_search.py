@@ -42,11 +42,7 @@ REPAIRED: Final = {
 
 
 def layout_request(options: SearchOptions, *, objective: str, **others: Any) -> LayoutRequest:
-    """What is searched for, as the options say.
-
-    Raises:
-        InputError: A word or a quantity cannot be read.
-    """
+    """What is searched for, as the options say."""
     return options.to(
         LayoutRequest,
         objective=_word("--objective", objective, Objective),

@@ -15,29 +15,17 @@ TIMES: Final[Mapping[str, float]] = {"s": 1.0, "min": 60.0, "h": 3600.0}  # [s]
 
 
 def read_length(option: str, text: str) -> float:
-    """A length in [mm] of a text such as ``10mm``; a plain number is in millimetres.
-
-    Raises:
-        InputError: The text is no length of at least 0.
-    """
+    """A length in [mm] of a text such as ``10mm``; a plain number is in millimetres."""
     return _read(option, text, LENGTHS, "a length such as 10mm")
 
 
 def read_angle(option: str, text: str) -> float:
-    """An angle in [deg] of a text such as ``15deg``; a plain number is in degrees.
-
-    Raises:
-        InputError: The text is no angle of at least 0.
-    """
+    """An angle in [deg] of a text such as ``15deg``; a plain number is in degrees."""
     return _read(option, text, ANGLES, "an angle such as 15deg")
 
 
 def read_misplacement(option: str, text: str) -> tuple[float, float]:
-    """A length in [mm] and an angle in [deg] of a text such as ``10mm,1deg``.
-
-    Raises:
-        InputError: The text is not that, or one of them is 0.
-    """
+    """A length in [mm] and an angle in [deg] of a text such as ``10mm,1deg``."""
     length, comma, angle = text.partition(",")
     if not comma:
         raise InputError(f"{option}: expected a length and an angle such as 10mm,1deg, got {shown(text)}")
@@ -48,11 +36,7 @@ def read_misplacement(option: str, text: str) -> tuple[float, float]:
 
 
 def read_time(option: str, text: str) -> float:
-    """A time in [s] of a text such as ``60s`` or ``10min``; a plain number is in seconds.
-
-    Raises:
-        InputError: The text is no time above 0.
-    """
+    """A time in [s] of a text such as ``60s`` or ``10min``; a plain number is in seconds."""
     seconds = _read(option, text, TIMES, "a time such as 60s or 10min")
     if not seconds > 0.0:
         raise InputError(f"{option}: expected a time above 0 such as 60s or 10min, got {shown(text)}")

@@ -72,11 +72,7 @@ def recover(options: RecoverOptions) -> Result:
 
 
 def frozen_times(texts: Sequence[str]) -> dict[str, float]:
-    """Time in [s] by robot from texts such as ``kuka@1.30``.
-
-    Raises:
-        InputError: A text is another one, or a robot stands twice.
-    """
+    """Time in [s] by robot from texts such as ``kuka@1.30``."""
     times: dict[str, float] = {}
     for text in texts:
         name, sign, time = text.rpartition("@")

@@ -116,11 +116,7 @@ def export(options: ExportOptions) -> Result:
 
 
 def _choice(options: ExportOptions) -> "Choice":
-    """What of the run is exported, and how.
-
-    Raises:
-        InputError: There is no such kind of row, or no such promise.
-    """
+    """What of the run is exported, and how."""
     from cellplan.model.report.exported import Promise, Targets
     from cellplan.programs.export.choice import Choice
 

@@ -26,11 +26,7 @@ class InterruptedWorkError(CellplanError):
 
 @contextlib.contextmanager
 def resumable() -> Iterator[None]:
-    """Say of an interruption that the work can go on.
-
-    Raises:
-        InterruptedWorkError: It was interrupted.
-    """
+    """Say of an interruption that the work can go on."""
     try:
         yield
     except KeyboardInterrupt as error:

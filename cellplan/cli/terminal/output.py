@@ -72,11 +72,7 @@ def show(lines: Sequence[str], *, passed: bool | None = None) -> None:
 
 
 def say(text: str) -> None:
-    """Write a result to standard output, all of it or an error.
-
-    Raises:
-        OutputError: Standard output is closed or cannot take the text.
-    """
+    """Write a result to standard output, all of it or an error."""
     if sys.stdout is None:
         raise OutputError("standard output: expected an open stream, got a closed one; the result was not shown")
     try:

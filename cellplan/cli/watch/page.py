@@ -15,11 +15,7 @@ MARK_WITHIN: Final = 400  # [bytes]
 
 
 class WatchPage:
-    """A page and its script; both go when watching ends, and nothing of them is in the run folder.
-
-    Attributes:
-        path: The page to open.
-    """
+    """A page and its script; both go when watching ends, and nothing of them is in the run folder."""
 
     def __init__(self, path: Path, pages: Sequence[tuple[str, str]]) -> None:
         """Name the page after what it stands beside, and the pages of a run that it shows by title and file name."""
@@ -28,11 +24,7 @@ class WatchPage:
         self._title, self._pages, self._number, self._run = path.name, pages, 0, ""
 
     def open(self) -> None:
-        """Write the page.
-
-        Raises:
-            InputError: The place holds something else, or cannot be written.
-        """
+        """Write the page."""
         for path, mark in ((self.path, MARK), (self._script, "cellplanState(")):
             if path.is_symlink() or (path.exists() and mark not in _begin(path)):
                 raise InputError(f"{path}: holds something that watching did not write; choose another folder with -o")
@@ -45,12 +37,7 @@ class WatchPage:
         self.show("working")
 
     def show(self, phase: str, lines: Sequence[str] = (), *, run: Path | None = None) -> None:
-        """Tell the page what is going on; a disk that refuses leaves it as it was.
-
-        Args:
-            phase: One of working, passed, failed and error.
-            run: The run folder of a new result.
-        """
+        """Tell the page the phase: working, passed, failed or error; a disk that refuses leaves the page as it was."""
         if run is not None:
             self._number += 1
             self._run = quote(Path(os.path.relpath(run, self.path.parent)).as_posix())

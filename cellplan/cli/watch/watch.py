@@ -74,11 +74,7 @@ def watch(
 
 
 class WatchedFiles:
-    """The cell file, and every file that it was last read from.
-
-    Attributes:
-        cell: The cell file.
-    """
+    """The cell file, and every file that it was last read from."""
 
     def __init__(self, cell: Path) -> None:
         """Begin with the cell file alone."""
@@ -133,11 +129,7 @@ class WatchedFiles:
         return None
 
     def require_unchanged(self) -> None:
-        """Poll the files now and then during a computation.
-
-        Raises:
-            InputsChangedError: One of them was saved.
-        """
+        """Poll the files now and then during a computation, and stop it once one of them was saved."""
         if time.monotonic() - self._last_look < ASK_EVERY_S:
             return
         self._last_look = time.monotonic()

@@ -37,10 +37,9 @@ class BaseGrid:
     yaw: float | Literal["toward"] | None = None
 
     def places(self, robot: Robot, part: Array) -> Places:
-        """The places of a robot's base.
+        """The places of a robot's base; what ``refuse`` names is refused.
 
         Args:
-            robot: The robot.
             part: Where the part is at the start in [m], shape (3,).
 
         Raises:
@@ -53,14 +52,7 @@ class BaseGrid:
         return Places.of(robot.X_WB, x, y, yaw=yaw, toward=part if self.yaw == TOWARD else None)
 
     def refuse(self, robot: Robot) -> None:
-        """Refuse numbers that are not usable wherever the part is; call it early, before any long work.
-
-        Args:
-            robot: The robot.
-
-        Raises:
-            InputError: There are too many places, or a number is not usable.
-        """
+        """Refuse too many places and unusable numbers wherever the part is; call it early, before any long work."""
         x, y = self._axes(robot, np.zeros(3))
         if (len(x) - 1) * (len(y) - 1) > MOST_PLACES:  # one more or less, as the part is elsewhere
             raise InputError(f"--grid: expected at most {MOST_PLACES} places, got {len(x)} x {len(y)}: a larger step")
@@ -89,11 +81,7 @@ class BaseGrid:
 
 
 def read_span(option: str, text: str) -> Span:
-    """From and to of ``FROM:TO`` in [mm].
-
-    Raises:
-        InputError: The text is no span.
-    """
+    """Read ``FROM:TO`` in [mm], or refuse it."""
     first, _, last = text.partition(":")
     try:
         return float(first), float(last)
@@ -102,11 +90,7 @@ def read_span(option: str, text: str) -> Span:
 
 
 def read_yaw(text: str) -> float | Literal["toward"]:
-    """An angle in [deg], or ``toward``.
-
-    Raises:
-        InputError: The text is neither.
-    """
+    """Read an angle in [deg] or ``toward``, or refuse it."""
     if text == TOWARD:
         return "toward"
     try:

@@ -67,14 +67,7 @@ def base_map(
 def finished_record(
     ready: PreparedMap, verdicts: Sequence[PlaceVerdict], *, certify: int = 0, progress: Progress = silent
 ) -> Record:
-    """The record of a map whose places are judged, the best of them solved on request.
-
-    Args:
-        ready: What the map is made of.
-        verdicts: The verdict of every place.
-        certify: How many of the best places are solved and verified.
-        progress: Called with the stage and the fraction done.
-    """
+    """The record of a map whose places are judged, the best ``certify`` of them solved and verified."""
     job, cell = ready.job, ready.cell
     best = best_first(verdicts)[: max(BEST, certify)]
     settings = [place_settings(job, verdicts[place], place) for place in best]

@@ -92,11 +92,6 @@ class PreparedMap:
 def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent) -> PreparedMap:
     """The scene, the job at its nodes, the start at the present base, and the places.
 
-    Args:
-        robot: Name of the operator.
-        grid: Where its base is tried.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: There is no such operator, the grid is not usable, or the cell is of a kind that is not mapped.
         StartNotFoundError: A start posture is to be found, and there is none at the present base.
@@ -123,22 +118,13 @@ def prepared_request(request: MapRequest) -> PreparedMap:
 
 
 def requested_cell(request: MapRequest) -> Cell:
-    """The cell with all that the request sets in it.
-
-    Raises:
-        InputError: The cell cannot be read, or an address does not exist.
-    """
+    """The cell with all that the request sets in it."""
     cell = load_cell(request.cell, allow_dirs=request.allow_dirs)
     return with_overrides(cell, request.settings, mode=request.mode)
 
 
 def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
-    """Refuse a map that cannot be made; call it early, before any long work.
-
-    Raises:
-        InputError: The robot is no operator, the grid is not usable, or the job is not one synchronous pseudo-inverse
-            motion.
-    """
+    """Refuse what is no operator, no usable grid, or no synchronous pseudo-inverse motion; call it early."""
     operators = [task.robot for task in cell.tasks if task.robot not in cell.positioners]
     if name not in operators:
         raise InputError(

@@ -68,12 +68,8 @@ def map_record(
     """The map in printed units.
 
     Args:
-        job: The job and the places.
-        verdicts: The verdict of every place.
         best: The best places with their settings, best first.
         certified: What came of the first of them when they were solved.
-        drawing: Outlines and paths.
-        versions: Version by package.
     """
     cell, places = job.scene.cell, job.places
     base = cell.robot(job.robot).X_WB
@@ -301,11 +297,7 @@ def _legend(record: Record) -> Iterator[LegendKey]:
 
 
 def map_page(record: Record, plot: bytes) -> str:
-    """The page of a map.
-
-    Args:
-        plot: Its picture as SVG.
-    """
+    """The page of a map with its picture as SVG."""
     colours = colours_of(record)
     best: list[dict[str, Any]] = [{**place, **record["places"][place["place"]]} for place in record["best"]]
     examples = {
@@ -328,11 +320,7 @@ def map_page(record: Record, plot: bytes) -> str:
 
 
 def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
-    """Content of the files of a map by name.
-
-    Args:
-        formats: Formats of the picture beside SVG.
-    """
+    """Content of the files of a map by name, its picture as SVG and in ``formats``."""
     plots = pictures({"map": map_figure(record)}, formats)
     return {
         "map.json": as_json(record).encode(),

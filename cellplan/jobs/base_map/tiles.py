@@ -39,7 +39,6 @@ class Tiles:
         """The tiles of a map.
 
         Args:
-            job: The job and the places.
             q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
             at: Their places, shape (S,).
         """
@@ -51,11 +50,7 @@ class Tiles:
         return cls(known=known, values=[{"places": at[row].tolist(), "starts": q[row].tolist()} for row in rows])
 
     def verdicts(self, trials: Iterable[Mapping[str, Any]]) -> list[PlaceVerdict]:
-        """The verdict of every place.
-
-        Args:
-            trials: The trials of all tiles as plain data, in their order.
-        """
+        """The verdict of every place, from the trials of all tiles as plain data, in their order."""
         verdicts = list(self.known)
         for trial in trials:
             judged = trial["figures"].get("places")
@@ -73,12 +68,7 @@ def evaluate(request: MapRequest, variant: Variant) -> TrialOutcome:
 
 
 def judged(job: MapJob, values: Mapping[str, Any]) -> TrialOutcome:
-    """What becomes of the places of a tile.
-
-    Args:
-        job: The job and the places.
-        values: See ``Tiles``.
-    """
+    """What becomes of the places of a tile, whose values are those of ``Tiles``."""
     verdicts = judge(job, np.array(values["starts"]), np.array(values["places"], dtype=np.intp))
     listed = list(verdicts.values())
     figures: dict[str, Any] = {"places": {str(place): _plain(verdict) for place, verdict in sorted(verdicts.items())}}

@@ -60,7 +60,6 @@ def comparison_record(
 
     Args:
         header: What it is about: of, cell, names, settings, task, inputs and versions.
-        trials: Its trials in their order.
         differences: Values in each cell or run, by key path.
     """
     variants: list[Any] = [{"name": name, **trial} for name, trial in zip(header["names"], trials, strict=True)]
@@ -208,11 +207,7 @@ ROWS: Final[Sequence[Row]] = (
 
 
 def comparison_figures(record: Record, curves: Sequence[Record | None]) -> dict[str, Figure]:
-    """The figures of a comparison by name; none where nothing was solved.
-
-    Args:
-        curves: Curves of each variant; None for one without a motion.
-    """
+    """The figures of a comparison by name from the curves of each variant, None for one without a motion."""
     solved_variants = [
         {**variant["figures"], "name": variant["name"], "curves": its}
         for variant, its in zip(record["variants"], curves, strict=True)
@@ -331,11 +326,7 @@ def _distances(solved: Mapping[str, Any]) -> Figure:
 
 
 def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
-    """The page of a comparison.
-
-    Args:
-        plots: Its plots as SVG, by name.
-    """
+    """The page of a comparison with its plots as SVG, by name."""
     solved = [variant["name"] for variant in record["variants"] if variant["figures"]]
     robots = robot_names(record)
     return template("jobs/compare/comparison.html").render(
@@ -363,12 +354,7 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
 def comparison_files(
     record: Record, curves: Sequence[Record | None], formats: Collection[str] = ()
 ) -> dict[str, bytes]:
-    """Content of the files of a comparison by name.
-
-    Args:
-        curves: Curves of each variant; None for one without a motion.
-        formats: Formats of the plots beside SVG.
-    """
+    """Content of the files of a comparison by name; the curves are None for a variant without a motion."""
     plots = {f"study-{name}": data for name, data in pictures(comparison_figures(record, curves), formats).items()}
     drawings = {
         name.removeprefix("study-").removesuffix(".svg"): data.decode()

@@ -27,11 +27,7 @@ LOADS: Final = {
 
 
 def sentences(variants: Sequence[Record]) -> list[str]:
-    """What the figures of the variants say together.
-
-    Args:
-        variants: Entries with ``name``, ``status``, ``reason`` and ``figures`` each; see ``comparison_record``.
-    """
+    """What the figures of the variants, entries of ``comparison_record``, say together."""
     passed = sorted(
         (variant for variant in variants if variant["status"] == "passed"),
         key=lambda variant: variant["figures"]["cycle_time_s"],

@@ -24,9 +24,7 @@ class MetDemand:
     """The calmest program that meets a demand.
 
     Attributes:
-        per_hour: Parts per hour that were asked for.
         allowed: Longest cycle in whole steps that makes them, in [s].
-        program: The program.
     """
 
     per_hour: float
@@ -39,11 +37,7 @@ class MetDemand:
 
 
 def read_demand(text: str) -> float:
-    """Parts per hour of a demand such as ``900/h`` or ``15/min``.
-
-    Raises:
-        InputError: It is of another form, or not above 0.
-    """
+    """Parts per hour of a demand such as ``900/h`` or ``15/min``; any other form is refused."""
     match = WRITTEN.fullmatch(text.strip())
     per_hour = float(match[1]) * PER_HOUR[match[2]] if match else 0.0
     if not per_hour > 0.0:
@@ -52,16 +46,7 @@ def read_demand(text: str) -> float:
 
 
 def refuse_unless_possible(per_hour: float, shortest: TimedProgram, step: float) -> None:
-    """Refuse a demand for which no cycle is short enough.
-
-    Args:
-        per_hour: Parts per hour.
-        shortest: The program with the shortest cycle.
-        step: Time between two rows in [s].
-
-    Raises:
-        NoSolutionError: With the shortest cycle and what binds it.
-    """
+    """Refuse a demand for which no cycle is short enough, with the shortest one and what binds it; the step in [s]."""
     allowed = steps_within(HOUR / per_hour, step) * step
     if shortest.cycle <= allowed + NEAR:
         return
@@ -81,15 +66,7 @@ def calmest(
     common: TimedProgram,
     solved: SolvedAt,
 ) -> MetDemand:
-    """The program that meets a demand at the smallest load, by the time laws or by the common speed.
-
-    Args:
-        base: The cell as it is written.
-        per_hour: Parts per hour, which one of the shortest programs makes.
-        laws: The shortest one by the time laws.
-        common: The shortest one by the common speed.
-        solved: Solves the cell with other values.
-    """
+    """The program that makes ``per_hour`` parts at the smallest load, by the time laws or by the common speed."""
     step = base.motion.step
     allowed = steps_within(HOUR / per_hour, step) * step
     cycle = min(allowed, max(steps_within(SLOWEST * common.cycle, step) * step, written.cycle))

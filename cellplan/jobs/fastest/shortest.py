@@ -38,10 +38,8 @@ class CurvePoint:
     """One cycle on the production curve.
 
     Attributes:
-        law: What decides when the joints are where.
         values: What is set in the cell for it, by address.
         figures: Its load, ``LOAD`` of it; empty where there is no program.
-        reason: Why there is none.
     """
 
     law: Law
@@ -185,12 +183,7 @@ def production_curve(
     points of a law run along one joint path, and that of the shortest one is.
 
     Args:
-        base: The cell as it is written.
-        shortest: The shortest program of each law.
-        task: Name of the only task to work on.
         points: Number of calmer cycles of each law.
-        workers: Number of processes that solve.
-        progress: Called with the stage and the fraction done.
     """
     factors = [LONGEST ** ((k + 1) / points) for k in range(points)]
     sought = [(program.law, _values(base, program, factor)) for program, factor in product(shortest, factors)]

@@ -51,10 +51,6 @@ def shortest_by_time_laws(base: Cell, written: TimedProgram, solved: SolvedAt) -
 
     Limits are seen in the rows, so a load does not simply fall with the time: the cycle is sought from both sides.
 
-    Args:
-        base: The cell as it is written.
-        solved: Solves the cell with other values.
-
     Raises:
         NoSolutionError: No program keeps them.
     """
@@ -80,7 +76,6 @@ def from_both_sides(
     """The program that keeps all limits in so many steps while it would not in a step less; None where none does.
 
     Args:
-        number: Steps that the first program is said to take.
         at: The program in a number of steps; a ``TooFewStepsError`` says that a task needs more of them.
         demanded_share: How many times as long a program must last, at most 1 where it keeps its limits.
     """
@@ -133,11 +128,8 @@ def _at_greatest_feed(
     """The program at the greatest feed of a task at which the joints of a robot keep their limits; None for none.
 
     Args:
-        task: The task, with a process.
         values: What else is set in the cell, by address.
         program: The program at the feed as it is written, at which they do not.
-        robot: Name of the robot.
-        solved: Solves the cell with other values.
     """
     feed = MM * (task.feed or 0.0)
     unit = 10.0 ** (np.floor(np.log10(feed)) - DIGITS + 1)

@@ -45,8 +45,6 @@ class Binding:
     """The joint or tool and the limit that ask for most time in a phase.
 
     Attributes:
-        phase: Name of the phase.
-        robot: Name of the robot.
         joint: Name of the joint; that of the task for its feed and its tolerance between rows.
         kind: Its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows.
         share: What is reached of it, 0..1.
@@ -78,10 +76,7 @@ class TimedProgram:
     """A program at a cycle time of its own.
 
     Attributes:
-        law: What decides when the joints are where on their path.
         values: What was set in the cell for it, by address; see ``Cell.with_values``.
-        solution: The program, solved and verified at that time.
-        scene: The scene of the solved cell.
         bindings: What binds each of its phases with tasks; transfer moves go as fast as they can anyway.
         load: Share of its time in which the limits of joints, tools and part would allow the same motion.
     """
@@ -107,11 +102,6 @@ class TimedProgram:
         """The program of a cell with other values, verified but for its clearance.
 
         Args:
-            cell: The cell.
-            law: What decides when the joints are where.
-            values: Values by address.
-            task: Name of the only task to work on.
-            progress: Called with the stage and the fraction done.
             early: Begins with its clearance at once.
         """
         scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
@@ -209,11 +199,7 @@ def _share_between(errors: TaskAccuracy, cell: Cell) -> float:
 
 
 def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
-    """Values of the cell file with which everything takes longer by a factor, by address; see ``Cell.with_values``.
-
-    Args:
-        factor: More than 1 for slower.
-    """
+    """Values of the cell file by address with which everything takes ``factor`` times as long."""
     motion = cell.motion
     values: dict[str, object] = {}
     if motion.duration is not None:
@@ -227,11 +213,7 @@ def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
 
 
 def refuse_fixed_times(cell: Cell) -> None:
-    """Refuse trajectories and times to settle, which have times of their own.
-
-    Raises:
-        InputError: There is one.
-    """
+    """Refuse trajectories and times to settle, which have times of their own."""
     for task in cell.tasks:
         if isinstance(task.path, TimedPath):
             raise InputError(

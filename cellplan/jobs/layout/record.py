@@ -138,11 +138,7 @@ def layout_record(
     """The search in printed units.
 
     Args:
-        ready: The cell.
-        finished: Its trials.
-        given: The given layout.
         tried: What came of those that were solved in full, by number.
-        best: The best certified layout.
         solves: How often a layout was solved in full.
     """
     request, cell = ready.request, ready.cell

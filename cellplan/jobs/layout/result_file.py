@@ -22,8 +22,6 @@ def result_files(cell: Cell, given: Path, folder: Path, *, head: str) -> dict[st
     folder, and need leave to be read as before.
 
     Args:
-        cell: The cell to write, changed from the given one by ``with_values``.
-        given: The given cell file.
         folder: Where ``best.yaml`` will lie.
         head: Lines of comment above it.
     """

@@ -167,19 +167,7 @@ def search_layout(
 
 
 def refuse_search(request: LayoutRequest, folder: Path, *, resume: bool = False) -> Cell:
-    """Refuse a search of which its files say already that it cannot be; call it before any process begins.
-
-    Args:
-        request: What is searched for.
-        folder: Folder of the study.
-        resume: Whether an earlier study is continued.
-
-    Returns:
-        The cell that is searched.
-
-    Raises:
-        InputError: A cell cannot be read or searched, or the folder cannot be used.
-    """
+    """The cell to search; refuses what its files say already cannot be searched, before any process begins."""
     cell = searched_cell(request)
     read_attempts(request, cell)
     _study(request, cell, folder).refuse(resume=resume)
@@ -200,13 +188,7 @@ def _study(request: LayoutRequest, cell: Cell, folder: Path) -> Study:
 
 
 def finish_of(ready: PreparedSearch, progress: Progress, *, workers: int | Executor) -> Finish:
-    """The finish of the layouts of a cell, with displaced bases where they are asked for.
-
-    Args:
-        ready: The cell.
-        progress: Called with the stage and the fraction done.
-        workers: Processes that help; see ``Finish``.
-    """
+    """The finish of the layouts of a cell, with displaced bases where they are asked for."""
     misplacement = ready.variables.settings.misplacement
     if misplacement is None:
         return Finish(ready=ready, progress=progress, workers=workers)

@@ -81,11 +81,7 @@ def judged(
     """Check the tables of a recovery.
 
     Args:
-        texts: The table of each robot, by its name.
         phases: What they were written from: of these only kinds, scenes and numbers of rows are used.
-
-    Raises:
-        InputError: A table is not whole.
     """
     tables = [parse_table(text, f"tables/{name}.csv") for name, text in texts.items()]
     times, q = tables[0].times, np.concatenate([table.q for table in tables], axis=1)

@@ -40,11 +40,7 @@ class RecoveryPlanner:
         self.refused: list[str] = []
 
     def phases(self) -> tuple[RecoveryPhase, ...]:
-        """The first way that is found: straight off and home; else back along the program, then off and home.
-
-        Raises:
-            TransferNotFoundError: No way was found, with what was tried.
-        """
+        """The first way that is found: straight off and home; else back along the program, then off and home."""
         for back in BackwardProgram(self._places, self._state, self._fixed, self.refused).options():
             q = back[-1].q[-1] if back else self._state.q
             try:
@@ -67,11 +63,7 @@ class RecoveryPlanner:
         return not self._fixed and not np.any(np.abs(self._first(q)[0] - q) > SAME)
 
     def _off_and_home(self, q: Array) -> list[RecoveryPhase]:
-        """Retract, then transfer moves.
-
-        Raises:
-            TransferNotFoundError: One of them was not found.
-        """
+        """Retract, then transfer moves, or the error of the one that is not found."""
         made = self._retracts(q)
         last = made[-1].q[-1] if made else q
         goal = self._goal(last)
@@ -148,11 +140,7 @@ class RecoveryPlanner:
         return [RecoveryPhase(kind=RecoveryKind.TRANSFER, robots=robots, words=words, q=transfer.q)]
 
     def _with_holders(self, q: Array, goal: Array) -> list[RecoveryPhase]:
-        """The holders of the part together back along the program, before or after the others go home.
-
-        Raises:
-            TransferNotFoundError: Neither is free.
-        """
+        """The holders of the part together back along the program, before or after the others go home."""
         columns, faults = joints_of(self._cell, self._group), []
         holders = partial(holders_back, self._places, self._state, self._scene)
         for holders_first in (True, False):
@@ -176,11 +164,7 @@ class BackwardProgram:
     """
 
     def __init__(self, places: RunPlaces, state: StoppedState, fixed: Collection[str], refused: list[str]) -> None:
-        """Prepare; nothing is planned yet.
-
-        Args:
-            refused: See above.
-        """
+        """Prepare; nothing is planned yet."""
         self._places, self._state, self._fixed, self.refused = places, state, set(fixed), refused
 
     def options(self) -> Iterator[tuple[RecoveryPhase, ...]]:
@@ -248,11 +232,7 @@ class BackwardProgram:
 
 
 def holders_back(places: RunPlaces, state: StoppedState, scene: Scene, q: Array) -> RecoveryPhase:
-    """Robots that hold the part together, back along the program as they came while all others stand.
-
-    Raises:
-        TransferNotFoundError: Something is in their way.
-    """
+    """Robots that hold the part together, back along the program as they came while all others stand."""
     group = scene.cell.positioners
     named = ", ".join(group)
     path = _path_of_group(places, state.times[group[0]], q, joints_of(places.cell, group))

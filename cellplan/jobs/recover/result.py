@@ -183,9 +183,6 @@ def clock_text(recovery: Recovery) -> str:
     """What is done at each row of the tables: time, number of the phase from 1, kind, and the robots that move.
 
     A row at which one phase ends and another begins counts to the later one.
-
-    Raises:
-        ValueError: No recovery was found.
     """
     if recovery.judgement is None:
         raise ValueError("expected a recovery that was found")
@@ -214,11 +211,7 @@ def default_folder(run: Path) -> Path:
 
 
 def refuse_unless_recoverable(folder: Path, run: Path) -> None:
-    """Refuse a place for a recovery before any work.
-
-    Raises:
-        InputError: It is the run itself, or must not be written.
-    """
+    """Refuse the run itself, and a folder that must not be written, before any work."""
     if folder.resolve() == run.resolve():
         raise InputError(f"{folder}: expected a folder of its own for the recovery, got the run's")
     if folder.exists() and folder.is_dir() and any(folder.iterdir()) and not (folder / RECOVERY).is_file():

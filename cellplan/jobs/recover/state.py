@@ -145,10 +145,6 @@ def stopped_state(
     Args:
         at: Time of the program in [s].
         frozen: Time of the program at which a robot stands instead, by its name.
-        keep: Names of the robots that are to stand still.
-
-    Raises:
-        InputError: See ``refuse_state``.
     """
     cell, motion = places.cell, places.motion
     refuse_state(cell, motion, at=at, frozen=frozen, keep=keep)
@@ -166,12 +162,7 @@ def stopped_state(
 
 
 def refuse_state(cell: Cell, motion: Motion, *, at: float, frozen: Mapping[str, float], keep: Collection[str]) -> None:
-    """Refuse a state that is none of a run; call it early, before any long work. Arguments as of ``stopped_state``.
-
-    Raises:
-        InputError: A time is outside of the program or where it has no rows, there is no such robot, a joint fails in
-            the run, or robots that hold the part together stand at different times.
-    """
+    """Refuse what ``stopped_state`` cannot make, and robots that hold the part at different times; call it early."""
     names = [robot.name for robot in cell.robots]
     _require_time(motion, at, "--at")
     for option, given in (("--frozen", frozen), ("--keep", keep)):

@@ -69,10 +69,6 @@ def correct_from_pass_to_pass(
     """Repeat the program on the real cell until its error converges.
 
     The loop goes by the measured errors, as it would have to beside a real cell; the true ones are reported.
-
-    Args:
-        job: The program as it was solved, and what it is for.
-        on_round: Called with the number of each round that begins.
     """
     executions = _Executions(job, real, system, rng)
     executions.add(job.schedule, job.q)

@@ -199,11 +199,7 @@ def _rounds(curves: Sequence[Array], *, title: str, unit: str, allowed: float) -
 
 
 def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) -> str:
-    """The page of a rehearsal.
-
-    Args:
-        plots: As ``pictures`` returns them.
-    """
+    """The page of a rehearsal."""
     parts = {"plots": inline_plots(plots), "executions": TITLES, "outcomes": ON_PAGE}
     return cell_page("jobs/rehearsal/rehearsal.html", record, cell, parts)
 

@@ -20,7 +20,6 @@ def neat(ready: PreparedSearch, x: Array, start: Array) -> tuple[Array, Array]:
     """A layout with round numbers and its start posture; as it was where the tools cannot follow from there.
 
     Args:
-        ready: What may change.
         x: Values of the variables, shape (n,).
         start: Start posture in [rad] or [m], shape (nq,).
     """

@@ -32,9 +32,6 @@ def ready_cell(request: LayoutRequest) -> PreparedSearch:
     """The cell of a request with all that it lets a layout search change but joint paths; made once in each process.
 
     Where a joint path may change, so may the start posture of its robot, which decides the motion without one.
-
-    Raises:
-        InputError: The cell gives a joint path.
     """
     cell = searched_cell(request)
     for robot in cell.robots:
@@ -60,11 +57,7 @@ def start_posture(ready: PreparedSearch) -> tuple[Array, str]:
 
 
 def with_attempt(ready: PreparedSearch, attempt: Attempt) -> PreparedSearch:
-    """The cell ready for a search of what one attempt may change.
-
-    Raises:
-        InputError: The cell does not take it.
-    """
+    """The cell ready for a search of what one attempt may change."""
     if attempt.addresses:
         variables = ready.variables.among(frozenset(attempt.addresses))
         return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
@@ -75,10 +68,7 @@ def begins(ready: PreparedSearch, start: Array, *, seed: int, count: int) -> Ite
     """Where searches begin: the given layout, and small perturbations of it; of those with a motion only.
 
     Args:
-        ready: What may change.
         start: The start posture of the given layout, shape (nq,).
-        seed: Seed of the perturbations.
-        count: Number of beginnings.
     """
     problem = ready.coarse
     for number in range(count):

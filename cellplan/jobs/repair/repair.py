@@ -116,11 +116,7 @@ class StartFault:
 
 @dataclass(slots=True, kw_only=True)
 class _Work:
-    """The attempts of a repair.
-
-    Attributes:
-        given: What came of the cell as it is given.
-    """
+    """The attempts of a repair."""
 
     request: LayoutRequest  # what is repaired
     workers: int  # number of processes

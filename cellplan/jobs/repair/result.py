@@ -31,11 +31,7 @@ PAGE: Final = "advice.html"
 
 
 def advice_lines(record: Record, folder: Path, cell: Path) -> list[str]:
-    """All lines about a repair.
-
-    Args:
-        cell: The cell file, as the user named it.
-    """
+    """All lines about a repair of a cell file, as the user named it."""
     lines = [f"{record['cell']}: {verdict_line(record)}", *_given(record)]
     if record["remedies"]:
         lines.append("  remedies, each solved and verified; a cost of 1 stands for 100 mm, 10 deg or a tenth more time")

@@ -186,7 +186,6 @@ def confirmed(ready: PreparedSearch, x: Array, start: Array) -> Confirmed:
     """A layout of the search, corrected until it passes every check with the demanded margins.
 
     Args:
-        ready: What may change.
         x: Values of the variables, shape (n,).
         start: Start posture in [rad] or [m], shape (nq,).
     """

@@ -32,7 +32,6 @@ def study_record(header: Mapping[str, Any], trials: Sequence[Record]) -> dict[st
 
     Args:
         header: What the study is about: kind, cell, settings, task, vary, inputs and versions.
-        trials: Its trials in their order.
     """
     counts = Counter(trial["status"] for trial in trials)
     about = {key: header[key] for key in ("kind", "cell", "settings", "task", "vary")}

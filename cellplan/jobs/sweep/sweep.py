@@ -101,12 +101,7 @@ def sweep(
 
 
 def evaluate_variant(job: SweepJob, variant: Variant) -> TrialOutcome:
-    """Solve one variant; what is wrong with it becomes its reason.
-
-    Args:
-        job: The cell and what is set in it for all variants.
-        variant: Its number and values.
-    """
+    """Solve one variant; what is wrong with it becomes its reason."""
     return solved_outcome(
         lambda: _base_cell(job).with_values(variant.values),
         _figures,
@@ -129,11 +124,7 @@ def _base_cell(job: SweepJob) -> Cell:
 
 
 def _require_a_valid_value(base: Cell, axis: Axis) -> None:
-    """Refuse a key none of whose values can stand in the cell.
-
-    Raises:
-        InputError: That of the first value.
-    """
+    """Refuse a key none of whose values can stand in the cell, with the error of the first one."""
     first: InputError | None = None
     for value in axis.values:
         try:

@@ -50,11 +50,7 @@ class ViewedPhase:
 
 
 def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> Record:
-    """The scene of a run.
-
-    Raises:
-        InputError: The series of the run do not fit its cell.
-    """
+    """The scene of a run."""
     program = DemandedProgram.of(cell)
     played = list(_played(stored, cell, program.labels))
     scenes = program.scenes(cell)
@@ -90,12 +86,7 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> Record:
 
 
 def motion_record(times: Array, q: Array, phases: list[dict[str, Any]]) -> Record:
-    """A motion, every n-th row of a long one and the last.
-
-    Args:
-        times: Times of the rows in [s], shape (N,).
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-    """
+    """A motion with times (N,) in [s] and joints (N, nq) in [rad] or [m]: every n-th row of a long one and the last."""
     every = max(1, math.ceil(q.size / MOST_NUMBERS))
     rows = np.unique(np.append(np.arange(0, len(times), every), len(times) - 1))
     return {
@@ -137,11 +128,7 @@ def _series(stored: StoredRun, place: str, cell: Cell) -> dict[str, Array]:
 
 
 def stored_series(stored: StoredRun, place: str, cell: Cell) -> tuple[Array, Array]:
-    """Times in [s] and stacked joint positions in [rad] or [m] of one run, from its series.
-
-    Raises:
-        InputError: The series do not fit the cell.
-    """
+    """Times in [s] and stacked joints in [rad] or [m] of one run, from series that must fit the cell."""
     return _positions(stored.series(place), stored.file(place, SERIES), cell)
 
 

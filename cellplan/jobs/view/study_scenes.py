@@ -42,11 +42,7 @@ FIGURES: Final = (
 
 
 def read_layout_study(folder: Path) -> Record:
-    """The result of a layout search.
-
-    Raises:
-        InputError: The study has no result yet, or is of another kind.
-    """
+    """The result of a layout search; a study without one, or of another kind, is refused."""
     file = folder / RESULT
     if not file.exists():
         raise InputError(f"{file}: missing: the search has not ended; finish it with --resume")
@@ -59,11 +55,7 @@ def read_layout_study(folder: Path) -> Record:
 
 
 def cell_of_study(folder: Path, given: Path | None, allow_dirs: Sequence[Path]) -> Cell:
-    """The cell that the layouts are made of: the given one, else the best layout in the folder.
-
-    Raises:
-        InputError: There is none.
-    """
+    """The cell that the layouts are made of: the given one, else the best layout in the folder; one must be there."""
     path = folder / BEST if given is None else given
     if given is None and not path.exists():
         raise InputError(f"{folder}: expected {BEST} in it, got none: no layout passed; name the cell file with --cell")
@@ -71,14 +63,7 @@ def cell_of_study(folder: Path, given: Path | None, allow_dirs: Sequence[Path]) 
 
 
 def study_scenes(record: Record, cell: Cell, file: str, geometries: Geometries, progress: Progress) -> Iterator[Record]:
-    """A scene for each of the best layouts.
-
-    Args:
-        file: Where the result was read from.
-
-    Raises:
-        InputError: A layout does not fit the cell.
-    """
+    """A scene for each of the best layouts."""
     top: list[Any] = record["top"]
     first: Scene | None = None
     for place, layout in enumerate(top):
@@ -104,9 +89,6 @@ def placed_scene(first: Scene | None, cell: Cell) -> Scene:
 
     Args:
         first: The scene of another layout of the same cell; None for the first one.
-
-    Raises:
-        InputError: The bodies of the cell cannot be meant.
     """
     bodies = tuple(sorted(scene_bodies(cell), key=is_ground))
     if first is None or [body.name for body in bodies] != [body.name for body in first.bodies]:

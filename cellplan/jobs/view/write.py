@@ -95,25 +95,14 @@ def _target(request: ViewRequest, usual: Path) -> Path:
 
 
 def write_view_of_run(folder: Path, cell: Cell, *, progress: Progress = silent) -> Path:
-    """Write the 3-D page of a run whose cell is at hand into its folder.
-
-    Raises:
-        InputError: The run was changed meanwhile, or the page cannot be written.
-    """
+    """Write the 3-D page of a run whose cell is at hand into its folder."""
     progress("making the 3-D page", 0.0)
     write_view(_record_of_run(read_stored_run(folder), cell), folder / VIEW_PAGE)
     return folder / VIEW_PAGE
 
 
 def write_view_of_blocked(error: BlockedTransferError, target: Path) -> bool:
-    """Write the 3-D page of the best try of a transfer move that was not found; False where it is not known.
-
-    Args:
-        target: The page; an older one there is replaced.
-
-    Raises:
-        InputError: The place holds something else, or cannot be written.
-    """
+    """Write the page of the best try of a missing transfer move over any older page; False where no try is known."""
     if error.best is None:
         return False
     geometries, cell = Geometries(), error.best.scene.cell

@@ -23,7 +23,6 @@ def brought_onto_tasks(motion: MotionTask, q: Array) -> Array:
     fail on the way (``motion.locked_joints``) leave everything as it is.
 
     Args:
-        motion: The tasks and the robots that move for them.
         q: Configurations at the samples of the clock, shape (N, nq).
     """
     cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps

@@ -22,7 +22,6 @@ def desired_motion(
     """The desired motion of the tools of the tasks, then of further holders, whose grasps never change.
 
     Args:
-        paths: The paths of the tasks on the common clock.
         offset: How far the tools stand beside their paths at the start; None when they stand on them.
     """
 

@@ -30,8 +30,6 @@ class BatchTasks:
     """The tasks of one run, and the joints that may move for them.
 
     Attributes:
-        chains: The chains of all robots.
-        joint_count: Length of the stacked joint vector.
         is_refined: Whether speeds are exact to rounding even where operators cannot do their tasks alone.
     """
 

@@ -23,16 +23,12 @@ class _NoConvergenceError(NoSolutionError):
 
 
 def closed_path(run: AccurateRun, problem: TrackingProblem) -> CollocatedPath | None:
-    """A path that closes in every cycle; None where collocation does not converge.
+    """A path that closes in every cycle; None where collocation does not converge. Open paths and cycles are refused.
 
     Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
     those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the
     map of one cycle onto the next need not be a contraction. Before the first cycle and after the last one there is
     nothing to close, and no drift.
-
-    Raises:
-        InputError: A path is open.
-        NoSolutionError: A cycle does not close.
     """
     bounds, start = _bounds(run, problem.motion.schedule), problem.motion.start
     for begin, end in pairwise(bounds):

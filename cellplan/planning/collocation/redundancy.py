@@ -31,11 +31,7 @@ class Redundancy:
     """
 
     def __init__(self, motion: MotionTask, tasks: BatchTasks) -> None:
-        """Make ready what each goal and each weight needs.
-
-        Args:
-            tasks: The same tasks for many configurations.
-        """
+        """Make ready what each goal and each weight needs."""
         cell, relations = motion.cell, motion.relations
         model = CombinedModel(cell)
         constraints = TaskConstraints.of(cell, relations, motion.moving)

@@ -49,11 +49,7 @@ class AccurateRun:
     """
 
     def __init__(self, motion: MotionTask, *, progress: Progress = silent) -> None:
-        """Gather the tasks, and measure how far the tools stand beside their paths at the start.
-
-        Raises:
-            TypeError: The desired motion is known at the samples only.
-        """
+        """Gather the tasks, and measure how far the tools stand beside their paths at the start."""
         cell, schedule, grasps = motion.cell, motion.schedule, motion.grasps
         if not schedule.is_continuous:
             raise TypeError("accurate run: expected a desired motion between samples, got none")

@@ -111,7 +111,6 @@ class Collocation:
         Args:
             windows: Windows in order.
             q: Configurations of all cells, shape (nq, all cells); those of the cells are carried on in place.
-            cells: Indices of the cells to carry.
             record: Called with every window that cells passed, in order for each of them.
         """
         for first in range(0, len(windows), AT_ONCE):

@@ -27,12 +27,7 @@ def closed(problem: TrackingProblem, integrate: Callable[[TrackingProblem, int],
     first one at the feedback gain.
 
     Args:
-        problem: The tasks, without a drift.
         integrate: Motion of a problem from its start to the sample k, shape (k + 1, nq).
-
-    Raises:
-        InputError: A path is open, or its cycle does not end on a sample of the clock.
-        NoSolutionError: The cycle does not close.
     """
     schedule, start = problem.motion.schedule, problem.motion.start
     begin, end = first_cycle(problem.cell, schedule)
@@ -82,9 +77,6 @@ def closing_drift(
 
     Returns:
         Mean speeds in [rad/s] or [m/s], shape (nq,); ``moved`` was evaluated for them last.
-
-    Raises:
-        NoSolutionError: The cycle does not close.
     """
     N = _null_space(problem, sample, start)
     u = np.zeros(N.shape[1])
@@ -112,11 +104,7 @@ def closing_drift(
 
 
 def first_cycle(cell: Cell, schedule: Schedule) -> tuple[int, int]:
-    """Times at which the first cycle begins and ends: the whole motion when the tasks keep no common cycle.
-
-    Raises:
-        InputError: The tools are not back at its end.
-    """
+    """Times at which the first cycle begins and ends, where the tools must be back; the whole motion without one."""
     first, last = 0, len(schedule.times) - 1
     bounds = common_cycles(schedule)
     if bounds is not None and np.ptp(np.diff(bounds)) <= SAME_PERIOD:

@@ -63,11 +63,7 @@ def integrate(
 
 
 def refuse_long_step(cell: Cell, q: Array, step: StepResult) -> None:
-    """Stop when a step is not finite, or so long that the first order no longer holds.
-
-    Raises:
-        DivergedError: A joint would turn by half a turn, or slide as many metres, in one step.
-    """
+    """Stop when a step is not finite, or a joint would turn by half a turn in it, where the first order ends."""
     moves = np.abs(step.q - q)
     if not float(np.max(moves, initial=0.0)) < LARGEST_STEP:  # also for what is not a number
         robot, joint = joint_at(cell, int(np.argmax(np.where(np.isfinite(moves), moves, np.inf))))

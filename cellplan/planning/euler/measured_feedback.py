@@ -61,11 +61,7 @@ def displaced(task: Task, X_desired: Array, X_measured: Array, *, nominal: Array
 
 
 def settled_start(motion: MotionTask) -> Array:
-    """The configuration near the start from which the model's tools stand on the first references, shape (nq,).
-
-    Raises:
-        NoSolutionError: The tools cannot be brought there.
-    """
+    """The configuration near the start from which the model's tools stand on the first references, shape (nq,)."""
     cell = motion.cell
     times: Array = cell.motion.step * np.arange(SETTLING_STEPS + 1, dtype=np.float64)
     still = Schedule(times=times, tasks=tuple(_standing(task, len(times)) for task in motion.schedule.tasks))
@@ -87,9 +83,6 @@ def measured_start(motion: MotionTask, *, measure: Measure) -> Array:
 
     The standing tools are measured and put right several times: a pass that began with the whole error would begin with
     a jerk. The arguments are those of `integrate_measured`.
-
-    Raises:
-        NoSolutionError: The tools cannot be brought there.
     """
     desired = motion.schedule
     first = Schedule(times=desired.times[:1], tasks=tuple(_standing(task, 1) for task in desired.tasks))
@@ -108,9 +101,6 @@ def integrate_measured(motion: MotionTask, *, measure: Measure) -> Motion:
 
     Args:
         motion: The tasks in the written cell: what the method knows.
-
-    Raises:
-        NoSolutionError: A tool lost its path, or the method found no step.
     """
     cell, desired = motion.cell, motion.schedule
     targets, _ = motion.references()

@@ -64,9 +64,6 @@ def bounded_velocities(
 
     Returns:
         Joint velocities within the bounds to the last bit, shape (nq,).
-
-    Raises:
-        NoSolutionError: The program could not be solved.
     """
     velocities = np.zeros(len(tasks.weights))
     if not mobile.any():

@@ -88,12 +88,7 @@ class _Rounds:
         self._target = AIM * cell.solver.search.tolerance_mm.si**2
 
     def on(self, cost: SearchCost, shares: Array) -> Pass:
-        """Rounds on one expansion after another.
-
-        Args:
-            cost: The cost that is expanded.
-            shares: Share of each joint's best move that it makes, in the order of the sequence.
-        """
+        """Rounds on one expansion after another; each joint makes a share of its best move, in their order."""
 
         def improve(expansion: Expansion, bounds: Bounds, rounds: int) -> tuple[Expansion, int]:
             trust, used = SMALL_ANGLE, 0

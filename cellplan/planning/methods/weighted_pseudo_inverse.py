@@ -43,9 +43,6 @@ def damped_velocities(inverse: WeightedInverse, xdot: Array, damping: float | No
 
     Returns:
         Joint velocities in [rad/s] or [m/s], shape (nq,).
-
-    Raises:
-        NoSolutionError: Without damping, at a singularity.
     """
     if damping == 0.0 and inverse.is_singular:
         raise NoSolutionError("the cooperation Jacobian is singular and solver.damping is 0: allow damping (auto)")

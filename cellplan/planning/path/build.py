@@ -110,9 +110,6 @@ def refuse_path_in_metres(curve: Curve, *, task: Task, part: Part) -> None:
 
     Args:
         curve: The path as it is listed, in P, before it is projected.
-
-    Raises:
-        InputError: With its length, asking for the unit.
     """
     first, last = float(curve.knots[0]), float(curve.knots[-1])
     p, _ = curve.evaluate(np.union1d(curve.knots, np.linspace(first, last, LOOKED_AT)), (first, last))
@@ -131,11 +128,7 @@ def refuse_path_in_metres(curve: Curve, *, task: Task, part: Part) -> None:
 
 
 def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part) -> None:
-    """Refuse a path that is shorter than anybody works, or far from the part that it is given on.
-
-    Raises:
-        InputError: With the length, or the farthest point and its distance from the part.
-    """
+    """Refuse a path that is shorter than anybody works, or far from the part that it is given on."""
     if not isinstance(task.path, TimedPath) and arc.total < SHORTEST:
         raise InputError(
             f"{task.where('path')}: expected a path of at least {length(SHORTEST)} mm, got {length(arc.total)} mm; "

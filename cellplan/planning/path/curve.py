@@ -62,9 +62,6 @@ def path_curve(task: Task) -> PathCurve:
     """Draw the path of a task in the part frame.
 
     Listed points are passed in their order; shapes that have none run the way round that their task says.
-
-    Raises:
-        InputError: The points do not make a path, or a corner cannot be rounded as stated.
     """
     path = task.path
     where = task.where("path")

@@ -29,9 +29,6 @@ def refuse_near_points(
         path: Where they come from, for messages; None for a list in the cell file.
         is_closed: Whether the last point is joined to the first.
         is_smooth: Whether a smooth curve joins them.
-
-    Raises:
-        InputError: With the numbers of the points, their lines in their file, and their distance.
     """
     ends = np.vstack([points, points[:1]]) if is_closed else points
     sides = np.linalg.norm(np.diff(ends, axis=0), axis=1)
@@ -52,11 +49,7 @@ def refuse_near_points(
 
 
 def refuse_near_times(path: TimedPath, where: str) -> None:
-    """Refuse two rows of a trajectory between which hardly any time passes.
-
-    Raises:
-        InputError: With the lines of both.
-    """
+    """Refuse two rows of a trajectory between which hardly any time passes."""
     steps = np.diff(path.times)
     k, others = _isolated(steps, NEAR_SMOOTH, is_closed=path.is_closed)
     if k is not None:

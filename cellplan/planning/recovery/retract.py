@@ -71,7 +71,6 @@ def find_retract(scene: Scene, q: Array, *, may_move: Collection[str]) -> tuple[
     Args:
         scene: See ``certify.growth.scene_at_stop``.
         q: Stacked joint positions in [rad] or [m] at which the cell stands, shape (nq,).
-        may_move: Names of the robots that may retract; all others stand.
 
     Raises:
         TransferNotFoundError: A pair that is too near belongs to robots that stand, or no free retract was found.
@@ -215,11 +214,7 @@ class Lines:
     """Straight lines of the tools of a cell from one stacked configuration."""
 
     def __init__(self, cell: Cell, q: Array) -> None:
-        """Place the cell.
-
-        Args:
-            q: Stacked joint positions in [rad] or [m], shape (nq,).
-        """
+        """Place the cell at stacked joint positions in [rad] or [m], shape (nq,)."""
         self._cell, self._q, self._model = cell, q, CombinedModel(cell)
         self._X_WT = self._model.state(q).X_WT
 

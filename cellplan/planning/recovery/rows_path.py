@@ -42,7 +42,6 @@ def rows_along(path: RowsPath, retimer: Retimer, *, widths: tuple[float, float, 
     """Rows of a motion from rest to rest along a path, shape (K, nq); its ends are exact.
 
     Args:
-        retimer: The limits of all joints and the step of the rows.
         widths: Times in [s] of the law to begin with: see ``planning.transfer.straight_time``.
     """
     count = max(2, int(np.ceil(sum(widths) / retimer.step)))

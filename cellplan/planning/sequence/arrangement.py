@@ -31,9 +31,6 @@ def arrange(cell: Cell) -> tuple[Block, ...]:
     Pairwise has one task in each block, the first of the cell that may begin; semi-coordinated only tasks at one
     configuration of the first holder, the present one as long as there are any for it.
 
-    Args:
-        cell: The cell, with any number of tasks for each robot.
-
     Raises:
         InputError: A name does not exist or stands in the order of another robot, robots wait for one another in a
             circle, or tasks that begin together need different configurations of the holder.
@@ -102,11 +99,7 @@ def _holder_configuration(cell: Cell, task: Task) -> Array | None:
 
 
 def _require_names(cell: Cell) -> None:
-    """Refuse orders and ``after`` with names that the cell does not have.
-
-    Raises:
-        InputError: The first of them.
-    """
+    """Refuse orders and ``after`` with names that the cell does not have."""
     operators = {task.name: task.robot for task in cell.tasks}
     marks = [mark.name for mark in cell.program.all_marks] if cell.program is not None else []
     for robot in cell.robots:
@@ -120,11 +113,7 @@ def _require_names(cell: Cell) -> None:
 
 
 class SequenceProgress:
-    """How far each robot of a cell is in its sequence of tasks and marks.
-
-    Attributes:
-        cell: The cell; all names in its orders exist.
-    """
+    """How far each robot of a cell is in its sequence of tasks and marks."""
 
     def __init__(self, cell: Cell) -> None:
         """Begin before the first task and mark of every robot."""
@@ -216,11 +205,7 @@ class SequenceProgress:
 
 
 def with_only_task(cell: Cell, name: str) -> Cell:
-    """The cell with one of its tasks only, in the order of its robot and after nothing else.
-
-    Raises:
-        InputError: There is no such task.
-    """
+    """The cell with one of its tasks only, in the order of its robot and after nothing else."""
     chosen = next((task for task in cell.tasks if task.name == name), None)
     if chosen is None:
         raise InputError(f"task: expected one of {', '.join(task.name for task in cell.tasks)}, got '{name}'")

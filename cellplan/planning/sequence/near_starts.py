@@ -78,12 +78,7 @@ def _nearest(scene: Scene, task: Task, path: ClockedPath, last: Array) -> Array 
 
 
 def with_approach_starts(cell: Cell, chains: Mapping[str, ScrewChain], toolpaths: Mapping[str, Toolpath]) -> Cell:
-    """The cell with starts on the paths of their tasks moved back to the begin of the approaches.
-
-    Args:
-        cell: The cell as it is while the tasks are worked on; each of its robots has at most one.
-        chains: Kinematic chain of each robot, by name.
-    """
+    """The cell, with at most one task a robot, with starts on the paths moved back to the begin of the approaches."""
     holder = cell.robot(cell.positioners[0]).start if cell.positioners else None
     X_WP = part_pose(cell, holder)
     starts: dict[str, Array] = {}

@@ -44,9 +44,6 @@ def with_move(cell: Cell, move: PartMove, place: PartPlaceEntry, holder: str) ->
     """The cell with a straight move of the holder as its only task.
 
     Gripping and letting go are straight along the axis of the holder's tool; lifting and lowering are vertical.
-
-    Args:
-        cell: The cell as it is meanwhile: with the part lying in it, or held.
     """
     grasp = next(grasp for grasp in cell.part.held_by if grasp.robot == holder)
     at = place.X_WP @ grasp.X_PT

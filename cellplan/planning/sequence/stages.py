@@ -32,14 +32,7 @@ class Stage:
 
 
 def program_stages(cell: Cell) -> tuple[Stage, ...]:
-    """The stages of one cycle of a program from home to home.
-
-    Args:
-        cell: A cell with a program; starts and homes that are not known yet are None in the stages too.
-
-    Raises:
-        InputError: The order of the tasks cannot be kept.
-    """
+    """The stages of one cycle from home to home; starts and homes that are not known yet are None in them too."""
     if cell.program is None:
         raise ValueError(f"cell '{cell.name}' has no program from home to home")
     between = [*_picked_up(cell, cell.program), *_worked_on(cell), *_put_down(cell, cell.program)]

@@ -45,9 +45,6 @@ def home_place(cell: Cell, robot: Robot) -> str:
 def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
     """Refuse start postures and homes that no solve could be right with.
 
-    Args:
-        cell: The cell; starts and homes that are to be found are passed over.
-
     Raises:
         StartOutsideLimitsError: A joint starts outside its limits.
         HomeOutsideLimitsError: A joint is outside its limits at home.
@@ -80,7 +77,6 @@ def tool_distance(
     """How far a configuration, shape (n,), puts a tool from where it is desired, in [m] and [rad].
 
     Args:
-        relation: The task or grasp, which says which components of the pose count.
         X_PT_desired: Reference tool tip, shape (4, 4), in the frame that the relation refers to.
         X_WR: That frame in the world, shape (4, 4).
     """
@@ -97,13 +93,7 @@ def is_off(cell: Cell, relation: Relation, off: tuple[float, float]) -> bool:
 
 
 def off_words(cell: Cell, relation: Relation, off: tuple[float, float], *, at_best: str = "") -> str:
-    """One line on a given start that is off its task or its grasp, in [m] and [rad].
-
-    Args:
-        relation: The task or grasp.
-        off: Distance and angle.
-        at_best: Label before them where they are the smallest of several.
-    """
+    """One line on a start off its task or grasp, in [m] and [rad]; ``at_best`` stands before the least of several."""
     goal = f"the start of task '{relation.name}'"
     if isinstance(relation, Grasp):
         goal = f"its grasp on the part that '{cell.positioners[0]}' carries"

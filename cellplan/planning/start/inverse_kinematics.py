@@ -40,7 +40,6 @@ def reaching_configurations(chain: ScrewChain, task: Relation, X_PT: Array, *, X
     Joint limits are not checked here: a configuration out of limits may have an equal one a turn away.
 
     Args:
-        task: The task or grasp, which says which components of the pose count.
         X_PT: Reference tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
         seeds: Configurations to start from, shape (B, n).

@@ -219,7 +219,6 @@ def nearest_reach(
     with the lever ``l`` from the base to the goal, which bounds the curvature of the tip's way beyond reach.
 
     Args:
-        relation: The task or grasp, which says which components of the pose count.
         X_PT: Reference tool tip in P, shape (4, 4).
         X_WP: The part, shape (4, 4).
         seeds: Configurations to start from, shape (B, n).

@@ -67,9 +67,6 @@ def choose_start(scene: Scene, paths: Mapping[str, ClockedPath], *, progress: Pr
     The search works in the order of names, each robot with random numbers of its own, drawn from ``solver.seed`` and
     its name: the order in which the file lists robots and tasks changes nothing.
 
-    Args:
-        paths: Path of every task on the common clock, by task name.
-
     Raises:
         StartNotFoundError: No configuration reaches all tasks within limits and without collision.
     """
@@ -107,11 +104,7 @@ def _tried(search: StartSearch, progress: Progress) -> list[StartTrial]:
 
 
 def _candidates(search: StartSearch, progress: Progress) -> Iterator[Array]:
-    """Configurations of the whole cell that reach every task without touching, best first for each of the positioner.
-
-    Raises:
-        StartNotFoundError: There is none.
-    """
+    """Configurations of the whole cell that reach all tasks without touching, best first for each of the positioner."""
     configurations = holder_configurations(search)
     yielded = 0
     for index, configuration in enumerate(configurations):

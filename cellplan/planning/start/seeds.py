@@ -33,7 +33,6 @@ def led_to(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR
     """The configuration on the same branch that puts a tool where it is desired, shape (n,); None where there is none.
 
     Args:
-        relation: The task or grasp, which says which components of the pose count.
         q: The seed in [rad] or [m], shape (n,).
         X_PT: Desired tool tip, shape (4, 4), in the frame that the relation refers to.
         X_WR: That frame in the world, shape (4, 4).
@@ -72,9 +71,6 @@ def with_seeds(
     A given start is moved by a few degrees or millimetres only; what is farther off is left for
     ``examine_given_starts`` to refuse. One that an earlier run began at is moved as far as its branch goes. A start on
     the path of a task with an approach is moved onto the path.
-
-    Args:
-        cell: The cell; each of its robots has at most one task or grasp that it begins at.
 
     Raises:
         NoSolutionError: A branch of the earlier run does not lead to a task.

@@ -124,11 +124,7 @@ class AtFixedRate:
 
 
 def least_steps(motion: AtFixedRate, is_allowed: Callable[[Array], bool]) -> int | None:
-    """The fewest steps found with which a motion keeps all limits; None when slower rates beside it do not help.
-
-    Args:
-        is_allowed: Whether rows keep all limits, by their nominal times in [s].
-    """
+    """Fewest steps in which all limits hold, by nominal times in [s]; None when slower rates beside it do not help."""
     low = whole_steps(motion.fixed_seconds, motion.step)
     if motion.is_fixed:
         return low if is_allowed(motion.rows(low)) else None

@@ -100,11 +100,7 @@ class RetimedPath:
         return np.round(sigma, TIME_DECIMALS)
 
     def lasting(self, steps: int) -> Self:
-        """The same motion slower as a whole, so that all loads fall alike; what is fixed takes no more.
-
-        Args:
-            steps: What it is to take, at least as many as it takes.
-        """
+        """The same motion slower as a whole, so that all loads fall alike; what is fixed takes no more."""
         given = np.array(self.counts)
         free = np.array([not motion.is_fixed for motion in self.motions], dtype=bool)
         if not free.any():

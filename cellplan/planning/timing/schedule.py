@@ -36,11 +36,7 @@ def schedule_tasks(cell: Cell, toolpaths: Sequence[Toolpath]) -> Schedule:
 
 
 def schedule_paths(cell: Cell, paths: Sequence[ClockedPath]) -> Schedule:
-    """Clocked paths with their common clock, sampled at its times.
-
-    Raises:
-        InputError: As `clock_times` does.
-    """
+    """Clocked paths with their common clock, sampled at its times."""
     times = clock_times(cell, paths)
     return Schedule(times=times, tasks=tuple(_on_clock(times, path) for path in paths), paths=tuple(paths))
 
@@ -78,9 +74,6 @@ def clock_times(cell: Cell, paths: Sequence[ClockedPath]) -> Array:
     """Samples ``t = k step``, k = 0..n, of the common clock, which is as long as the cell says, shape (n + 1,).
 
     A cell that gives no duration has a clock that ends with its last task.
-
-    Args:
-        cell: The cell; its motion gives the step and the length of the clock.
 
     Raises:
         InputError: A task does not fit the clock, or the clock would have more than two million samples.
@@ -287,11 +280,7 @@ def _stops(task: Task, toolpath: Toolpath) -> Array:
 
 
 def require_memory(cell: Cell, samples: int) -> None:
-    """Refuse a clock whose samples of all joints do not fit an ordinary machine.
-
-    Raises:
-        InputError: With the memory that they would take, and the shortest step that fits.
-    """
+    """Refuse a clock whose samples do not fit an ordinary machine, with the memory and the shortest step that fits."""
     joints = sum(len(robot.model.joints) for robot in cell.robots)
     if samples * joints <= MOST_VALUES:
         return

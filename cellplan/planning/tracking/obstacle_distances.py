@@ -38,11 +38,7 @@ class ClosestPairs:
     """
 
     def __init__(self, scene: Scene, *, classes: frozenset[ClearanceClass] = BETWEEN_THINGS) -> None:
-        """Choose the pairs.
-
-        Args:
-            classes: Classes of pairs that are considered; those of one robot with itself only when asked for.
-        """
+        """Choose the pairs of the classes; those of one robot with itself only when they are among them."""
         self._scene = scene
         chosen = np.array([pair.rule is Rule.CLEARANCE and pair.clearance_class in classes for pair in scene.pairs])
         self._table = _among(scene.near_table, chosen)

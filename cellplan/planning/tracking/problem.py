@@ -67,8 +67,6 @@ class TrackingProblem:
     """All tasks of one run on the common clock, and the joints that may move for them.
 
     Attributes:
-        motion: The tasks and the robots that move for them.
-        cell: The cell.
         times: Samples of the clock in [s], shape (N,).
         tasks: The tasks, then the grasps of further holders, one block row each.
         constraints: What they constrain, in which frames and by which joints.
@@ -86,7 +84,6 @@ class TrackingProblem:
         """Gather what stays the same from step to step.
 
         Args:
-            motion: The tasks and the robots that move for them; goals may lead back to its start.
             drift: Joint velocities in the null space of the tasks that close a cycle; None for none.
             references: Poses that replace the desired ones, shape (N, tasks, 4, 4): a feedback corrects those of each
                 step before it; None to use the desired ones.
@@ -138,11 +135,7 @@ class TrackingProblem:
         return [rows[k] @ block for rows, block in zip(self._rows, J, strict=True)]
 
     def first_order(self, k: int, q: Array) -> FirstOrder:
-        """The tasks at sample k and configuration q, to first order.
-
-        Raises:
-            DivergedError: A tool lost its path.
-        """
+        """The tasks at sample k and configuration q, to first order."""
         state = self.state(q)
         signs = self.signs * self.mobile(k)
         X_WT = state.X_WT[self.constraints.operators]
@@ -162,11 +155,7 @@ class TrackingProblem:
         return self._with_goals(k, q, state, FirstOrder(rows, twist, errors, weights, drift), signs=signs)
 
     def weights(self, k: int, q: Array) -> Array:
-        """Joint weights at sample k and configuration q, shape (nq,), for methods without a Jacobian.
-
-        Raises:
-            DivergedError: A tool lost its path.
-        """
+        """Joint weights at sample k and configuration q, shape (nq,), for methods without a Jacobian."""
         if self._weights.varies:
             return self.first_order(k, q).weights
         state = self.state(q)

@@ -115,7 +115,6 @@ def constraint_rows(task: Relation, X_RT: Array) -> Array:
     """Rows that pick what a task constrains from a relative twist in R, shape (N, m, 6).
 
     Args:
-        task: The task or grasp.
         X_RT: Desired tool poses, shape (N, 4, 4).
     """
     to_frames = np.zeros((len(X_RT), 6, 6))

@@ -21,12 +21,7 @@ class WeightedInverse:
     """
 
     def __init__(self, J: Array, weights: Array) -> None:
-        """Decompose once.
-
-        Args:
-            J: Task rows, shape (m, nq).
-            weights: Positive joint weights, the diagonal of W, shape (nq,).
-        """
+        """Decompose once, with rows of shape (m, nq) and positive weights, the diagonal of W, shape (nq,)."""
         self._J = J
         self._JW = J / weights
         self._s_squared, self._U = np.linalg.eigh(self._JW @ J.T)

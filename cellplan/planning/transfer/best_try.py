@@ -49,8 +49,6 @@ class BlockedTransferError(TransferNotFoundError):
     """No transfer move was found, or it begins or ends too close to something.
 
     Attributes:
-        place: Where in the cell file the robots stand.
-        what: What is in the way.
         best: The best try; None once the error was sent to another process.
         name: Name of the phase; empty where it is not known.
     """

@@ -35,14 +35,7 @@ class BlendedLine:
 
     @classmethod
     def through(cls, columns: slice, times: Array, q: Array, *, shares: Array | float = 1.0) -> "BlendedLine":
-        """Round the corners as far as their neighbours allow.
-
-        Args:
-            columns: See ``BlendedLine``.
-            times: Likewise.
-            q: Likewise.
-            shares: Share of that which is used at each via point, 0 < share <= 1, shape (K,) or one number.
-        """
+        """Round the corners by a share of what their neighbours allow, 0 < share <= 1, one number or shape (K,)."""
         steps = np.diff(times)
         nearest = np.minimum(np.append(np.inf, steps), np.append(steps, np.inf))
         return cls(columns=columns, times=times, q=q, halves=0.5 * shares * nearest)

@@ -49,19 +49,10 @@ class SpaceTimePath:
 
 
 class InTime:
-    """Moves of all robots in the same span of time.
-
-    Attributes:
-        tried: What was tried in vain.
-    """
+    """Moves of all robots in the same span of time."""
 
     def __init__(self, query: TransferQuery, tried: Tried, *, reserve: float, progress: Progress) -> None:
-        """Prepare; nothing is planned yet.
-
-        Args:
-            query: Who moves from where to where.
-            reserve: Distance in [m] beyond the demanded one while planning.
-        """
+        """Prepare a query to be planned with ``reserve`` in [m] beyond the demanded distance."""
         self.tried, self._query, self._reserve, self._progress = tried, query, reserve, progress
 
     def lines(self) -> Iterator[list[BlendedLine]]:
@@ -203,7 +194,6 @@ def connected_in_time(
     """A way from a configuration at a tick to another one at a later tick.
 
     Args:
-        check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each, with their ticks.
         samples: How many of them at most.
 
@@ -232,11 +222,7 @@ def connected_in_time(
 
 
 def shortened_in_time(check: MoveCheck, path: SpaceTimePath, rng: np.random.Generator) -> SpaceTimePath:
-    """A way with straight lines in joint space and time in place of several edges, each in the same time as these.
-
-    Args:
-        check: Which moves are free.
-    """
+    """A way with straight lines in joint space and time in place of several edges, each in the same time as these."""
     for _ in range(SHORTCUTS):
         if len(path.ticks) == 2:
             break

@@ -44,20 +44,10 @@ class RobotMove:
 
 
 class InTurn:
-    """Moves of one robot after the other.
-
-    Attributes:
-        query: Who moves from where to where.
-        tried: What was tried in vain.
-    """
+    """Moves of one robot after the other."""
 
     def __init__(self, query: TransferQuery, tried: Tried, *, reserve: float, progress: Progress) -> None:
-        """Prepare; nothing is planned yet.
-
-        Args:
-            query: Who moves from where to where.
-            reserve: Distance in [m] beyond the demanded one while planning.
-        """
+        """Prepare a query to be planned with ``reserve`` in [m] beyond the demanded distance."""
         self.tried, self.query, self._reserve, self._progress = tried, query, reserve, progress
         self._checks: dict[tuple[str, frozenset[str]], MoveCheck | None] = {}
         self._known: dict[tuple[str, frozenset[str], bool], RobotMove | None] = {}
@@ -163,7 +153,6 @@ def shortened(check: MoveCheck, path: Array, velocity: Array, rng: np.random.Gen
     """A shorter way between the same ends, shape (K', n).
 
     Args:
-        check: Which moves are free.
         path: Via points in [rad] or [m], shape (K, n).
         velocity: Top speeds, shape (n,); lengths are times at these.
     """
@@ -186,7 +175,6 @@ def rounded_line(check: MoveCheck, path: Array, columns: slice, velocity: Array)
     """A way with its corners rounded off as far as that is free.
 
     Args:
-        check: Which moves are free.
         path: Via points in [rad] or [m], shape (K, n), K at least 2.
         velocity: Top speeds, shape (n,): between via points the fastest joint goes at its own.
     """

@@ -50,16 +50,11 @@ class MoveCheck:
     """Moves of one robot.
 
     Attributes:
-        robot: Its name.
         refused: How often each pair was too near, by the names of its bodies.
     """
 
     def __init__(self, scene: Scene, robot: str, others: Others, *, reserve: float) -> None:
-        """Collect the pairs that the robot changes.
-
-        Args:
-            reserve: Distance in [m] beyond the demanded one.
-        """
+        """Collect the pairs that the robot changes, with ``reserve`` in [m] beyond the demanded distance."""
         self.robot, self.refused = robot, Counter[tuple[str, str]]()
         self._scene, self._others, self._reserve = scene, others, reserve
         self._chain = scene.chains[robot]

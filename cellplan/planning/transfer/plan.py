@@ -69,7 +69,6 @@ def plan_transfer(
     the rows are certified with all pairs of the scene.
 
     Args:
-        scene: The scene of the phase: its pairs carry the demands that count in it.
         start: Stacked joint positions in [rad] or [m], shape (nq,).
         goal: Likewise.
         retimer: The limits of all joints and the step of the rows.

@@ -40,11 +40,7 @@ class Tried:
 
 
 def require_free_ends(query: TransferQuery) -> None:
-    """Refuse a start or a goal that keeps less distance than is demanded.
-
-    Raises:
-        BlockedTransferError: With the pair of bodies, their distance and what is demanded.
-    """
+    """Refuse a start or a goal at which two bodies keep less distance than is demanded."""
     for name, q in (("start", query.start), ("goal", query.goal)):
         at_rest = q[None].repeat(2, axis=0)
         if not certify(query.scene, at_rest, with_minimum=False).is_met:
@@ -60,12 +56,7 @@ def require_free_ends(query: TransferQuery) -> None:
 def blocked_error(
     query: TransferQuery, tries: Sequence[Try], in_turn: Tried, in_time: Tried | None
 ) -> BlockedTransferError:
-    """The error of a query for which no way was found.
-
-    Args:
-        tries: What was tried; the straight move of all robots first.
-        in_time: What was tried of all robots at once; None where a single one moves.
-    """
+    """The error of a query for which no way was found; ``in_time`` is None where a single robot moves."""
     words = [f"straight, {nearest_words(query.scene, tries[0].q)[0]}"]
     name = "one robot after the other" if in_time is not None else "by trees in its joint space"
     words.append(f"{name}, {_tried_words(in_turn)}")

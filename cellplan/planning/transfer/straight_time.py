@@ -27,7 +27,6 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     Args:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
         goal: Likewise, not the same.
-        retimer: The limits of all joints and the step of the rows.
     """
     widths = box_widths(goal - start, retimer.bounds, least=retimer.step)
     count = int(np.ceil(sum(widths) / retimer.step))

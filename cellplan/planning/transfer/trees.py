@@ -78,7 +78,6 @@ def connected(
     """A way between two configurations.
 
     Args:
-        check: Which moves are free.
         ends: Start and goal in [rad] or [m], shape (n,) each.
         samples: How many of them at most.
     """

@@ -64,11 +64,7 @@ def floor_plan_dxf(plan: FloorPlan) -> str:
 
 
 def require_dxf() -> None:
-    """Refuse what needs ezdxf where that is not installed.
-
-    Raises:
-        InputError: It is not.
-    """
+    """Refuse what needs ezdxf where that is not installed."""
     if find_spec("ezdxf") is None:
         raise InputError(NO_DXF)
 

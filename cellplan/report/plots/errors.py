@@ -37,13 +37,7 @@ ORIENTATION: Final = ErrorKind(
 
 
 def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind) -> list[PlotPanel]:
-    """The length of an error with its tolerance, and the error by axis.
-
-    Args:
-        times: Times of the samples in [s], shape (N,).
-        error: In SI units, shape (N, 3).
-        allowed: Its tolerance in SI units.
-    """
+    """The length of an error, shape (N, 3) in SI, with its tolerance, and the error by axis; the times in [s]."""
     total = np.linalg.norm(error, axis=1)
     unit, scale = kind.units[0]
     worst = int(total.argmax())
@@ -89,7 +83,6 @@ def error_axis(curves: Sequence[Array], allowed: float, *, unit: str) -> PlotAxi
 
     Args:
         curves: Errors, not negative, shape (K,) each.
-        allowed: Their tolerance.
     """
     largest = max(float(curve.max()) for curve in curves)
     positive = [float(curve[curve > 0.0].min()) for curve in curves if curve.max() > 0.0]

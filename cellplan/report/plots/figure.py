@@ -42,11 +42,7 @@ def time_axis(times: Array) -> PlotAxis:
 
 
 def value_axis(low: float, high: float, *, unit: str = "", is_floored: bool = False) -> PlotAxis:
-    """An axis for values, with some room at its ends.
-
-    Args:
-        is_floored: Whether the axis begins at the smallest value itself.
-    """
+    """An axis for values with some room at its ends, but none below the smallest value where it is floored."""
     padding = PADDING_FRACTION * (high - low) or 1.0
     return PlotAxis(low=low if is_floored else low - padding, high=high + padding, unit=unit)
 

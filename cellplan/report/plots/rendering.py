@@ -13,9 +13,6 @@ FORMATS: Final = ("png", "pdf")  # that may be requested beside SVG
 def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> dict[str, bytes]:
     """Every figure as SVG and in the requested formats, by file name.
 
-    Args:
-        formats: Further formats, of ``FORMATS``.
-
     Raises:
         InputError: A format is unknown, or needs the plotting library, which is not installed.
     """
@@ -30,11 +27,7 @@ def pictures(figures: Mapping[str, Figure], formats: Collection[str] = ()) -> di
 
 
 def require_formats(formats: Collection[str]) -> None:
-    """Refuse formats that are not known.
-
-    Raises:
-        InputError: A format is unknown.
-    """
+    """Refuse formats that are not known."""
     for name in formats:
         if name not in FORMATS:
             raise InputError(f"plots: expected one of {', '.join(FORMATS)}, got '{name}' (SVG is always written)")

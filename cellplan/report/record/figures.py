@@ -163,9 +163,7 @@ def figures_of(reports: Iterable[Report], *, cycle: float | None = None, load: f
     """The figures of a program, as its ``report.json`` has them.
 
     Args:
-        reports: The report of each phase.
         cycle: Time from the first row of the program to the last one in [s], where that is asked for.
-        load: Share of its time in which the limits would allow the same motion, likewise.
     """
     figures = Figures({phase_of(report): _figures_of_phase(report) for report in reports})
     of_program: dict[str, dict[str, float]] = {} if load is None else {"load_ratio": {ALL: load}}
@@ -247,9 +245,6 @@ def energy_proxy(report: Report) -> float:
 
     Along the same path it is inversely proportional to the cycle time. Masses and motors are not in it: it compares
     programs of one cell, not cells.
-
-    Args:
-        report: The report of one phase.
     """
     total, steps = 0.0, np.diff(report.times)
     for robot, velocities in report.qd.items():
@@ -260,12 +255,7 @@ def energy_proxy(report: Report) -> float:
 
 
 def terminal_lines(rows: Sequence[Sequence[str]], indent: str) -> list[str]:
-    """Rows of a table, the first one its headings, every column flush right.
-
-    Args:
-        rows: Texts by column.
-        indent: What every line begins with.
-    """
+    """Rows of a table as indented lines, the first one its headings, every column flush right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return [indent + "  ".join(map(str.rjust, row, widths)).rstrip() for row in rows]
 

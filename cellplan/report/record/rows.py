@@ -27,11 +27,7 @@ OF_PAIRS: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def columns_of(rows: Iterable[Row], names: Iterable[str] = ()) -> dict[str, Any]:
-    """Values of each column in the order of the rows; None where a row has none.
-
-    Args:
-        names: Columns that are there even without a row, in their order.
-    """
+    """Values by column, those named first and always there; None where a row has none."""
     columns = list(rows)
     every = dict.fromkeys([*names, *(name for row in columns for name in row)])
     return {name: [row.get(name) for row in columns] for name in every}
@@ -44,11 +40,7 @@ def format_of(record: Record) -> str:
 
 
 def run_tables(records: Sequence[Record]) -> Tables:
-    """The tables of the phases of a program; each row begins with the name of its phase.
-
-    Args:
-        records: The ``report.json`` of each phase.
-    """
+    """Tables from the ``report.json`` of each phase of a program; each row begins with the name of its phase."""
 
     def column(make: Callable[[Record], Iterable[Row]], names: Sequence[str] = ()) -> Table:
         def rows() -> Iterator[Row]:
@@ -71,12 +63,7 @@ def run_tables(records: Sequence[Record]) -> Tables:
 
 
 def flat(entry: Mapping[str, Any], prefix: str = "") -> Row:
-    """One row of a record: nested records flattened, pairs as two columns.
-
-    Args:
-        entry: The record.
-        prefix: Stands before the names of its keys.
-    """
+    """One row of a record: nested records flattened with a prefix, pairs as two columns."""
     row: Row = {}
     for key, value in entry.items():
         if key == PAIR:
@@ -99,11 +86,7 @@ def by_name(entries: Mapping[str, Mapping[str, Any]], name: str) -> Iterator[Row
 
 
 def curve_columns(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """The curves of a run as columns, a row for each kept sample; without a value where a step would begin at the last.
-
-    Args:
-        tree: Content of ``series.json``, or the result of ``series``.
-    """
+    """The curves of a run as columns, a row for each kept sample; no value where a step would begin at the last one."""
     count = len(tree["times_s"])
     columns: dict[str, Any] = {"time_s": tree["times_s"]}
     for robot, joints in tree["joints"].items():

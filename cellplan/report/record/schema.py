@@ -21,11 +21,7 @@ TYPES: Final[Mapping[object, str]] = {
 
 
 def report_schema(*, closed: bool = False) -> dict[str, Any]:
-    """The JSON Schema of ``report.json``.
-
-    Args:
-        closed: Refuse keys that the schema does not name; the published schema permits those of later releases.
-    """
+    """The JSON Schema of ``report.json``; the published one is not closed: it permits keys of later releases."""
     definitions: dict[str, dict[str, Any]] = {}
     forms = [_schema(form, definitions, closed=closed) for form in (RunRecord, SummaryRecord)]
     for definition in definitions.values():
@@ -50,23 +46,12 @@ def _with_phases(properties: dict[str, Any]) -> dict[str, Any]:
 
 
 def series_schema(*, closed: bool = False) -> dict[str, Any]:
-    """The JSON Schema of ``series.json``.
-
-    Args:
-        closed: Refuse keys that the schema does not name, as for ``report_schema``.
-    """
+    """The JSON Schema of ``series.json``, closed as that of ``report.json``."""
     return record_schema(SeriesRecord, "cellplan.series/1", "series.json of a run", closed=closed)
 
 
 def record_schema(form: Any, title: str, description: str, *, closed: bool = False) -> dict[str, Any]:
-    """The JSON Schema of a file with one record.
-
-    Args:
-        form: Its type.
-        title: Name and version of its format.
-        description: What the file is.
-        closed: Refuse keys that the schema does not name, as for ``report_schema``.
-    """
+    """The JSON Schema of a file with one record of a typed form; ``title`` is the name and version of its format."""
     definitions: dict[str, dict[str, Any]] = {}
     top = _schema(form, definitions, closed=closed)
     return {"$schema": DIALECT, "title": title, "description": description, **top, "$defs": definitions}

@@ -81,7 +81,6 @@ def series(report: Report, motion: Motion | None = None) -> Tree:
     at the k-th kept sample.
 
     Args:
-        report: The run.
         motion: The planned motion, for iterations and slack of its steps; None if it is not available.
     """
     last = len(report.times) - 1
@@ -147,12 +146,7 @@ def series_json(report: Report, motion: Motion | None = None) -> str:
 
 
 def series_text(tree: Mapping[str, Any], depth: int = 0) -> str:
-    """The series as JSON, one line for each array; values that are not finite are null.
-
-    Args:
-        tree: Result of ``series``.
-        depth: Levels of indentation, which the first line does not have.
-    """
+    """The series as JSON behind ``depth`` levels, one line for each array; values that are not finite are null."""
     inside = INDENT * (depth + 1)
     lines = [
         f"{inside}{json.dumps(name, ensure_ascii=False)}: "

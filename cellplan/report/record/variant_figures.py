@@ -36,13 +36,7 @@ SHOWN: Final = (
 
 
 def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str) -> dict[str, Any]:
-    """The figures of a program over all its phases, by the keys of ``SHOWN``.
-
-    Args:
-        record: Its ``report.json``.
-        phases: The ``report.json`` of each of its phases, in their order.
-        proof: ``solved``, ``verified``, or why a run on disk was not verified again.
-    """
+    """The figures of a program over its phases by the keys of ``SHOWN``; ``proof`` says why a run was not verified."""
     whole = Figures.of_record(record)
     by_phase = [whole.in_phases([name]) for name in whole.by_phase]
     tasks = zip(whole.by_phase, (phase["tasks"] for phase in phases.values()), strict=True)

@@ -55,11 +55,7 @@ def is_worth_it(picture: StillPicture, camera: Camera, edge: int) -> bool:
 
 
 def detail(picture: StillPicture, camera: Camera, window: DetailWindow, classes: dict[tuple[str, int], str]) -> str:
-    """What matters, enlarged in a window without what hides it, with a frame round its place in the picture.
-
-    Args:
-        classes: Names of the classes of materials and tones, which are added to.
-    """
+    """What matters, enlarged in a window without what hides it, with a frame round its place in the picture."""
     scale = window.edge / _shown(picture, camera)
     low = np.array([window.x, window.y], dtype=np.float64)
     high, place = low + window.edge, low + 0.5 * window.edge

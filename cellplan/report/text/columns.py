@@ -6,12 +6,7 @@ Row = tuple[str, str, str]  # what, its figure, where and when
 
 
 def aligned(rows: Iterable[Sequence[str]], indent: str = "  ") -> list[str]:
-    """Lines of rows with the same number of columns, each column as wide as its widest text.
-
-    Args:
-        rows: Texts by column.
-        indent: What every line begins with.
-    """
+    """Indented lines of rows with the same number of columns, each column as wide as its widest text."""
     table = [tuple(row) for row in rows]
     if not table:
         return []

@@ -18,7 +18,6 @@ def method_lines(record: Record, step_s: float) -> Iterator[str]:
     """Sentences about the method, its secondary goals, and its effort.
 
     Args:
-        record: Result of ``solver_record``.
         step_s: Time between two samples in [s].
     """
     yield from _integration_lines(record, f"{1e3 * step_s:.6g} ms")

@@ -40,12 +40,7 @@ def summary_lines(record: Record, folder: Path) -> list[str]:
 
 
 def figure_lines(record: Record, more: str) -> list[str]:
-    """The worst values of a run, and what was not judged.
-
-    Args:
-        record: The report of the run.
-        more: Where the pairs stand that were not judged in full.
-    """
+    """The worst values of a run, and what was not judged: the pairs stand at ``more``."""
     return [
         *_program_lines(record),
         *aligned(_rows(record)),
@@ -61,12 +56,7 @@ def figure_lines(record: Record, more: str) -> list[str]:
 
 
 def left_out_lines(record: Record, more: str) -> list[str]:
-    """How many pairs were not judged in full, by reason; nothing for a record without such a key.
-
-    Args:
-        record: A report.
-        more: Where these pairs and the reasons stand.
-    """
+    """How many pairs were not judged in full, by reason; nothing for a record without such a key."""
     if "left_out" not in record:
         return []
     counts = Counter(str(entry["kind"]) for entry in record["left_out"])
@@ -310,11 +300,7 @@ def _figure(point: Record, what: str) -> tuple[str, str]:
 
 
 def failure_lines(checks: Iterable[Record], more: str) -> Iterator[str]:
-    """A line for each failed check below a heading for each group; nothing if all checks passed.
-
-    Args:
-        more: Where the checks stand that are not shown.
-    """
+    """A line for each failed check below a heading for each group; those not shown stand at ``more``."""
     groups: dict[str, list[str]] = {}
     for check in checks:
         if not check["passed"]:

@@ -27,8 +27,6 @@ def contacts(scene: Scene, robot: str, X_WB: Array, q: Array, *, standing: bool 
     """The worst contact of each motion at the first nodes that show one; None for a motion without any.
 
     Args:
-        scene: The cell; of its mounted pairs those that are to be judged.
-        robot: Name of the robot that stands elsewhere.
         X_WB: Its base for each motion, shape (K, 4, 4).
         q: The motions, shape (K, N, nq).
         standing: Whether what stands there is judged too, by its depth.

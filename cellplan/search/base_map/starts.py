@@ -50,9 +50,7 @@ def starts_at(goal: StartGoal, places: Places, model: RobotModel, X_WB: Array, *
     """Start postures at all places, of each branch the one on the turns nearest to the present start.
 
     Args:
-        goal: What is reached.
         X_WB: Its present base, shape (4, 4).
-        seed: Seed of the random configurations.
 
     Returns:
         Configurations in [rad] or [m], shape (S, n), and their places, ascending, shape (S,); at each place in order of

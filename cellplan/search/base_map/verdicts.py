@@ -86,7 +86,6 @@ def verdicts_at_start(job: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVer
     """What the starts alone say of every place, and which starts are within limits.
 
     Args:
-        job: The job and the places.
         q: Starts of the robot, shape (S, n), as ``starts_at`` returns them.
         at: Their places, shape (S,).
 
@@ -110,7 +109,6 @@ def judge(job: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
     """The verdict of each place of some starts by its motions: of the first that passes, else of the best one.
 
     Args:
-        job: The job and the places.
         q: Starts of the robot within its limits, shape (S, n).
         at: Their places, ascending, shape (S,); at each place those that are tried first come first.
     """
@@ -198,7 +196,6 @@ def _with_contacts(job: MapJob, known: dict[int, PlaceVerdict], q: Array, X_WB: 
     """Make collisions of those that pass in which two bodies are too near at a node, or one stands too deep in another.
 
     Args:
-        job: The job and the places.
         known: What is known of some motions without the bodies, by motion.
         q: All motions, shape (K, N, nq).
         X_WB: Bases of the robot, shape (K, 4, 4).

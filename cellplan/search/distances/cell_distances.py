@@ -164,7 +164,6 @@ class CellDistances:
         """Derivatives of near distances by the variables, shape (M, n).
 
         Args:
-            near: The pairs, as ``near`` found them at x.
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """

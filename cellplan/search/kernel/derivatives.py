@@ -38,8 +38,6 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     """Derivatives of the motion of one layout at all nodes.
 
     Args:
-        job: The tasks at their nodes.
-        layout: The layout, a batch of one.
         q: Joint positions at the nodes in [rad] or [m], shape (N, nq), as ``run`` gives them.
         qd: Their speeds, shape (N, nq).
     """

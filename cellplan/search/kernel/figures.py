@@ -117,11 +117,7 @@ class MotionFigures:
 
     @classmethod
     def of(cls, job: Job, motions: Motions) -> "MotionFigures":
-        """The figures of motions; of those that lost a path they are not valid.
-
-        Raises:
-            NotFiniteError: A figure of a motion that follows all paths is no finite number.
-        """
+        """The figures of motions; of those that lost a path they are not valid."""
         limits, times = job.limits, job.times
         figures = cls(
             beyond_lower=Peaks.of(times, limits.lower - motions.q),
@@ -141,16 +137,7 @@ class MotionFigures:
 
 
 def refuse_not_finite(name: str, values: Array, joint_names: Callable[[int], tuple[str, str]]) -> None:
-    """Refuse figures of joints that are no numbers, or infinite; an infinite margin is one.
-
-    Args:
-        name: What they are, one of ``FIGURES``.
-        values: The figures, shape (K, nq); negative where margin is left.
-        joint_names: Names of the robot and the joint of a column.
-
-    Raises:
-        NotFiniteError: With the joint of the first one.
-    """
+    """Refuse figures of joints that are no numbers, or infinite, with the joint of the first; infinite margins pass."""
     bad = ~(values < np.inf)
     if bad.any():
         place, column = np.argwhere(bad)[0].tolist()

@@ -58,13 +58,7 @@ class Job:
         """Place nodes evenly between the times at which the desired motion is not smooth.
 
         Args:
-            schedule: Its tasks on the common clock.
-            moving: Names of the robots that may move.
-            nodes: About how many nodes there are.
             denser: Times in [s] about which there are more: the steps there are a third as long.
-
-        Raises:
-            ValueError: The cell gives a path of joints.
         """
         if any(robot.path is not None for robot in cell.robots):
             raise ValueError("job: expected joints that follow from the tasks, got a given path of the positioner's")
@@ -84,8 +78,6 @@ class Job:
         """The job at given nodes.
 
         Args:
-            schedule: Its tasks on the common clock.
-            moving: Names of the robots that may move.
             nodes: Times of the nodes in [s], never falling, and begin and end of the stretch of each, shape (N,) each.
         """
         grasps = closures(cell, moving)
@@ -160,13 +152,9 @@ class Layouts:
 
 
 def enough_nodes(schedule: Schedule, fewest: int) -> int:
-    """Number of nodes, roughly, that resolve the desired motion of all tools.
+    """Number of nodes, at least about ``fewest``, that resolve the desired motion of all tools.
 
     It is doubled until the desired twists are nearly linear between nodes, up to ``PER_KNOT`` between two knots.
-
-    Args:
-        schedule: The tasks on the common clock.
-        fewest: About how many there are at least.
     """
     most = min(MOST, PER_KNOT * (len(schedule.breaks) - len(schedule.jumps)))
     count, bend = fewest, _bend(schedule, fewest) if fewest < most else 0.0

@@ -60,11 +60,7 @@ class Motions:
 
 
 def run(job: Job, layouts: Layouts) -> Motions:
-    """The motions of all candidates.
-
-    Raises:
-        ValueError: The candidates are not cells of these robots.
-    """
+    """The motions of all candidates."""
     if layouts.X_WB.shape[1] != len(job.cell.robots) or layouts.start.shape[1] != job.cell.joint_count:
         raise ValueError(
             f"layouts: expected {len(job.cell.robots)} robots with {job.cell.joint_count} joints in all, got "
@@ -137,8 +133,6 @@ def run_near(job: Job, layouts: Layouts, q: Array, rates: Array | None = None) -
     linearisations as there are nodes. Candidates that passes do not settle are run from node to node.
 
     Args:
-        job: The tasks at their nodes.
-        layouts: The candidates.
         q: Joint positions at the nodes that are nearly right in [rad] or [m], shape (K, N, nq).
         rates: How the joint speeds change with the joints near them, see ``MotionDerivatives``, shape (N, nq, nq); a
             few passes less are needed with them.

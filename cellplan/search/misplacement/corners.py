@@ -40,11 +40,8 @@ def judged(problem: GuardedProblem, d: Array, start: Array, demands: Demands, ef
     """Motions of a layout with displaced bases, planned anew, all together.
 
     Args:
-        problem: The job, with displacements as its variables.
         d: The displacements, shape (K, m).
         start: Start posture of the layout, near theirs, shape (nq,).
-        demands: What is demanded of each.
-        effort: Where distances are asked, and within which distance beyond the demand.
     """
     motions = run(problem.job, problem.variables.layouts(d, np.tile(start, (len(d), 1))))
     corners = []

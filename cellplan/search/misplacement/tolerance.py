@@ -33,10 +33,7 @@ def tolerances(
     """How far each base may be off in every direction, by bisection of all of them together.
 
     Args:
-        problem: The job, with the displacements as its variables.
         start: Start posture of the layout in [rad] or [m], shape (nq,).
-        demands: What is demanded.
-        effort: Where distances are asked.
         cycle: Cycle in [s] in which limits of speed and acceleration must be kept.
     """
     amounts, count = problem.upper, len(problem.upper)

@@ -32,14 +32,7 @@ class Worst:
 
 
 def worst(problem: GuardedProblem, point: Point, demands: Demands, effort: Effort) -> Worst:
-    """The worst displacements of a layout.
-
-    Args:
-        problem: The job, with displacements as its variables.
-        point: The layout's motion, at no displacement.
-        demands: What is demanded.
-        effort: Where distances are asked, and within which distance beyond the demand they count.
-    """
+    """The worst displacements of a layout."""
     amounts, by = problem.upper, problem.derivatives(point)
     measures = Measures.of(problem, point, demands, effort)
     apart = problem.distance_derivatives(point, measures.distances, by)

@@ -84,11 +84,8 @@ def improve(
     """The local optimum that programs reach from a point.
 
     Args:
-        problem: What is improved.
         x: Variables to begin with, shape (n,).
         start: Start posture near the right one in [rad] or [m], shape (nq,).
-        demands: The objective and what must be kept.
-        effort: How much work it may do.
 
     Returns:
         The best point; None where there is no motion at the first one.

@@ -47,13 +47,7 @@ class LayoutProblem:
         derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
 
     def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
-        """The same problem on more nodes.
-
-        Args:
-            schedule: The tasks on the common clock.
-            nodes: About how many nodes there are, evenly.
-            denser: Times in [s] on the clock of the nodes about which there are more.
-        """
+        """The same problem on about so many nodes evenly, and more about some times in [s] on their clock."""
         enough = enough_nodes(schedule, nodes)
         job = Job.of(self.job.cell, schedule, moving=self.job.moving, nodes=enough, denser=denser)
         return replace(self, job=job)
@@ -109,11 +103,7 @@ class PairsAtNodes:
 
     @classmethod
     def of(cls, distances: Distances) -> "PairsAtNodes":
-        """Those that distances came from.
-
-        Raises:
-            TypeError: The distances are not those of ``distances_at``.
-        """
+        """Those that distances came from."""
         if not isinstance(distances.detail, PairsAtNodes):
             raise TypeError("distance_derivatives: expected distances of this problem")
         return distances.detail

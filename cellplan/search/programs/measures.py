@@ -65,11 +65,7 @@ class Measures:
 
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
-        """Measure a point.
-
-        Raises:
-            NotFiniteError: A figure of a joint is no finite number.
-        """
+        """Measure a point."""
         times, limits, beyond = problem.times, problem.limits, demands.beyond
         pace = Pace.of(problem, point) if demands.timing is CycleTiming.RETIMED else None
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)

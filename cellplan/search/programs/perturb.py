@@ -13,18 +13,12 @@ DRAWS: Final = 40  # [-] until one has a motion
 def perturbed(
     problem: Problem, x: Array, start: Array, rng: np.random.Generator, *, size: float = 1.0, draws: int = DRAWS
 ) -> Point | None:
-    """A random point near a given one, drawn again until all tools can follow their paths.
+    """A random point near a given one, drawn again until all tools can follow their paths; None where none can.
 
     Args:
-        problem: What is varied.
         x: The variables, shape (n,).
         start: Start posture near the right one in [rad] or [m], shape (nq,).
-        rng: Where chance comes from.
         size: Standard deviation of each variable in its usual steps.
-        draws: How often it is drawn at most.
-
-    Returns:
-        The point; None where no draw has a motion.
     """
     for _ in range(draws):
         candidate = x + size * problem.scale * rng.normal(size=len(x))

@@ -50,7 +50,6 @@ class ArmValues(Protocol):
     """Least singular values of A arms along a motion.
 
     Attributes:
-        names: Names of the robots.
         values: The values at the nodes in mixed units of [m] and [rad], shape (N, A).
     """
 
@@ -71,7 +70,6 @@ class Problem(Varied, Protocol):
 
     Attributes:
         times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
-        limits: Limits of the joints.
         acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
         is_dense: Whether the nodes alone count. Elsewhere an extreme between two of them is that of the parabola
             through three: good with few nodes, but it jumps where the highest of them becomes another one.

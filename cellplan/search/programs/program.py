@@ -38,7 +38,7 @@ class ProgramSolution:
 def least(
     cost: Array, weights: Array, rows: Array, highest: Array, bounds: tuple[Array, Array]
 ) -> ProgramSolution | None:
-    """Minimise ``cost x + 1/2 sum weights x^2`` under ``rows x <= highest`` and bounds.
+    """The least ``cost x + 1/2 sum weights x^2`` under ``rows x <= highest`` and bounds; None where there is none.
 
     Args:
         cost: Shape (n,).
@@ -46,9 +46,6 @@ def least(
         rows: Shape (M, n).
         highest: Shape (M,).
         bounds: Lower and upper ones, shape (n,) each.
-
-    Returns:
-        The point; None where the solver finds none.
     """
     lengths = np.linalg.norm(rows, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)

@@ -108,8 +108,6 @@ class Linear:
         """All rows that a step within a box can bind; the ones that bound the objective first.
 
         Args:
-            demands: What is demanded.
-            reserve: What is asked for beyond it.
             box: Largest steps of the variables, then of the squares of a retimed motion, relative, (n + m,).
         """
         count = len(self.problem.scale)

@@ -19,17 +19,7 @@ SAMPLES: Final = 401  # of a given path that gets another number of coefficients
 def first_path(
     cell: Cell, schedule: Schedule, layout: Layouts, *, count: int, degree: int
 ) -> tuple[JointSpline, Array] | None:
-    """The path that a search begins with, and the start posture of all joints that goes with it, shape (nq,).
-
-    Args:
-        schedule: Its tasks on the common clock.
-        layout: The layout, a batch of one, with a start posture near the right one.
-        count: Number of coefficients of each joint.
-        degree: Degree of the spline.
-
-    Returns:
-        The path that is nearest to the motion by the weighted pseudo-inverse; None where a tool loses its path.
-    """
+    """The path nearest to the weighted pseudo-inverse motion, and the start posture (nq,); None if a tool is lost."""
     carrier = next(robot for robot in cell.robots if robot.name == cell.positioners[0])
     start = layout.start[0]
     if carrier.path is not None:

@@ -47,10 +47,7 @@ class PathNodes:
         """Place nodes for a spline of so many coefficients.
 
         Args:
-            schedule: Its tasks on the common clock.
-            count: Number of coefficients of each joint.
             degree: Degree of the spline, 3 or 5.
-            nodes: About how many nodes there are.
 
         Raises:
             InputError: An operator's motion does not follow from its task and the positioner alone.
@@ -75,11 +72,7 @@ class PathNodes:
 
 
 def _positioner(cell: Cell) -> int:
-    """Place of the robot that carries the part.
-
-    Raises:
-        InputError: There is none, or it has a task of its own.
-    """
+    """Place of the robot that carries the part, which must have no task of its own."""
     if cell.carrier is None:
         raise InputError(f"{cell.origin.at('part.held_by')}: expected a robot that holds the part and may have a path")
     name = cell.robots[cell.carrier].name
@@ -90,11 +83,7 @@ def _positioner(cell: Cell) -> int:
 
 
 def _operators(job: Job) -> Indices:
-    """Columns of the joints of each relation's robot.
-
-    Raises:
-        InputError: A task leaves components open, or its robot has a joint too many or too few.
-    """
+    """Columns of the joints of each relation's robot."""
     operators = []
     for relation, is_constrained, operator in zip(
         job.relations, job.constraints.constrained, job.constraints.operators, strict=True

@@ -17,17 +17,12 @@ SMALLER: Final = 0.9  # factor of the next draw where a tool could not follow
 def perturbed_path(
     problem: PathProblem, x: Array, start: Array, rng: np.random.Generator, *, size: float
 ) -> Point | None:
-    """A random point near a given one, drawn again and smaller until all tools can follow their paths.
+    """A random point near a given one, drawn again and smaller until all tools can follow their paths, or None.
 
     Args:
-        problem: What is varied.
         x: The variables, shape (n,).
         start: Start posture near the right one in [rad] or [m], shape (nq,).
-        rng: Where chance comes from.
         size: Standard deviation in usual steps.
-
-    Returns:
-        The point; None where there is no motion at the given one, or at any that is drawn.
     """
     origin = problem.evaluate(x, start)
     if origin is None:

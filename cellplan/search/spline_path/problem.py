@@ -151,12 +151,8 @@ def path_derivatives(
     """Derivatives of the motion at all nodes: by all coefficients, one after the other, then by the directions.
 
     Args:
-        nodes: The job at its nodes.
-        layout: The layout, a batch of one.
         q: Joint positions at the nodes in [rad] or [m], shape (N, nq).
         qd: Their speeds, shape (N, nq).
-        directions: The directions of the layout.
-        is_accelerating: Whether accelerations are asked for.
     """
     job, c = nodes.job, nodes.columns
     screws = TaskScrews.of(job, layout, q, directions)
@@ -204,16 +200,11 @@ def _add(derivatives: Array, nodes: PathNodes, inverses: Array, twists: Array) -
 
 
 def followed(nodes: PathNodes, placement: Placement, coefficients: Array, q: Array) -> tuple[Array, Array] | None:
-    """Joints and speeds at the nodes, of the solution near a given motion.
+    """Joints and speeds at the nodes, (N, nq) each, near a given motion; None where a tool cannot follow.
 
     Args:
-        nodes: The job at its nodes.
-        placement: Where the robots stand, a batch of one.
         coefficients: Of the spline, shape (count, n).
         q: Joint positions that are nearly right in [rad] or [m], shape (N, nq).
-
-    Returns:
-        Positions and speeds, shape (N, nq) each; None where a tool cannot follow.
     """
     job = nodes.job
     at = np.ascontiguousarray(q.T)
@@ -241,8 +232,6 @@ def continued(nodes: PathNodes, placement: Placement, coefficients: Array, start
     """The motion from a start posture, node after node; see ``followed`` for the arguments.
 
     Args:
-        nodes: The job at its nodes.
-        placement: Where the robots stand, a batch of one.
         coefficients: Of the spline, shape (count, n).
         start: A start posture near the right one, shape (nq,).
 

@@ -53,16 +53,7 @@ class Pool:
 
 
 def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tuple[list[Setting], Counter[str]]:
-    """Places for the part at rest, the ones that operators reach best first.
-
-    Args:
-        problem: The cell.
-        rng: Random numbers.
-        count: How many at most.
-
-    Returns:
-        The settings, and by what draws failed.
-    """
+    """At most ``count`` places for the part at rest, best reached by operators first, and by what draws failed."""
     cell, drops = problem.cell, Counter[str]()
     if cell.carrier is None:
         return _part_settings(problem, rng, count), drops
@@ -162,14 +153,7 @@ def _draws(
 
 
 def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Generator) -> Pool:
-    """Bases of one operator from which its tool follows the whole path with the part at rest, free of contact.
-
-    Args:
-        problem: The cell.
-        robot: Index of the operator.
-        setting: Where the part rests.
-        rng: Random numbers.
-    """
+    """Bases of one operator from which its tool follows the whole path with the part at rest, free of contact."""
     goal, arm, bounds = problem.goal(robot, setting.X_WP), problem.arms[robot], problem.bounds(robot)
     if goal is None:
         raise ValueError(f"pool: robot {robot} has no path")

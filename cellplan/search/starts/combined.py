@@ -65,7 +65,6 @@ def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None 
     Limits are judged of all of them, distances of the best ones.
 
     Args:
-        problem: The cell.
         x: Variables, shape (C, n).
         start: Start postures, shape (C, nq).
         picks: What was picked of each pool, shape (C, pools).

@@ -112,13 +112,7 @@ def _base_columns(robot: str, names: Sequence[str], columns: Indices) -> list[in
 
 
 def random_within(variables: StartVariables, columns: Indices, count: int, rng: np.random.Generator) -> Array:
-    """Values of some variables drawn evenly within their bounds, shape (count, n); ten steps where these are infinite.
-
-    Args:
-        columns: Those that are drawn; all others keep the given values.
-        count: How many.
-        rng: Random numbers.
-    """
+    """The given values, shape (count, n), with columns drawn evenly within their bounds, or ten steps if infinite."""
     x = np.tile(variables.given, (count, 1))
     spread = np.where(variables.scale > 0.0, 10.0 * variables.scale, 1.0)
     lower = np.where(np.isfinite(variables.lower), variables.lower, variables.given - spread)[columns]

@@ -65,11 +65,7 @@ class Starts:
 
     @property
     def first(self) -> tuple[Array, Array]:
-        """Variables, shape (n,), and start posture, shape (nq,), of the best one.
-
-        Raises:
-            NoSolutionError: There is none.
-        """
+        """Variables, shape (n,), and start posture, shape (nq,), of the best one."""
         if not self.starts:
             raise NoSolutionError(self.reason)
         return self.starts[0].x, self.starts[0].start
@@ -82,8 +78,6 @@ class StartGenerator:
         """Take what is searched.
 
         Args:
-            problem: The cell and its variables.
-            seed: Seed of the whole search.
             tries: The engineer's own layouts: name, values of the variables, shape (n,), and start posture, (nq,).
         """
         self._problem, self._seed, self._tries = problem, seed, tuple(tries)
@@ -107,7 +101,6 @@ class StartGenerator:
         """Other branches of inverse kinematics of the given layout from which all tools follow their paths.
 
         Args:
-            robots: Names of the operators whose branch may change.
             start: The start posture of the given layout, which is left out, shape (nq,).
 
         Returns:
@@ -201,13 +194,7 @@ def _most_frequent(reasons: Sequence[str]) -> str:
 
 
 def pools(problem: StartProblem, setting: Setting, rng: np.random.Generator) -> tuple[list[Pool], str]:
-    """Pools of all operators, and the first one that has none in words.
-
-    Args:
-        problem: The cell.
-        setting: Where the part rests.
-        rng: Random numbers.
-    """
+    """Pools of all operators, and the first one that has none in words."""
     pools = list[Pool]()
     for first, *others in problem.freedom.groups(problem.operators):
         together = _finer(problem, first, setting, rng)

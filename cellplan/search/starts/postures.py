@@ -22,11 +22,8 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
     They are ordered by what they leave of the joint limits on the whole path, the most first.
 
     Args:
-        problem: The cell.
-        robot: Index of the operator.
         x: Values of the variables, shape (n,).
         start: Start posture of the cell; that of this robot is tried too, shape (nq,).
-        rng: Random numbers.
     """
     cell, arm = problem.cell, problem.arms[robot]
     layouts = problem.variables.layouts(x[None], start[None])
@@ -53,10 +50,8 @@ def branch_starts(
     """Combinations of branches of the operators of one layout.
 
     Args:
-        problem: The cell.
         x: Values of the variables, shape (n,).
         start: Start posture, shape (nq,).
-        rng: Random numbers.
         robots: Names of the operators whose branch may change; None for all.
 
     Returns:

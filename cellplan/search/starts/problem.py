@@ -53,12 +53,7 @@ class Contacts:
     """
 
     def __init__(self, scene: Scene, robots: Iterable[str], against: Iterable[str] = ()) -> None:
-        """Keep the pairs of which a body goes with one of some robots, the other with any of these or with none.
-
-        Args:
-            robots: Names of the robots.
-            against: Names of further robots, whose pairs with each other do not count.
-        """
+        """Keep the pairs of which a body goes with one of some robots, the other with any of these or with none."""
         members = set(robots)
         known, anyone = {*members, *against, None}, {body.name: body.robot for body in scene.bodies}
         self._pairs, watched = layout_pairs(scene)
@@ -113,7 +108,6 @@ class StartProblem:
 
     Attributes:
         acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
-        contacts: Pairs of each robot with itself, the surroundings and the first holder with the part.
     """
 
     cell: Cell
@@ -139,7 +133,6 @@ class StartProblem:
 
         Args:
             cell: The cell; its first phase is what starts are judged by.
-            variables: What is varied.
             margin: Demanded distance of the joints from their limits in [rad] or [m], shape (nq,) or one number.
 
         Raises:

@@ -88,8 +88,6 @@ def matched(goal: Goal, bounds: BaseBounds, X_BT: Array, X_WB: Array) -> tuple[A
     """Bases moved so that tools come as near to the start of the path as they do with the joints as they are.
 
     Args:
-        goal: The path.
-        bounds: How far bases may be moved.
         X_BT: Tools in their base frames, shape (B, 4, 4).
         X_WB: Bases, shape (B, 4, 4).
 

@@ -20,11 +20,7 @@ class Choices:
 
     @classmethod
     def of(cls, cell: Cell) -> "Choices":
-        """Those of a cell.
-
-        Raises:
-            InputError: The cell was not read from a file.
-        """
+        """Those of a cell."""
         if cell.layout is None:
             raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
         choices = cell.layout.choices

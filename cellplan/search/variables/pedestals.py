@@ -31,9 +31,6 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
     An upright cylinder or box counts on which exactly one base stands, and that centred. One that an exclusion names
     stays an obstacle.
 
-    Args:
-        settings: What may change.
-
     Returns:
         Values by address for ``Cell.with_values``, and sentences about what they do.
     """
@@ -68,14 +65,7 @@ def with_pedestals(cell: Cell, settings: LayoutSettings) -> tuple[dict[str, obje
 
 
 def leaving_columns(cell: Cell, ranges: Sequence[VaryRange], *, spare: float = 0.0) -> tuple[VaryRange, ...]:
-    """Ranges of heights narrowed so that a column below a base, or above one that hangs, does not vanish.
-
-    Args:
-        spare: Length in [m] by which bases may be off their heights.
-
-    Raises:
-        InputError: That leaves no height.
-    """
+    """Ranges of heights narrowed by ``spare`` in [m] so that a column below a base, or above one that hangs, stays."""
     extended, shortest = [], SHORTEST + spare
     for variable in ranges:
         mount = (

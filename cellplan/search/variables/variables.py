@@ -45,14 +45,7 @@ class Variables:
 
     @classmethod
     def of(cls, cell: Cell, *, without: Container[str] = ()) -> "Variables":
-        """The variables that a cell file gives.
-
-        Args:
-            without: Addresses of numbers that stay as they are, whatever the file says.
-
-        Raises:
-            InputError: The cell was not read from a file, or was changed in Python since.
-        """
+        """The variables that a cell file gives."""
         settings = None if cell.layout is None else cell.layout.without(without)
         if settings is None:
             raise InputError(f"cell '{cell.name}': expected a cell that was read from a file, got one built in Python")
@@ -251,9 +244,6 @@ def neighbour_cells(state: State, cell: Cell, tied: Tied, step: float) -> Iterat
     """All that numbers do to the solids of tools and to the place of the part.
 
     Args:
-        state: The layout.
-        cell: The cell that is searched.
-        tied: The numbers.
         step: In [m] or [rad].
     """
     for variable, by in zip(tied.ranges, tied.factors, strict=True):

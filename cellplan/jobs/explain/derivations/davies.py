@@ -48,11 +48,7 @@ class Network:
     matrix: Array
 
     def columns(self, names: Collection[str]) -> list[int]:
-        """Places of joints by name.
-
-        Raises:
-            InputError: There is no such joint.
-        """
+        """Places of joints by name."""
         for name in names:
             if name not in self.joints:
                 raise InputError(f"joint: expected one of {', '.join(self.joints)}, got '{name}'")
@@ -159,10 +155,6 @@ def solve_network(net: Network, imposed: Mapping[str, float], *, weights: Array 
     Args:
         imposed: Speeds by joint name, in [rad/s] or [m/s].
         weights: Positive weights of all joints in the order of ``net.joints``; ones if None.
-
-    Raises:
-        InputError: A name is unknown, or a speed or weight is not usable.
-        PrimaryChoiceError: No speeds of the other joints keep the circuits closed.
     """
     for name, speed in imposed.items():
         if not np.isfinite(speed):

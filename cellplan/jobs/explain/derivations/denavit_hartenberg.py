@@ -123,9 +123,6 @@ def dh_cooperation_jacobian(cell: Cell, q: Array) -> Array:
     Returns:
         Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks + further holders, 6,
         nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
-
-    Raises:
-        InputError: The configuration does not fit the cell.
     """
     q = checked_configuration(cell, q)
     holder = part_holder(cell)

@@ -83,11 +83,7 @@ def part_holder(cell: Cell) -> tuple[Robot, Array] | None:
 
 
 def checked_configuration(cell: Cell, q: Array) -> Array:
-    """The stacked joint vector, shape (nq,), its length and figures checked.
-
-    Raises:
-        InputError: The length is wrong, or a figure is not finite.
-    """
+    """The stacked joint vector, shape (nq,); one of another length, or that is not finite, is refused."""
     q = np.asarray(q, dtype=float)
     if q.shape != (cell.joint_count,):
         raise InputError(f"q: expected {cell.joint_count} joint positions, one per joint, got shape {q.shape}")

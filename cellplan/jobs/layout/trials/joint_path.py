@@ -89,7 +89,6 @@ class PathSearch:
         """The path problem at about so many nodes.
 
         Args:
-            nodes: The number.
             acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], shape (nq,).
         """
         base, settings = self.layout_variables.base, self.settings

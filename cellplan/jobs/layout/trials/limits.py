@@ -34,13 +34,7 @@ class LimitRecord(TypedDict):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Standing:
-    """A point measured against its demands.
-
-    Attributes:
-        problem: The problem.
-        measures: Its figures.
-        demands: What is demanded.
-    """
+    """A point measured against its demands."""
 
     problem: Problem
     measures: Measures
@@ -185,12 +179,7 @@ def standing_of(problem: Problem, point: Point, demands: Demands, effort: Any) -
 
 
 def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
-    """Effects of a step of each variable: on the cycle in [s], the smallest margin in [deg] and clearance in [mm].
-
-    Args:
-        standing: The point.
-        steps: The steps, shape (n,).
-    """
+    """Effects of a step of each variable, shape (n,): on cycle in [s], smallest margin in [deg], clearance in [mm]."""
     problem, measures = standing.problem, standing.measures
     by = problem.derivatives(measures.point)
     span = float(problem.times[-1] - problem.times[0])

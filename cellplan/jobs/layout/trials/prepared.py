@@ -69,15 +69,7 @@ class PreparedSearch:
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
-        """Make a cell ready.
-
-        Args:
-            request: What is searched for.
-            cell: The cell, as ``searched_cell`` gives it.
-
-        Raises:
-            InputError: The paths, bodies or variables of the cell are not usable.
-        """
+        """Make a cell ready."""
         unled = without_path(cell)
         variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
@@ -127,11 +119,7 @@ class PreparedSearch:
 
     @cached_property
     def path_search(self) -> PathSearch:
-        """Joint paths of this search.
-
-        Raises:
-            ValueError: No joint path may change.
-        """
+        """Joint paths of this search, which has one that may change."""
         if self.unled is None:
             raise ValueError("expected a cell whose joint path may change")
         try:
@@ -230,7 +218,6 @@ def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object
     """What to write into the given cell file for a point of its problem: values by address, rounded.
 
     Args:
-        ready: The cell.
         x: The variables, shape (n,).
         start: Start posture in [rad] or [m], shape (nq,).
     """

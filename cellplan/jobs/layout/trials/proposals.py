@@ -171,12 +171,7 @@ def is_candidate(trial: StudyTrial) -> bool:
 
 
 def origin_text(values: Mapping[str, Any], *, is_sampled: bool = False) -> str:
-    """Where a trial began, in words.
-
-    Args:
-        values: The values of the trial.
-        is_sampled: Whether no motion begins at the given layout and a sample took its place.
-    """
+    """Where a trial began, in words; ``is_sampled`` says that a sample took the place of the given layout."""
     match values["kind"]:
         case _ if is_sampled:
             text = "a sample in place of the given layout"

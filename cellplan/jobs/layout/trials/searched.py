@@ -20,11 +20,7 @@ FREE: Final = ("start", "weights", "path", "spin")
 
 
 def searched_cell(request: LayoutRequest) -> Cell:
-    """The cell with all that the request sets in it.
-
-    Raises:
-        InputError: The cell cannot be read, an address does not exist, or its job is not one that can be searched.
-    """
+    """The cell with all that the request sets in it."""
     if request.duration is not None and request.objective is Objective.CYCLE:
         raise InputError(
             "--duration: expected no duration where the shortest cycle is sought; add --objective conforming, "
@@ -54,11 +50,7 @@ def searched_cell(request: LayoutRequest) -> Cell:
 
 
 def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
-    """Refuse misplaced bases where the motions of all corners are not those of one time law.
-
-    Raises:
-        InputError: The motion is retimed, or the positioner's joint path is given.
-    """
+    """Refuse misplaced bases with a retimed motion or a given joint path: their corners have no common time law."""
     if cell.layout is None or cell.layout.misplacement is None:
         return
     key = "--misplacement" if request.misplacement is not None else cell.origin.at("layout.misplacement")
@@ -69,11 +61,7 @@ def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:
 
 
 def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
-    """Refuse tasks that leave their robot a choice where a joint path of the positioner is searched.
-
-    Raises:
-        InputError: A task leaves a component open, or its robot has a joint too many or too few for six.
-    """
+    """Refuse open components, and robots without just six joints, where a joint path of the positioner is searched."""
     for task in cell.tasks:
         robot = cell.robot(task.robot)
         why = f"for {purpose}: the joints of '{robot.name}' would not follow from the path of the positioner"
@@ -91,11 +79,7 @@ def _refuse_open_tasks(cell: Cell, *, purpose: str) -> None:
 
 
 def _refuse_margins(cell: Cell) -> None:
-    """Refuse demanded margins that leave a joint no room.
-
-    Raises:
-        InputError: A joint cannot keep so far from both of its limits.
-    """
+    """Refuse demanded margins that leave a joint no room."""
     if cell.layout is None:
         return
     for robot in cell.robots:
@@ -111,11 +95,7 @@ def _refuse_margins(cell: Cell) -> None:
 
 
 def read_attempts(request: LayoutRequest, cell: Cell) -> list[Cell]:
-    """The cells whose layouts are tried too.
-
-    Raises:
-        InputError: One cannot be read or has other robots.
-    """
+    """The cells whose layouts are tried too; one that cannot be read, or has other robots, is refused."""
     names = [robot.name for robot in cell.robots]
     layouts = [load_cell(path, allow_dirs=request.allow_dirs) for path in request.attempts]
     for path, other in zip(request.attempts, layouts, strict=True):
@@ -200,9 +180,6 @@ def freed(cell: Cell, words: Iterable[str]) -> dict[str, object]:
     Args:
         words: ``start``: the start posture of the positioner; ``weights``: of all joints; ``path``: the joint path
             of the positioner; ``spin``: how the tools are turned about their own axes.
-
-    Raises:
-        InputError: A word is none of these, or the cell has no positioner where one is needed.
     """
     vary = dict[str, object]()
     for word in words:

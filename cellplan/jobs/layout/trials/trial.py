@@ -50,7 +50,6 @@ def evaluate(request: LayoutRequest, variant: Variant) -> TrialOutcome:
     """Improve the layout that a trial begins with; what is wrong with it becomes its reason.
 
     Args:
-        request: What is searched for.
         variant: Number of the trial, and where it begins; see ``Proposals``.
     """
     return _evaluated(request, variant.number, json.dumps(variant.values))
@@ -200,11 +199,7 @@ def _perturbed(ready: PreparedSearch, begin: Begin, values: Mapping[str, object]
 
 
 def _near_given(ready: PreparedSearch, values: Mapping[str, object], number: int) -> Begin | None:
-    """The given layout or one near it; where no motion begins there, a sample that no other trial takes.
-
-    Raises:
-        NoSolutionError: There is none either.
-    """
+    """The given layout or one near it; where no motion begins there, a sample that no other trial takes."""
     begin = _given(ready)
     if begin is None:
         return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
@@ -246,11 +241,7 @@ def _attempted(ready: PreparedSearch, index: int) -> Cell:
 
 
 def _sampled(ready: PreparedSearch, index: int) -> Begin:
-    """A start that was sampled over all that may change.
-
-    Raises:
-        NoSolutionError: There is none.
-    """
+    """A start that was sampled over all that may change."""
     return ready.starts.at(1 + index).first
 
 

@@ -46,9 +46,6 @@ class ConfigurationSearch:
     The only singular situation ([Nicolato2007]_ 3.2.2) is an arm stretched out towards a goal on its own line: no joint
     alone can lower the cost there. The search is then repeated from a slightly disturbed configuration, always the same
     disturbance; its result is dropped if it lowers the cost no further, as with a goal out of reach.
-
-    Attributes:
-        cost: The cost that is searched for its least value.
     """
 
     def __init__(self, problem: TrackingProblem) -> None:

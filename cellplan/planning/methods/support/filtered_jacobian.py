@@ -80,11 +80,7 @@ class FilteredMotion:
         self.theta: Array | None = None
 
     def advance(self, k: int, q: Array) -> StepResult:
-        """One step, in as many sub-steps as it needs; between two times the desired twist is held.
-
-        Raises:
-            DivergedError: No sub-step is short enough.
-        """
+        """One step, in as many sub-steps as it needs; between two times the desired twist is held."""
         step, moves = self._problem.step(k), self._reach & (self._problem.mobile(k) > 0.0)
         passed, evaluations = 0.0, 0  # shares of the step are binary fractions: they add up to 1 exactly
         while passed < 1.0:

@@ -16,7 +16,7 @@ TROUBLES: Final = {-1: "contradictory bounds", -2: "cycling", -3: "no bounded so
 
 
 def nearest_to_origin(A: Array, *, lower: Array, upper: Array) -> Array:
-    r"""Minimise ``1/2 |y|^2`` under ``lower <= A y <= upper``.
+    r"""The ``y`` nearest to the origin, the least of ``1/2 |y|^2``, under ``lower <= A y <= upper``.
 
     A strictly convex program has one solution only, so the answer does not depend on how the engine goes about it.
 
@@ -24,12 +24,6 @@ def nearest_to_origin(A: Array, *, lower: Array, upper: Array) -> Array:
         A: Rows, shape (k, n).
         lower: Lower bounds, shape (k,); may be -inf.
         upper: Upper bounds, shape (k,); may be +inf.
-
-    Returns:
-        The nearest point, shape (n,).
-
-    Raises:
-        NoSolutionError: The engine gave up, or its answer breaks the bounds.
     """
     n = A.shape[1]
     y, _, flag, _ = daqp.solve(

@@ -41,14 +41,7 @@ class JointBounds:
         self._acceleration = np.where(np.isinf(limits.acceleration), by_ramp, limits.acceleration)
 
     def refuse_outside(self, q: Array) -> None:
-        """Refuse a configuration from which no bounded speed is right.
-
-        Args:
-            q: Stacked joint vector, shape (nq,).
-
-        Raises:
-            StartOutsideLimitsError: A joint is outside its position limits.
-        """
+        """Refuse a configuration outside of the position limits, from which no bounded speed is right."""
         for index, (name, position) in enumerate(zip(self._names, q, strict=True)):
             lower, upper = self._lower[index], self._upper[index]
             if not lower <= position <= upper:

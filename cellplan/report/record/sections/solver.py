@@ -144,7 +144,6 @@ def solver_record(
     Args:
         motion: The planned motion; None if it is not available, or if there are several.
         transfers: How the transfer moves of each phase were found; None or empty without such moves.
-        moved: How far starts were moved.
     """
     return {
         "method": solver.method,
