@@ -88,11 +88,7 @@ class StretchSearch:
     """Some blocks of the motion, few enough to be searched at once."""
 
     def __init__(self, survey: Survey, motion: StraightMotion, first: int, last: int) -> None:
-        """Bound all pairs over the stretch by the cheapest means.
-
-        Args:
-            survey: All pairs; receives what is found.
-        """
+        """Bound all pairs over the stretch by the cheapest means; the survey receives what is found."""
         self._survey, self._motion, self._first, self._last = survey, motion, first, last
         self._scene = survey.scene
         self._edges = survey.edges[first : last + 1] - survey.edges[first]
@@ -198,8 +194,7 @@ class StretchSearch:
     def _first_readings(self, kind: ClearanceClass, lowest: Array) -> Iterator[tuple[int, tuple[int, Reading]]]:
         """Measure the pairs of a class that seem nearest once, at an edge of the block where they do.
 
-        Args:
-            lowest: The lowest bound of each pair in the stretch in [m], shape (pairs,).
+        The lowest bound of each pair in the stretch is in [m], shape (pairs,).
         """
         survey = self._survey
         rows = survey.rows(kind)
@@ -273,20 +268,15 @@ class CurveRefiner:
     """One class over a stretch of blocks."""
 
     def __init__(self, engine: Engine, motion: StraightMotion, edges: Indices) -> None:
-        """Store the stretch.
-
-        Args:
-            edges: Samples at which the blocks begin and end, from 0 to the last, shape (K + 1,).
-        """
+        """Store the stretch; at ``edges`` blocks begin and end, from sample 0 to the last, shape (K + 1,)."""
         self._engine, self._motion, self._edges = engine, motion, edges
         self._middles = (edges[1:] + edges[:-1]) // 2
 
     def raise_bounds(self, low: Array, pairs: Sequence[Pair | None]) -> None:
         """Measure the pair with the lowest bound of a block in its middle until that is near what was measured.
 
-        Args:
-            low: Certified lower bounds by pair and block in [m], shape (P, K); raised in place.
-            pairs: The engine's bodies of each pair; None for those that need no measuring.
+        Certified lower bounds by pair and block in [m], shape (P, K), are raised in place; a pair that needs no
+        measuring is None.
         """
         ceiling = np.full(low.shape[1], np.inf)  # [m] distance that is known to be reached in each block
         searches: dict[int, SolidSearch] = {}

@@ -31,9 +31,8 @@ def mounted_depths(scene: Scene, q: Array, first: BodyPoses | None = None) -> tu
     holds as far as its grasp is closed, which is a check of its own. Of pairs that do move, a half-space is measured at
     every configuration, two solids at up to ``MAX_ROWS`` of them, the first and the last among them.
 
-    Args:
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        first: Poses of the bodies of the engine at the first configuration, where they are known.
+    Joint positions are stacked, in [rad] or [m], shape (N, nq). ``first`` has the poses of the engine's bodies at the
+    first one, where they are known.
     """
     if first is None:
         first = scene.body_poses(q[:1])

@@ -92,12 +92,12 @@ class Growth:
 
 
 def scene_at_stop(scene: Scene) -> Scene:
-    """The scene of a cell that has stopped: the full distance is demanded of every tool and the part.
+    """The scene of a cell that has stopped, from that in which all tools are at work.
+
+    The full distance is demanded of every tool and the part, and what of a tool lies outside its contact zone must not
+    touch the part.
 
     What of a tool lies outside its contact zone must not touch the part besides.
-
-    Args:
-        scene: The scene of the cell, in which all tools are at work.
     """
     clear = scene_of_run(scene, ())
     outside = [
@@ -133,12 +133,10 @@ def rows_too_near(scene: Scene, q: Array) -> list[int]:
 
 
 def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Growth:
-    """Judge a motion that begins where a cell has stopped.
+    """Judge a motion that begins where a cell has stopped, in ``scene_at_stop``; between rows joints move evenly.
 
-    Args:
-        scene: See ``scene_at_stop``.
-        q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2; between rows joints move evenly.
-        with_minimum: Whether the smallest distances of the pairs that begin with their demand are searched for too.
+    Joint positions are stacked, in [rad] or [m], shape (N, nq), N at least 2. The smallest distances of the pairs that
+    begin with their demand may be searched for too.
     """
     near = rows_too_near(scene, q[0])
     others = scene_of_rows(scene, [row for row in range(len(scene.pairs)) if row not in set(near)])
@@ -149,11 +147,8 @@ def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Gro
 def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collection[int]) -> Growth:
     """As ``certify_growth``, for a search: pairs that come apart are measured at few moments, and nothing is proved.
 
-    Args:
-        scene: See ``scene_at_stop``.
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-        near: Pairs that do not keep their demand in the first row.
-        moved: Pairs that the motion changes; the others are not asked.
+    ``near`` has the pairs that do not keep their demand in the first row, ``moved`` those that the motion changes; the
+    others are not asked.
     """
     bound = certify(scene_of_rows(scene, sorted({*moved} - {*near})), q, with_minimum=False)
     return Growth.of(bound, [_Separation(scene, row, q, is_sampled=True) for row in near] if bound.is_met else [])

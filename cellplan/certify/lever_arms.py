@@ -47,8 +47,7 @@ class Chain:
         :math:`s_i \times (s_j \times (x - P_j))` when both turn, no longer than :math:`L_j`; :math:`s_i \times s_j`
         when only i turns; and zero when i slides.
 
-        Args:
-            steps: By how much each axis of the scene moves in each step in [rad] or [m], shape (n - 1, axes).
+        In each step every axis of the scene moves by so much in [rad] or [m], shape (n - 1, axes).
         """
         moved = steps[:, self.axes]
         turned = moved * self.turns
@@ -67,11 +66,9 @@ class LeverArms:
     """All axes of a cell at their reference configuration, and how far each slides in a program."""
 
     def __init__(self, scene: Scene, q: Array) -> None:
-        """Place the axes in the world.
+        """Place the axes in the world at the rows of a program, between which joints move evenly.
 
-        Args:
-            q: Stacked joint positions of the program in [rad] or [m], shape (N, nq); between its rows joints move
-                evenly.
+        The joint positions are stacked, in [rad] or [m], shape (N, nq).
         """
         cell = scene.cell
         self._scene = scene

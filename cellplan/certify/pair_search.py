@@ -42,12 +42,9 @@ class Search(ABC):
     """
 
     def __init__(self, low: Array, state: PairState, *, begin: float, width: float) -> None:
-        """Start from the first bounds.
+        """Start from the first bounds, lower ones by the cheapest means in [m], shape (n - 1,).
 
-        Args:
-            low: Lower bounds by the cheapest means in [m], shape (n - 1,).
-            begin: Time of the first sample.
-            width: Length of a step, in samples of the program.
+        ``begin`` is the time of the first sample, ``width`` the length of a step, in samples of the program; so below.
         """
         self.bounds, self.state = StepBounds(low), state
         self._begin, self._width = begin, width
@@ -161,13 +158,7 @@ class SolidSearch(Search):
         begin: float = 0.0,
         width: float = 1.0,
     ) -> None:
-        """Start from the bounding spheres.
-
-        Args:
-            state: State of the search of the pair; a new one when None.
-            begin: Time of the first sample.
-            width: Length of a step, in samples of the program.
-        """
+        """Start from the bounding spheres, with a new state when there is None."""
         super().__init__(motion.sphere_bounds(pair), state or PairState(), begin=begin, width=width)
         self._engine, self._pair, self._motion = engine, pair, motion
         self._are_spheres_apart = self.low > APART_TOL
@@ -301,13 +292,7 @@ class GroundSearch(Search):
     def __init__(
         self, pair: ScenePair, motion: StraightMotion, *, state: PairState, begin: float = 0.0, width: float = 1.0
     ) -> None:
-        """Work out the heights at all samples.
-
-        Args:
-            pair: The solid and the half-space.
-            begin: Time of the first sample.
-            width: Length of a step, in samples of the program.
-        """
+        """Work out the heights of the solid above the half-space at all samples."""
         self._pair, self._motion = pair, motion
         heights = motion.scene.ground_heights(pair, motion.poses)
         self._strays: Array = motion.bend[pair.first] / 8.0

@@ -17,11 +17,7 @@ SAME_DISTANCE: Final = 1e-12  # [m] rounding of a distance along a straight move
 
 
 def scene_of_run(scene: Scene, tasks: Collection[str]) -> Scene:
-    """The scene while some tasks are worked on: the tool of an idle robot keeps away from the part like anything else.
-
-    Args:
-        scene: The scene of the cell, in which all tools are at work.
-    """
+    """The scene while some tasks are worked on: the tool of an idle robot keeps away from the part like the rest."""
     idle = idle_robots(scene.cell, tasks)
     pairs = list(scene.pairs)
     for row, pair in enumerate(pairs):
@@ -40,14 +36,10 @@ def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:
 def with_straight_move(scene: Scene, times: Array, q: Array) -> tuple[Scene, Array, Array]:
     """The scene with the pairs of its straight move, each with the rows between which it is watched.
 
+    A row, with its time in [s] and stacked joint positions in [rad] or [m], is added wherever a pair begins or ends to
+    be watched between two rows: joints move linearly.
+
     Where a pair begins or ends to be watched between two rows, a row is added there: joints move linearly.
-
-    Args:
-        times: Times of the rows in [s], shape (N,).
-        q: Stacked joint positions in [rad] or [m], shape (N, nq).
-
-    Returns:
-        The scene, and the times and positions with the added rows.
     """
     move = scene.straight
     if move is None:

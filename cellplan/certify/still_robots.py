@@ -45,11 +45,9 @@ class HomeTrials:
         self._tables[run].add(q)
 
     def is_refused(self, q: Array, *, extra: float = 0.0) -> bool:
-        """Whether a configuration is too near to something at one of the samples.
+        """Whether a configuration in [rad] or [m], shape (n,), is too near to something at one of the samples.
 
-        Args:
-            q: The configuration in [rad] or [m], shape (n,).
-            extra: Distance in [m] beyond the demanded one that is required from the part and from other robots.
+        ``extra`` is a distance in [m] beyond the demanded one that is required from the part and from other robots.
         """
         robot_poses = self._tables[0].placed(q)
         pair = self._tables[0].too_near_alone(robot_poses, extra)  # what stands still is the same in every run

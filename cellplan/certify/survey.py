@@ -47,11 +47,7 @@ class Survey:
     """
 
     def __init__(self, scene: Scene, q: Array) -> None:
-        """Divide the motion into blocks.
-
-        Args:
-            q: Stacked joint positions in [rad] or [m], shape (N, nq), N at least 2.
-        """
+        """Divide the motion into blocks; joint positions are stacked, in [rad] or [m], shape (N, nq), N at least 2."""
         count = len(scene.pairs)
         self.scene, self._q = scene, q
         even = np.linspace(0, len(q) - 1, min(MAX_BLOCKS, len(q) - 1) + 1).round().astype(np.intp)

@@ -24,9 +24,7 @@ class Spans:
 def line_spans(shape: Solid, points: Array, directions: Array) -> Spans:
     """Where endless lines run inside a solid; solids that overlap within one mesh count as one.
 
-    Args:
-        points: A point of each line in [m], shape (N, 3), in the frame of the solid.
-        directions: Unit directions, shape (N, 3).
+    A line has a point in [m] and a unit direction, shape (N, 3) each, in the frame of the solid.
     """
     match shape:
         case Mesh():

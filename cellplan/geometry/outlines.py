@@ -18,16 +18,11 @@ FACING: Final = 1e-9  # [-] a direction this near to the normal of a face is the
 
 
 def outlines(shape: Solid, R: Array, p: Array) -> Array:
-    """Corners of the outline of a solid from above at some poses, in the order of their directions round it.
+    """Corners in [m], shape (N, 24, 2), of the outline of a solid from above at some poses, counter-clockwise.
 
     The outline is that of the convex hull, its corners points of the solid: one for each of 24 directions.
 
-    Args:
-        R: Its rotations in the world, shape (N, 3, 3).
-        p: Its positions in [m], shape (N, 3).
-
-    Returns:
-        Corners in [m], counter-clockwise, shape (N, 24, 2).
+    Rotations in the world have the shape (N, 3, 3), positions in [m] (N, 3).
     """
     if isinstance(shape, Mesh):
         return _of_points(_corners(shape, few=len(R) <= FEW_SAMPLES), R, p)

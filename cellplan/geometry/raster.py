@@ -11,11 +11,7 @@ SMOOTHED: Final = 0.6  # [-] squares by which a contour may leave the middles of
 
 
 def covered(outlines: Array) -> Indices:
-    """Squares whose middles lie in any of some convex outlines, shape (K, C, 2).
-
-    Returns:
-        Row, first and last column of what each outline covers of a row, shape (M, 3).
-    """
+    """Squares with the middle in any convex outline, shape (K, C, 2): row, first and last column, shape (M, 3)."""
     first, second = outlines, np.roll(outlines, -1, axis=1)
     low, high = np.ceil(first[..., 1].min(axis=1) - NEAR), np.floor(first[..., 1].max(axis=1) + NEAR)
     most = int((high - low).max()) + 1 if len(first) else 0
@@ -49,11 +45,7 @@ def stretches(squares: Indices) -> Indices:
 
 
 def contours(squares: Indices) -> list[Array]:
-    """Closed lines round squares, holes the other way round, shape (N, 2) each, as x and y.
-
-    Args:
-        squares: Row, first and last column of stretches, shape (M, 3).
-    """
+    """Closed lines round stretches of squares, shape (M, 3), holes the other way round; x and y, shape (N, 2) each."""
     if not len(squares):
         return []
     corner, mask = _mask(squares)

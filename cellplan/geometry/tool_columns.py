@@ -60,10 +60,7 @@ class Columns:
 def axis_depths(length: float, shape: Solid, X_ST: Array) -> Array:
     """Depth of a tool's axis in [m] for each pose, shape (N,); an axis that runs along a surface does not count.
 
-    Args:
-        length: Length of the axis that counts, back from the tip, in [m].
-        shape: The part.
-        X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
+    So much of the axis counts, back from the tip, in [m]. Poses are in the frame of the part's shape, shape (N, 4, 4).
     """
     axis = np.array([[0.0, 0.0]])
     depth = depths(_along_axis(axis, length), shape, X_ST)
@@ -94,10 +91,7 @@ def body_columns(shape: Solid, X_TS: Array, zone: float) -> Columns:
     what it varies over the body. A round end of radius r that leans by up to 30 deg is missed by at most 0.5 % of r. A
     bump of the part that is thinner than the columns are apart may stand between them.
 
-    Args:
-        shape: The body.
-        X_TS: Its pose in the tool frame.
-        zone: Radius round the tool's axis in [m] that is sampled more densely when the body is wider.
+    A body that is wider than ``zone``, a radius round the tool's axis in [m], is sampled more densely within.
     """
     centre, rim = _outline(shape, X_TS)
     lengths = np.linalg.norm(rim - centre, axis=1)
@@ -119,9 +113,7 @@ def body_columns(shape: Solid, X_TS: Array, zone: float) -> Columns:
 def depths(columns: Columns, shape: Solid, X_ST: Array) -> Array:
     """Depth of the deepest column in [m] for each pose of a tool, shape (N,); 0 where the tool is free.
 
-    Args:
-        shape: The part.
-        X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
+    Poses are in the frame of the part's shape, shape (N, 4, 4).
     """
     step = max(1, LINES_AT_ONCE // max(1, len(columns.line)))
     batches = [_depths(columns, shape, X_ST[k : k + step]) for k in range(0, len(X_ST), step)]
@@ -180,12 +172,8 @@ def line_depths(X_FT: Array, shape: Solid, X_ST: Array, *, zone: float, is_all: 
     tool may also reach round and point back at its flange; then its bodies say where it goes round. Where there are
     none it is a straight line to the side of the flange.
 
-    Args:
-        X_FT: The tool in the flange frame.
-        shape: The part.
-        X_ST: Tool poses in the frame of the part's shape, shape (N, 4, 4).
-        zone: Radius of the contact zone in [m].
-        is_all: Whether this line is all that is known of the tool.
+    Poses of the tool are in the frame of the part's shape, shape (N, 4, 4); ``zone`` is the radius of the contact zone
+    in [m], and ``is_all`` says that this line is all that is known of the tool.
     """
     along = float(X_FT[:3, 3] @ X_FT[:3, 2])
     depth = axis_depths(max(along, zone), shape, X_ST)

@@ -32,11 +32,7 @@ class ForkedWork:
     """
 
     def __init__(self, progress: Listener) -> None:
-        """Prepare.
-
-        Args:
-            progress: Called with the stage and the fraction done, while a result is waited for.
-        """
+        """Prepare; progress is called with the stage and the fraction done, while a result is waited for."""
         self._progress = progress
         self._running: dict[int, BinaryIO] = {}  # what comes from each copy, by its process number
         self._life = os.pipe() if sys.platform == "linux" else None  # it ends with this process
@@ -56,13 +52,9 @@ class ForkedWork:
         self._life = None
 
     def begin(self, function: Callable[..., Value], *arguments: object) -> Callable[[], Value]:
-        """Begin ``function(*arguments, progress=...)`` in a copy of this process.
+        """Begin ``function(*arguments, progress=...)`` in a copy of this process; the value returned gives its result.
 
-        Args:
-            function: A function without side effects; its value can be pickled.
-
-        Returns:
-            What gives the result, once it is there; exceptions are those of the function.
+        The function has no side effects, and its result can be pickled; exceptions are those of the function.
         """
         may_fork = self.is_possible and len(self._running) < processors()
         process = self._forked(function, arguments) if may_fork else None

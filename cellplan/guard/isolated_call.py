@@ -15,12 +15,7 @@ Value = TypeVar("Value")
 
 
 def in_child(function: Callable[..., Value], *arguments: object, guard: Guard) -> Value:
-    """Result of ``function(*arguments)``, worked out in the child process.
-
-    Args:
-        function: A function of a module; the child imports it from there.
-        *arguments: Plain data.
-        guard: Names for messages, and limits.
+    """Result of ``function(*arguments)``, worked out in the child process, which imports the function from its module.
 
     Raises:
         OverrunError: The work crashed, or took too long or too much memory.

@@ -29,13 +29,8 @@ class ChildStock:
     ) -> Any:
         """Result of ``function(*arguments)``, worked out in a child process; as ``in_child``.
 
-        Args:
-            prepare: What a process does first that has not done so, its argument and limits: imports, for which the
-                limits of the job are too narrow.
-
-        Raises:
-            OverrunError: The work crashed, or took too long or too much memory.
-            CellplanError: What the function itself raises; other exceptions are reported as internal errors.
+        What a process prepares that has not done so yet comes with its argument and limits: imports, for which the
+        limits of the job are too narrow.
         """
         child = self._taken()
         try:

@@ -6,11 +6,6 @@ import numpy as np
 
 
 def generator(name: str, seed: int = 0) -> np.random.Generator:
-    """Random numbers that depend on a name and a seed only: the same on every machine and in every order of use.
-
-    Args:
-        name: Name of what the numbers are for, such as a robot.
-        seed: Seed of the whole search.
-    """
+    """Random numbers that depend on a name and a seed only: the same on every machine and in every order of use."""
     digest = hashlib.sha256(f"{seed}:{name}".encode()).digest()
     return np.random.default_rng(int.from_bytes(digest, "big"))

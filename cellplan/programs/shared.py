@@ -41,19 +41,11 @@ class Shared:
         return DemandedProgram.of(self.run.cell).scenes(self.run.cell)
 
     def orders(self, progress: Progress = silent) -> tuple[Orders, ...]:
-        """Marks of every program, between which every order of the robots is certified.
-
-        Raises:
-            NotVerifiedError: Marks do not suffice.
-        """
+        """Marks of every program, between which every order of the robots is certified."""
         return self.once("orders", lambda: certified_orders(self.run, progress=progress))
 
     def once(self, key: object, make: Callable[[], Result]) -> Result:
-        """What was found for a key before, or else what is found now.
-
-        Args:
-            key: What the result depends on besides the run.
-        """
+        """The result kept for a key, which states all that it depends on besides the run, or else made now."""
         if key not in self._results:
             self._results[key] = make()
         known: Result = self._results[key]

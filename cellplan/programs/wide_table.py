@@ -26,24 +26,12 @@ def verified_rows(run: VerifiedRun) -> WideRows:
 
 
 def render_wide_tables(run: VerifiedRun) -> dict[str, str]:
-    """Text of every wide table, by its path in the folder of the export: one for each program of the run.
-
-    Raises:
-        InputError: A joint cannot be written with the decimals of the format, or two columns have the same name.
-    """
+    """Text of every wide table, by its path in the folder of the export: one for each program of the run."""
     return {file_name(name): render_wide(rows) for name, rows in _programs(run)}
 
 
 def read_wide_tables(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[str, JointTable], ...]:
-    """Read the files of an export back, strictly: the joint tables of each motion, by robot.
-
-    Args:
-        run: The run that they were made from.
-        files: Text by path, as ``render_wide_tables`` gives it.
-
-    Raises:
-        InputError: With file and line, when a text is not such a table.
-    """
+    """Read what ``render_wide_tables`` gives back, strictly: the joint tables of each motion of their run, by robot."""
     return run.by_phase([read_wide(run.cell, files[path], path) for path in map(file_name, run.programs)])
 
 

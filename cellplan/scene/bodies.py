@@ -58,8 +58,7 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
 
     Robots and surroundings stand in the order of their names.
 
-    Raises:
-        InputError: Two bodies have the same name.
+    ``InputError`` where two bodies have the same name.
     """
     named = NameOrder.of(cell).cell  # the order of a file does not decide which pairs come first
     bodies = [body for robot in named.robots for body in _robot_bodies(robot)]
@@ -74,11 +73,7 @@ def scene_bodies(cell: Cell) -> tuple[SceneBody, ...]:
 
 
 def body_poses(bodies: Sequence[SceneBody], chains: Mapping[str, ScrewChain], q: Mapping[str, Array]) -> BodyPoses:
-    """Poses of all bodies in the world.
-
-    Args:
-        q: Joint positions in [rad] or [m] by robot, shape (N, n) each.
-    """
+    """Poses of all bodies in the world, from joint positions in [rad] or [m] by robot, shape (N, n) each."""
     return carried_poses(bodies, {name: chains[name].link_displacements(positions) for name, positions in q.items()})
 
 
@@ -99,8 +94,7 @@ def carried_poses(bodies: Sequence[SceneBody], D: Mapping[str, Array]) -> BodyPo
 
     Links are far fewer than bodies: what is checked are their displacements and where on them the bodies are.
 
-    Raises:
-        CellplanError: A displacement is not finite or not rigid.
+    ``CellplanError`` where one is not finite or not rigid.
     """
     count, X_BS = len(next(iter(D.values()))) if D else 1, np.array([body.X_BS for body in bodies]).reshape(-1, 4, 4)
     for X in (*D.values(), X_BS[None]):

@@ -26,11 +26,7 @@ class BodyTable:
 
     @classmethod
     def of(cls, forest: LinkForest, carriers: Sequence[SceneBody], bodies: Sequence[CollisionBody]) -> "BodyTable":
-        """The arrays of some bodies.
-
-        Args:
-            carriers: The body of the scene that each body is, or is cut from.
-        """
+        """The arrays of some bodies, each with the body of the scene that it is, or is cut from."""
         return cls(
             links=np.array([forest.place(carrier.robot, carrier.link) for carrier in carriers], dtype=np.intp),
             X_LS=np.array([carrier.X_BS for carrier in carriers]).reshape(-1, 4, 4),
@@ -67,25 +63,12 @@ class BodyTable:
         return BodyPoses(np.ascontiguousarray(moved[..., :3]), moved[..., 3] + D[self.links, :, :3, 3])
 
     def bounds(self, poses: BodyPoses) -> tuple[Array, Array]:
-        """Centres of the bounding spheres and ends of the bounding lines in the world in [m].
-
-        Returns:
-            Shape (B, K, 3), and (B, K, 2, 3).
-        """
+        """Centres of bounding spheres, shape (B, K, 3), ends of bounding lines, (B, K, 2, 3), in the world in [m]."""
         points = np.concatenate([self.centres[:, None], self.ends], axis=1)
         placed = points[:, None] @ np.swapaxes(poses.R, 2, 3) + poses.p[:, :, None]
         return placed[:, :, 0], placed[:, :, 1:]
 
 
 def placed_points(poses: BodyPoses, bodies: Indices, samples: Indices, points: Array) -> Array:
-    """Points of some bodies in the world.
-
-    Args:
-        bodies: Which bodies, shape (M,).
-        samples: At which samples, shape (M,).
-        points: In their own frames in [m], shape (M, 3).
-
-    Returns:
-        Shape (M, 3).
-    """
+    """Points in the world, shape (M, 3), of bodies at samples, shape (M,), from those in their own frames in [m]."""
     return (poses.R[bodies, samples] @ points[..., None])[..., 0] + poses.p[bodies, samples]

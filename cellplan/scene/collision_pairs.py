@@ -40,14 +40,9 @@ class CollisionPairs:
     def of(
         cls, cell: Cell, bodies: Sequence[SceneBody], *, engine: Engine, chains: Mapping[str, ScrewChain]
     ) -> "CollisionPairs":
-        """Sort all pairs of bodies.
+        """Sort all pairs of bodies, half-spaces last; the engine has those that are none.
 
-        Args:
-            bodies: All solids, half-spaces last.
-            engine: The bodies that are no half-spaces.
-
-        Raises:
-            InputError: An exclusion names something that is no body; the mounting of a body cannot be meant.
+        ``InputError`` where an exclusion names no body, or the mounting of a body cannot be meant.
         """
         remaining, excluded = sort_pairs(cell, bodies)
         design = apply_design(cell, bodies, remaining, engine=engine, chains=chains)

@@ -41,8 +41,7 @@ def grip_watch(cell: Cell, body: SceneBody, grasp: Grasp) -> GripWatch:
     instant, whether the grasp leaves axes free or not. A body that is too deep in the part by its grasp is not watched
     as well: its depth fails the cell, and no start could be found.
 
-    Raises:
-        InputError: By a grasp that leaves no axis free the body touches the part elsewhere.
+    ``InputError`` where by a grasp that leaves no axis free the body touches the part elsewhere.
     """
     if isinstance(body.shape, HalfSpace):  # no tool is one
         return GripWatch(rule=Rule.CONTACT, reason=RIGID, is_whole=False, outside=None)

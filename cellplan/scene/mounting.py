@@ -126,11 +126,7 @@ def mounted_pair(a: SceneBody, b: SceneBody, ends: tuple[int, int], cell: Cell) 
 
 
 def refuse_wrong_mounting(cell: Cell, bodies: Sequence[SceneBody], faults: Sequence[tuple[int, Sequence[int]]]) -> None:
-    """Refuse a cell in which what the user mounted touches links of its own robot in every configuration.
-
-    Raises:
-        InputError: There is such a body.
-    """
+    """Refuse a cell in which what the user mounted touches links of its own robot in every configuration."""
     for mounted, links in faults:
         body, others = bodies[mounted], [bodies[link].name for link in links]
         outside = [bodies[link].name for link in links if keeps_out_of_grip(body, bodies[link], cell)]

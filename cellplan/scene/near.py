@@ -64,12 +64,7 @@ class NearTable:
         return replace(self, bodies=self.bodies.replaced(poses, bodies))
 
     def find(self, engine: Engine, D: Array, within: float) -> NearbyPairs:
-        """All pairs nearer than a distance in [m].
-
-        Args:
-            D: Displacements of the links, shape (links, K, 4, 4).
-            within: The distance.
-        """
+        """All pairs nearer than ``within`` in [m], from displacements of the links, shape (links, K, 4, 4)."""
         poses = self.bodies.poses(D)
         centres, lines = self.bodies.bounds(poses)
         parts = [self._solids(engine, poses, (centres, lines), within), self._grounds(poses, centres, within)]
@@ -93,12 +88,9 @@ class NearTable:
         return self.by_axes(nearby, self.forest.screws(D)) @ self.forest.shares
 
     def by_axes(self, nearby: NearbyPairs, screws: Array) -> Array:
-        """The work of a unit force along each normal on every axis, shape (M, axes).
+        """The work of a unit force along each normal on every axis, shape (M, axes), from screws of shape (axes, K, 6).
 
         It is the same at both points, as the normal goes through both.
-
-        Args:
-            screws: Of all axes, shape (axes, K, 6).
         """
         links = np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])  # that carry the bodies, (M, 2)
         forces, count = wrenches(nearby), screws.shape[1]
@@ -190,8 +182,7 @@ def counts_by_hull(body: CollisionBody, tip: Array | None) -> bool:
     The surface of such a tool differs from its hull by the hollow that the contact zone leaves at its end. Where the
     hull keeps clear of the tip only what bulges into that hollow is taken for a contact.
 
-    Args:
-        tip: The tip that it is cut off before, in its own frame in [m], shape (3,); None for a body that is not cut.
+    The tip is in the frame of the body in [m], shape (3,); None for a body that is not cut.
     """
     if body.is_convex or tip is None:
         return body.is_convex

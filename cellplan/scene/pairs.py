@@ -76,11 +76,7 @@ class Excluded:
 
 
 def sort_pairs(cell: Cell, bodies: Sequence[SceneBody]) -> tuple[list[ScenePair], list[Excluded]]:
-    """All pairs of bodies, those that are joined or mounted and those the user named left out.
-
-    Raises:
-        InputError: An exclusion of the cell names something that is no body.
-    """
+    """All pairs of bodies, those that are joined or mounted and those the user named left out."""
     trees = {robot.name: LinkTree(robot.model) for robot in cell.robots}
     by_user, by_file = _user_exclusions(cell, bodies), _disabled(cell, bodies)
     watched, excluded = [], []

@@ -73,9 +73,8 @@ class Scene:
     def from_cell(cls, cell: Cell) -> "Scene":
         """Build the chains and bodies of a cell and sort its pairs.
 
-        Raises:
-            InputError: Two bodies share a name, or an exclusion names something that is no body.
-            SelfTestError: The collision engine fails a test with a known answer.
+        ``InputError`` where two bodies share a name, or an exclusion names no body; ``SelfTestError`` where the
+        collision engine fails a test with a known answer.
         """
         prove_engine()
         chains = {robot.name: ScrewChain(robot) for robot in cell.robots}
@@ -113,11 +112,7 @@ class Scene:
         takes as long as that does. A column that touches a link of its own robot in
         every configuration is not refused here; it shows as a contact.
 
-        Args:
-            X_WB: Base in the world by the name of the robot, shape (4, 4); all others stay.
-
-        Raises:
-            ValueError: There is no such robot, or a pose is not finite or not rigid.
+        Bases are in the world, shape (4, 4), by name of the robot; ``ValueError`` where one is not finite or not rigid.
         """
         cell = with_bases(self.cell, X_WB)
         placed = None if any(stands_by_link(cell, name) for name in X_WB) else placed_columns(cell, self.bodies, X_WB)
@@ -139,9 +134,7 @@ class Scene:
         The distances are quick, not proved: a search asks them, ``certify`` judges what it finds. Bodies that never
         move against each other and those of which the depth is judged (``mounted``) are not among the watched pairs.
 
-        Args:
-            q: Stacked joint positions in [rad] or [m], shape (K, nq).
-            within: The distance.
+        Joint positions are stacked, in [rad] or [m], shape (K, nq).
         """
         return near_pairs(self, q, within)
 
@@ -171,11 +164,9 @@ class Scene:
         return above - body.looseness
 
     def touching(self, q: Array, *, among: Flags | None = None) -> tuple[str, str] | None:
-        """Names of the first two bodies that must not touch but do, at one stacked configuration of shape (nq,).
+        """Names of the first two bodies that must not touch but do, at a stacked configuration, shape (nq,), or None.
 
-        Args:
-            q: Stacked joint positions in [rad] or [m], shape (nq,).
-            among: Which of ``pairs`` are examined, shape (len(pairs),); all when None.
+        ``among`` says which of ``pairs`` are examined, shape (len(pairs),); all when None.
         """
         examined = np.ones(len(self.pairs), dtype=bool) if among is None else among
         poses = self.body_poses(q[None])
@@ -216,9 +207,6 @@ def left_out(
     Then come the surroundings among themselves, and robots whose links have no bodies.
 
     Bodies that never move and keep the demanded clearance are not listed: nothing was excused there.
-
-    Args:
-        engine: The solids first, in the order of the bodies.
     """
     standing = _Standing(cell, bodies, engine)
     entries = [*_relaxed(bodies, pairs), *(entry for entry in _excluded(excluded) if not standing.is_clear(*entry[:3]))]

@@ -34,14 +34,10 @@ class FreeMotion:
     """
 
     def __init__(self, scene: Scene, q: Array | Mapping[str, Array]) -> None:
-        """Work out the ways of all bodies.
+        """Work out the ways of all bodies, from at least two rows of each robot.
 
-        Args:
-            q: Positions in [rad] or [m] of each robot, shape (N, n), at least two rows, not necessarily as many for
-                each; or of all robots, stacked, shape (N, nq).
-
-        Raises:
-            ValueError: A robot has no rows, or fewer than two.
+        Positions are in [rad] or [m] of each robot, shape (N, n), not necessarily as many rows for each; or of all
+        robots, stacked, shape (N, nq).
         """
         self.scene = scene
         self._q = _by_robot(scene.cell, q)
@@ -70,9 +66,7 @@ class FreeMotion:
     def poses(self, bodies: Indices, rows: Array) -> tuple[Array, Array]:
         """Rotations, shape (M, 3, 3), and positions in the world in [m], shape (M, 3), of some bodies.
 
-        Args:
-            bodies: Bodies of the engine that robots carry, shape (M,).
-            rows: Place of each in the program of its robot, shape (M,).
+        Bodies of the engine that robots carry, and the place of each in the program of its robot, have the shape (M,).
         """
         R, p = np.empty((len(bodies), 3, 3)), np.empty((len(bodies), 3))
         for index, robot in enumerate(self.scene.cell.robots):

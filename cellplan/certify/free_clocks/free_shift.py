@@ -50,11 +50,9 @@ class ShiftBound:
 
 
 def free_shift(motion: FreeMotion, times: Array, first: str, second: str, *, most: float) -> ShiftBound:
-    """The largest shift that is proved to keep what is demanded of all pairs of bodies of two robots.
+    """The largest shift, up to ``most`` in [s], that is proved to keep all demands on pairs of bodies of two robots.
 
-    Args:
-        times: Times of these in [s], shape (N,).
-        most: Largest shift in [s] that is searched.
+    ``times`` are those of the rows in [s], shape (N,).
     """
     return _ShiftSearch(motion, times, first, second, most).run()
 
@@ -205,10 +203,7 @@ def _largest(rows: Array, times: Array) -> Array:
 def _shift_within(motion: FreeMotion, times: Array, bodies: Indices, most: tuple[float, float]) -> float:
     """Largest shift in [s] within which one of two bodies makes no way longer than it may, anywhere.
 
-    Args:
-        times: Times of their rows in [s], shape (N,).
-        bodies: The two bodies of the engine, shape (2,).
-        most: Largest way in [m], and largest shift in [s].
+    The rows have times in [s], shape (N,); ``most`` is the largest way in [m], and the largest shift in [s].
     """
     margin, high = most
     low = 0.0

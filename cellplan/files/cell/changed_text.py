@@ -11,12 +11,9 @@ from cellplan.files.yaml.writer import yaml_text
 
 
 def changed_text(text: str, values: Mapping[str, Any], *, head: str) -> str:
-    """The text of a cell file with other values, each beside what it was.
+    """The text of a cell file with other values, each beside what it was, below comment lines of a head without ``#``.
 
     Where the text cannot be edited in place, all values are written anew, without its comments.
-
-    Args:
-        head: Lines of comment above it, without ``#``.
     """
     top = "".join(f"# {line}\n" for line in head.splitlines())
     plain = text.removeprefix("\ufeff").replace("\r\n", "\n")

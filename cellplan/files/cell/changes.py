@@ -39,11 +39,7 @@ class _AddressError(Exception):
 def read_setting(text: str, *, option: str = "--set") -> tuple[str, object]:
     """Address and value of ``KEY=VALUE``; the value is read as strictly as one in a cell file, ``null`` leaves it out.
 
-    Args:
-        option: The option that it belongs to, as messages name it.
-
-    Raises:
-        InputError: The text is not of this form, or the value cannot be read.
+    Messages name the option that the text belongs to.
     """
     address, sign, value = (part.strip() for part in text.partition("="))
     if not sign or not address:
@@ -52,14 +48,7 @@ def read_setting(text: str, *, option: str = "--set") -> tuple[str, object]:
 
 
 def changed(document: YamlDocument, values: Mapping[str, object]) -> YamlDocument:
-    """The document with other values; see ``Cell.with_values``.
-
-    Args:
-        values: Values by address; None leaves a key out.
-
-    Raises:
-        InputError: An address leads nowhere, or a value cannot stand in a cell file.
-    """
+    """The document with other values by address, None for a key that is left out; see ``Cell.with_values``."""
     for address, value in values.items():
         document = _with_value(document, address, value)
     return document

@@ -12,9 +12,6 @@ def document_differences(documents: Sequence[Mapping[str, Any]]) -> dict[str, li
     """Key paths at which documents differ, with the value of each; None where a document has no such key.
 
     Paths lead as deep as all documents that have them agree in form: to numbers where lists have the same length.
-
-    Args:
-        documents: Plain values, as ``written_document`` gives them.
     """
     differences = _differences(tuple(documents), ())
     return {

@@ -23,11 +23,7 @@ OTHERS_MAY_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
 def user_folders(cell_folder: Path) -> tuple[Path, ...]:
     """Folders that the user allows for every cell; names that are not absolute in the variable are passed over.
 
-    Args:
-        cell_folder: Folder of the cell that is about to be read.
-
-    Raises:
-        InvalidFileError: The configuration does not have the required form.
+    An ``InvalidFileError`` has what is wrong with the configuration.
     """
     named = [Path(word) for word in os.environ.get(VARIABLE, "").split(os.pathsep)]
     return (*(folder for folder in named if folder.is_absolute()), *_configured(cell_folder))

@@ -30,7 +30,6 @@ def render_cell(cell: Cell, starts: Mapping[str, Array] | None = None) -> str:
     method, durations and the choice of tasks are those of the cell, which the command line may have changed.
 
     Args:
-        cell: The cell, as ``load_cell`` gave it or changed since.
         starts: Start postures that were found, by robot, in [rad] or [m]; those written in the cell stay.
 
     Raises:
@@ -63,13 +62,10 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
 
 
 def as_written(model: RobotModel, q: Array) -> Array:
-    """The configuration that is read back after ``q`` was written; at most a unit in the last place away from it.
+    """The configuration, in [rad] or [m], that is read back after ``q`` was written; within a unit in the last place.
 
     Not every number of radians is the image of a number of degrees. A solver that starts from this configuration can be
     repeated from the written cell to the last bit.
-
-    Args:
-        q: Configuration in [rad] or [m], shape (n,).
     """
     return configuration_in_si(model, in_file_units(model, q))
 

@@ -14,11 +14,7 @@ CHUNK: Final = 1 << 20  # [bytes] read at a time when only the digest is desired
 
 
 def read_regular_file(path: Path, *, file: str, limit: int) -> bytes:
-    """Content of a regular file; a pipe, a device or a folder is refused without waiting for it.
-
-    Raises:
-        InputError: When it is missing, unreadable, not a regular file or too large.
-    """
+    """Content of a regular file; one missing or too large, a pipe, a device or a folder is refused at once."""
     handle = _open_regular(path, file)
     try:
         with os.fdopen(handle, "rb") as stream:
@@ -36,11 +32,7 @@ def digest(data: bytes) -> str:
 
 
 def digest_of_file(path: Path, *, file: str) -> str:
-    """SHA-256 of a regular file, in hexadecimal.
-
-    Raises:
-        InputError: When it is missing, unreadable or not a regular file.
-    """
+    """SHA-256 of a regular file, in hexadecimal."""
     total = hashlib.sha256()
     handle = _open_regular(path, file)
     try:
@@ -79,11 +71,7 @@ class AllowedFolders:
     allowed: tuple[Path, ...] = ()  # further folders, by leave of the user
 
     def file(self, written: str) -> Path:
-        """Path of a file that exists within the allowed folders.
-
-        Raises:
-            InputError: With the reason only; the caller knows where the name stands.
-        """
+        """Path of a file within the allowed folders; an ``InputError`` has the reason, not the place of the name."""
         path = self._within(written)
         if not _is(path, "is_file"):
             what = "a regular file, got a folder, a pipe or a device" if _is(path, "exists") else "an existing file"
@@ -92,11 +80,7 @@ class AllowedFolders:
         return path
 
     def directory(self, written: str) -> Path:
-        """Path of a folder that exists within the allowed folders.
-
-        Raises:
-            InputError: With the reason only; the caller knows where the name stands.
-        """
+        """Path of a folder within the allowed folders; ``InputError`` as for a file."""
         path = self._within(written)
         if not _is(path, "is_dir"):
             raise InputError(f"expected an existing folder, got {shown(written)}")

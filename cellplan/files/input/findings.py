@@ -33,11 +33,7 @@ class Finding:
 
 
 def raise_findings(file: str, findings: Iterable[Finding], others: Sequence[InputError] = ()) -> None:
-    """Raise all findings about a file at once, equal ones as one, sorted by line, then those about the files it names.
-
-    Raises:
-        InvalidFileError: When there is at least one finding.
-    """
+    """Raise all findings about a file at once, equal ones as one, by line, then those about the files it names."""
     ordered = _equal_ones_joined(sorted(dict.fromkeys(findings), key=lambda finding: finding.line))
     errors = [finding.to_error(file) for finding in ordered[:FINDING_LIMIT]]
     if len(ordered) > FINDING_LIMIT:

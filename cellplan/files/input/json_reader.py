@@ -9,11 +9,7 @@ from cellplan.files.input.findings import shown
 
 
 def parse_json(data: bytes, file: str) -> dict[str, Any]:
-    """The object that a JSON file holds.
-
-    Raises:
-        InputError: With file and line, when the text is not one JSON object with finite numbers and each key once.
-    """
+    """The object of a JSON file with finite numbers and each key once; an ``InputError`` has file and line."""
     try:
         value = json.loads(data.decode("utf-8"), object_pairs_hook=_unique_keys, parse_constant=_refuse_constant)
     except UnicodeDecodeError as error:
@@ -31,11 +27,7 @@ def parse_json(data: bytes, file: str) -> dict[str, Any]:
 
 
 def required(record: Mapping[str, Any], key: str, kind: type, *, file: str) -> Any:
-    """The value of a key that must be there and of one type.
-
-    Raises:
-        InputError: It is missing or of another type.
-    """
+    """The value of a key that must be there and of one type."""
     if key not in record:
         raise InputError(f"{file}: {key}: missing")
     value = record[key]

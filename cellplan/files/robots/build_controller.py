@@ -22,14 +22,9 @@ PARALLEL: Final = 0.999  # [-] cosine of two axes that count as parallel: 2.6 de
 
 
 def with_zero_of_file(model: RobotModel, path: Path, *, file: str) -> tuple[RobotModel, str]:
-    """The robot with the counting that a file of its own states, and the SHA-256 of that file.
+    """The robot with the counting that a file of its own states, with the keys of ``controller`` in a joint-axis table.
 
-    Args:
-        model: A robot whose own file does not state it.
-        path: The file: the keys of ``controller`` in a joint-axis table.
-
-    Raises:
-        InputError: All findings about the file at once.
+    Its own file does not state it. The SHA-256 of that file comes second; an ``InputError`` has all findings about it.
     """
     document = read_yaml(path, file=file)
     entry, findings = validate(ControllerZeroEntry, document)
@@ -72,8 +67,7 @@ def controller_findings(
 ) -> Iterator[Finding]:
     """Joints that exist, in their own unit, and couplings to earlier joints of the same kind.
 
-    Args:
-        turns: Whether a joint is revolute, by name, from the base to the flange.
+    ``turns`` says whether a joint is revolute, by name, from the base to the flange.
     """
     if entry is None:
         return
@@ -103,8 +97,7 @@ def sense_findings(
     k s_2 q_2`, depends on this alone where :math:`k = s_2 s_3 (a_2 \cdot a_3)`: with the other sign the earlier axis
     would count twice instead of not at all.
 
-    Args:
-        axes: Directions of the joint axes at the reference configuration, shape (3,) each, by name, from the base on.
+    Axes are directions at the reference configuration, shape (3,), by name of the joint, from the base on.
     """
     for other, joint in pairwise(axes if entry is not None else ()):
         factor = None if entry is None else entry.coupling.get(joint, {}).get(other)

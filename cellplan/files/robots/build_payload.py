@@ -10,11 +10,7 @@ from cellplan.model.settings.robot import PayloadEntry
 def payload_findings(
     path: KeyPath, entry: PayloadEntry | None, turning: tuple[str, ...], document: YamlDocument
 ) -> Iterator[Finding]:
-    """Limits of axes belong to the last turning joints before the flange.
-
-    Args:
-        turning: Names of the turning joints, from the base to the flange.
-    """
+    """Limits of axes belong to the last turning joints before the flange, named from the base on."""
     last = turning[-3:]
     for joint in entry.axes if entry is not None else ():
         if joint not in last:

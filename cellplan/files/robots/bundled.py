@@ -19,21 +19,13 @@ def bundled_names() -> tuple[str, ...]:
 
 
 def load_bundled(name: str) -> RobotModel:
-    """A bundled robot.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """A bundled robot; ``InputError`` where there is none of that name."""
     return load_bundled_table(name).model
 
 
 @lru_cache(maxsize=16)
 def load_bundled_table(name: str) -> RobotTable:
-    """A bundled robot with the digest of its table; read once in each process.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """A bundled robot with the digest of its table; read once in each process."""
     names = bundled_names()
     if name not in names:
         hint = did_you_mean(name, names)

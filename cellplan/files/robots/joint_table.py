@@ -48,14 +48,7 @@ def read_robot_table(path: Path) -> RobotModel:
 
 
 def load_robot_table(path: Path, *, file: str, folders: AllowedFolders) -> RobotTable:
-    """Read a joint-axis table and its meshes.
-
-    Args:
-        folders: Where its meshes may lie.
-
-    Raises:
-        InputError: All findings about the table at once, or what is wrong with a mesh.
-    """
+    """Read a joint-axis table and its meshes in these folders; an ``InputError`` has all findings about the table."""
     document = read_yaml(path, file=file)
     table, findings = validate(RobotTableDocument, document)
     findings += document.findings

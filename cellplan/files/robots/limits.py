@@ -42,11 +42,7 @@ def tightest(limits: StatedLimits, cell: StatedLimits) -> StatedLimits:
 
 
 def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: bool) -> Iterator[tuple[str, str]]:
-    """Limits of a cell that are wider than those of the model or leave no range, by key of the cell file.
-
-    Args:
-        is_revolute: Whether the joint turns; decides the unit of keys and texts.
-    """
+    """Limits of a cell that are wider than those of the model or leave no range, by key of the cell file."""
     unit = joint_unit(is_revolute=is_revolute)
 
     def text(value: float) -> str:

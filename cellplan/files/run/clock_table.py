@@ -39,11 +39,7 @@ class ClockText:
 
 
 def render_clock(table: ClockTable, *, cell: str, program: str) -> str:
-    """The clock of a program as text.
-
-    Args:
-        program: SHA-256 of the rows of the joint tables that it belongs to.
-    """
+    """The clock of a program as text, with the SHA-256 of the rows of the joint tables that it belongs to."""
     columns = [plain_decimals(table.times), plain_decimals(table.sigma), list(table.phases)]
     for task, lengths in table.lengths.items():
         columns.append(plain_decimals(np.round(MM_PER_M * lengths, DECIMALS)))
@@ -53,12 +49,7 @@ def render_clock(table: ClockTable, *, cell: str, program: str) -> str:
 
 
 def parse_clock(text: str, source: str) -> ClockText:
-    """Read a clock back, strictly: nothing is skipped, guessed or repaired.
-
-    Raises:
-        InputError: With file and line, when the text is not a whole clock, its times do not grow from 0, or its nominal
-            time does not start at 0 or falls.
-    """
+    """Read a clock back, strictly: times grow from 0, nominal time starts at 0 and does not fall."""
     lines = text.split("\n")
     if lines.pop() != "":
         raise InputError(f"{source}: expected the last row to end with a line break; the file is cut off")

@@ -66,11 +66,7 @@ class RunFolder:
         self._made_parents: list[Path] = []
 
     def __enter__(self) -> Self:
-        """Check the place and open the hidden folder.
-
-        Raises:
-            InputError: When the folder must not or cannot be written.
-        """
+        """Check the place and open the hidden folder; ``InputError`` where it must not or cannot be written."""
         refuse_unless_replaceable(self.path)
         try:
             self._made_parents = _make_parents(self.path.parent)
@@ -92,11 +88,7 @@ class RunFolder:
         self.write_bytes(name, text.encode("utf-8", "backslashreplace"))
 
     def write_bytes(self, name: str, content: bytes) -> None:
-        """Write a file and force it to the disk.
-
-        Raises:
-            InputError: When the disk is full, read-only or otherwise refuses.
-        """
+        """Write a file and force it to the disk; ``InputError`` where that refuses."""
         relative = PurePosixPath(name)
         if relative.is_absolute() or ".." in relative.parts or not relative.name:
             raise ValueError(f"run folder: {name!r} does not lie inside the folder")
@@ -114,11 +106,7 @@ class RunFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        """Put the folder into place, or remove every trace of it.
-
-        Raises:
-            InputError: When the folder cannot be put into place.
-        """
+        """Put the folder into place, or remove every trace of it."""
         try:
             if error is None:
                 self._put_into_place()
@@ -163,12 +151,9 @@ class RunFolder:
 
 
 def refuse_unless_replaceable(path: Path) -> None:
-    """Refuse a place that cellplan must not write to; call it early, before any long work.
+    """Refuse links, files, the working folder and folders with other things; call it before any long work.
 
     What processes that were killed left beside it is removed or put back first.
-
-    Raises:
-        InputError: When the path is a symbolic link, a file, the working folder or a folder with other things in it.
     """
     try:
         for link in (path, path.parent):
@@ -251,11 +236,7 @@ def _holds_foreign(path: Path, foreign: str) -> InputError:
 def exchange(one: Path, other: Path) -> bool:
     """Let two existing paths of one file system change places in one step, so that neither is ever missing.
 
-    Returns:
-        Whether it was done; False where the system or the file system does not know how.
-
-    Raises:
-        OSError: It could have been done and failed.
+    False where the system or the file system does not know how; ``OSError`` where it does and failed.
     """
     call = _renameat2()
     if call is None:

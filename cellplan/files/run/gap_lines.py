@@ -11,11 +11,7 @@ _GAP: Final = re.compile(rf"# {NOT_IN_PROGRAM}: ([A-Za-z0-9_-]+ to [A-Za-z0-9_-]
 
 
 def with_gap_lines(rows: Iterator[str], gaps: Mapping[int, str]) -> Iterator[str]:
-    """Rows of a table with a line at each gap.
-
-    Args:
-        gaps: Name of what is not part of the program, by the first row after it, counted from 0.
-    """
+    """Rows of a table with a line at each gap, named by the first row after it, counted from 0."""
     for index, row in enumerate(rows):
         if index in gaps:
             yield f"# {NOT_IN_PROGRAM}: {gaps[index]}"
@@ -25,12 +21,7 @@ def with_gap_lines(rows: Iterator[str], gaps: Mapping[int, str]) -> Iterator[str
 def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> tuple[list[str], dict[int, str]]:
     """Rows of a table, and its gaps by the first row after each.
 
-    Args:
-        source: File name for messages.
-        first_line: Line of the first of them in the file, from 1.
-
-    Raises:
-        InputError: With file and line, when a comment is not such a line between two rows.
+    The first of them is so many lines, from 1, into the source; an ``InputError`` has the line of another comment.
     """
     rows: list[str] = []
     gaps: dict[int, str] = {}
@@ -48,10 +39,5 @@ def without_gap_lines(lines: Sequence[str], *, source: str, first_line: int) -> 
 
 
 def line_of_row(row: int, gaps: Mapping[int, str], *, first_line: int) -> int:
-    """Line of a row in its file, from 1.
-
-    Args:
-        row: The row, counted from 0.
-        first_line: Line of the first row in the file, from 1.
-    """
+    """Line of a row, counted from 0, in its file, from 1."""
     return first_line + row + sum(after <= row for after in gaps)

@@ -65,9 +65,6 @@ def render_table(
         times: Times of the rows in [s], shape (N,).
         q: Its joint positions in [rad] or [m], shape (N, n).
         gaps: Name of what is not part of the program, by the first row after it.
-
-    Raises:
-        InputError: When a joint's name cannot stand in a table.
     """
     return _render_header(robot.name, header) + _render_rows(robot, times, q, gaps)
 
@@ -82,9 +79,6 @@ def other_header_line(text: str, source: str) -> int | None:
     """The first header line of a table, from 1, that is not what ``render_table`` writes for what the header says.
 
     None where there is none: no line that says more, twice, or in another place.
-
-    Raises:
-        InputError: With file and line, when a header line is missing or of no known form.
     """
     written = replace_header(text, header=parse_header(text, source))
     if written == text:
@@ -112,14 +106,7 @@ def program_digest(tables: Mapping[str, str]) -> str:
 
 
 def parse_table(text: str, source: str) -> JointTable:
-    """Read a joint table back, strictly: nothing is skipped, guessed or repaired.
-
-    Returns:
-        Times in [s] and joint positions in [rad] or [m].
-
-    Raises:
-        InputError: With file, line and column, when the text is not a whole joint table.
-    """
+    """Read times in [s] and positions in [rad] or [m] back, strictly: nothing is skipped, guessed or repaired."""
     robot = _header_fields(text, source)["robot"]
     body = table_body(text)
     first_line = 1 + text.count("\n", 0, len(text) - len(body))
@@ -143,11 +130,7 @@ def row_place(text: str, source: str, row: int) -> str:
 
 
 def parse_header(text: str, source: str) -> TableHeader:
-    """Read what the header lines of a table say.
-
-    Raises:
-        InputError: With file and line, when a header line is missing or of no known form.
-    """
+    """Read what the header lines of a table say, all of them of known forms."""
     fields = _header_fields(text, source)
     digests = {
         key.removesuffix(" digest"): value.removeprefix(_SHA256)

@@ -56,11 +56,7 @@ class Manifest:
 
 
 def user_files(inputs: Iterable[str], cell_file: str) -> tuple[str, ...]:
-    """Files that a cell names, but for those that come with the program.
-
-    Args:
-        cell_file: Name of the cell file among them, without folders.
-    """
+    """Files that a cell names, but for those that come with the program, and the cell file without its folders."""
     return tuple(name for name in inputs if name != cell_file and not name.startswith((BUNDLED, NEAR)))
 
 
@@ -69,9 +65,7 @@ def render_manifest(
 ) -> str:
     """The manifest as JSON text, the same for the same run.
 
-    Args:
-        passed: Whether every check of every run passed.
-        files: Size in bytes and SHA-256 of every file of the run, by its path in the run folder.
+    ``files`` has size in bytes and SHA-256 of every file of the run, by its path in the run folder.
     """
     record = {
         "schema": SCHEMA,
@@ -87,11 +81,7 @@ def render_manifest(
 
 
 def parse_manifest(data: bytes, file: str) -> Manifest:
-    """Read a manifest back, strictly.
-
-    Raises:
-        InputError: With the file, when the text is not a whole manifest of this version.
-    """
+    """Read a manifest of this version back, strictly; an ``InputError`` has the file."""
     record = parse_json(data, file)
     if record.get("schema") != SCHEMA:
         raise InputError(f"{file}: schema: expected '{SCHEMA}', got {shown(record.get('schema'))}")

@@ -49,19 +49,11 @@ class StoredRun:
         return str(self.folder / place / name)
 
     def content(self, place: str, name: str) -> bytes:
-        """Content of a file of one run, which is still as it was written.
-
-        Raises:
-            InputError: It is missing, or was changed meanwhile.
-        """
+        """Content of a file of one run, which is still as it was written."""
         return _content(self.folder, _at(place, name), self.manifest)
 
     def series(self, place: str) -> Record:
-        """The ``series.json`` of one run.
-
-        Raises:
-            InputError: It is missing, was changed meanwhile, or is not JSON.
-        """
+        """The ``series.json`` of one run, unchanged and in JSON."""
         return parse_json(self.content(place, SERIES), self.file(place, SERIES))
 
     def drawings(self, place: str) -> dict[str, bytes]:
@@ -73,12 +65,7 @@ class StoredRun:
 
 
 def read_stored_run(folder: Path) -> StoredRun:
-    """Read a run folder and compare every file with the manifest.
-
-    Raises:
-        InvalidFileError: Everything that is not as it was written, one line for each file.
-        InputError: The folder is not a run, or its manifest cannot be read.
-    """
+    """Read a run folder and compare every file with the manifest; an ``InvalidFileError`` has a line for each."""
     manifest, whole = _manifest(folder)
     changed = file_findings(folder, manifest)
     if changed:

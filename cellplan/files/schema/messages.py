@@ -34,11 +34,7 @@ AnyEntry = TypeVar("AnyEntry", bound=Entry)
 
 
 def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | None, list[Finding]]:
-    """Read a whole file.
-
-    Returns:
-        The entry, or None when there are findings; and the findings that the YAML reader has not made already.
-    """
+    """Read a whole file: the entry, None with findings; and those that the YAML reader has not made already."""
     try:
         return model.model_validate(document.root), []
     except ValidationError as error:

@@ -127,11 +127,7 @@ FIRST: Final = TEMPLATES[0].name
 
 
 def template_named(name: str) -> Template:
-    """The template of a name.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """The template of a name; ``InputError`` where there is none."""
     names = [template.name for template in TEMPLATES]
     if name not in names:
         hint = did_you_mean(name, names)

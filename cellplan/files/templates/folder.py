@@ -9,11 +9,7 @@ from cellplan.files.run.drafts import hidden_folders
 
 
 def refuse_unless_empty(folder: Path) -> None:
-    """Refuse a place that holds something already; hidden entries such as ``.git`` and ``.venv`` may be there.
-
-    Raises:
-        InputError: When the path is a file, or a folder with something in it, or cannot be read.
-    """
+    """Refuse a place that holds something already; hidden entries such as ``.git`` and ``.venv`` may be there."""
     try:
         if not folder.is_dir():
             if folder.exists() or folder.is_symlink():
@@ -31,12 +27,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
 
     A new folder appears in one step. In a folder that exists, files are created one by one, each where there is none.
 
-    Args:
-        folder: New, or without visible entries.
-        files: Content by relative name, with ``/`` between folders.
-
-    Raises:
-        InputError: When the folder holds something, or the disk refuses.
+    Names are relative, with ``/`` between folders.
     """
     refuse_unless_empty(folder)
     made: list[Path] = []

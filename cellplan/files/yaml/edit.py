@@ -31,7 +31,6 @@ def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
     """The text with other values; what was in the place of each is repeated in a comment at the end of its line.
 
     Args:
-        text: A YAML text whose outermost value is a mapping.
         values: New values by key path; ``REMOVED`` for keys that are removed. The mapping that a new key belongs to
             exists.
     """

@@ -98,20 +98,12 @@ class YamlDocument:
 
 
 def read_yaml(path: Path, *, file: str) -> YamlDocument:
-    """Read a file whose outermost value is a mapping.
-
-    Raises:
-        InputError: When the file is missing, not a regular file, too large, not UTF-8 or not YAML.
-    """
+    """Read a regular file of UTF-8, not too large, whose outermost value is a mapping."""
     return parse_yaml(read_regular_file(path, file=file, limit=SIZE_LIMIT), file=file)
 
 
 def parse_yaml(data: bytes, *, file: str) -> YamlDocument:
-    """Read the bytes of a file whose outermost value is a mapping.
-
-    Raises:
-        InputError: When they are too many, not UTF-8, not YAML, or go beyond the limits on nodes and depth.
-    """
+    """Read the bytes of such a file, within the limits on nodes and depth."""
     if len(data) > SIZE_LIMIT:
         raise InputError(f"{file}: expected a file of at most {SIZE_LIMIT / 1e6:g} MB, got a larger one")
     text = _decoded(data, file)

@@ -22,11 +22,7 @@ class SurpriseError(ValueError):
 
 
 def plain_value(text: str) -> str | int | float | bool:
-    """Value of an unquoted scalar.
-
-    Raises:
-        SurpriseError: When the word is empty, not finite, or read differently by YAML 1.1 and 1.2.
-    """
+    """Value of an unquoted scalar; ``SurpriseError`` where empty, not finite, or other in YAML 1.1 than in 1.2."""
     if text in {"true", "false"}:
         return text == "true"
     if text.lower() in NOTHING:

@@ -48,11 +48,7 @@ def _depth(value: object) -> int:
 
 
 def flow_text(value: object) -> str:
-    """A value on one line, as it would stand behind its key.
-
-    Raises:
-        ValueError: A number in it is not finite.
-    """
+    """A value on one line, as it would stand behind its key; ``ValueError`` where a number is not finite."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_text(key)}: {flow_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, tuple | list):

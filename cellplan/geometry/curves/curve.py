@@ -93,10 +93,8 @@ def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
     and passes the corner at ``blend / 4`` times the length of the change of direction. Its sharpest curvature at a
     right angle is 1.3 times that of the circular arc between the same points, which would jump.
 
-    Args:
-        knots: Parameter at each corner: the length along the straight sides in [m], shape (N,).
-        corners: Corner points in [m], shape (N, 3); the first and the last are the ends of the curve.
-        blend: Distance in [m], at most half of the shortest side.
+    The corners are in [m], shape (N, 3), with the length along the straight sides as knots, shape (N,); ``blend`` is at
+    most half of the shortest side.
     """
     sides = np.diff(corners, axis=0)
     direction = sides / np.linalg.norm(sides, axis=1, keepdims=True)
@@ -116,10 +114,7 @@ def rounded_sides(knots: Array, corners: Array, blend: float) -> BezierCurve:
 def smooth_through(knots: Array, values: Array, *, breaks: NDArray[np.bool_]) -> BezierCurve:
     """Cubic curve through values of shape (N, 3) at ``knots``, with continuous derivatives except at the breaks.
 
-    Args:
-        knots: Increasing parameters, shape (N,).
-        values: Points or vectors, shape (N, 3).
-        breaks: Whether the derivative may jump at a knot, shape (N,); see `tangents`.
+    Knots increase; ``breaks`` says where the derivative may jump, shape (N,), see `tangents`.
     """
     width = np.diff(knots)[:, None]
     leaving, arriving = tangents(np.diff(values, axis=0) / width, width, breaks)
@@ -129,19 +124,14 @@ def smooth_through(knots: Array, values: Array, *, breaks: NDArray[np.bool_]) ->
 
 
 def tangents(slopes: Array, widths: Array, breaks: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Derivatives at the two ends of each span so that a parabola through three neighbours is met.
+    """Derivatives at both ends of each span, shape (M, 3) each, so that a parabola through three neighbours is met.
 
     Inside, the derivative is the mean of the neighbouring slopes, weighted with the opposite widths. At a break it
     comes from the span's own side alone: a span between two breaks is straight. When neither the first nor the last
     knot is a break, the curve is closed and the two are neighbours.
 
-    Args:
-        slopes: Mean derivative of each span, shape (M, 3).
-        widths: Parameter width of each span, shape (M, 1).
-        breaks: Whether the derivative may jump at a knot, shape (M + 1,).
-
-    Returns:
-        Derivatives at the start and at the end of each span, shape (M, 3) each.
+    Slopes are the mean derivatives of the spans, shape (M, 3), widths their parameter widths, shape (M, 1); ``breaks``
+    says at which knots the derivative may jump, shape (M + 1,).
     """
     before, after = np.roll(slopes, 1, axis=0), slopes
     width_before = np.roll(widths, 1, axis=0)

@@ -142,11 +142,8 @@ class RotationCurve:
 def rotations_through(knots: Array, rotations: Array, *, breaks: NDArray[np.bool_]) -> RotationCurve:
     """Smooth orientations through given ones; a span between two breaks rotates uniformly about one axis.
 
-    Args:
-        knots: Increasing parameters, shape (N,).
-        rotations: Orientations, shape (N, 3, 3).
-        breaks: Whether the angular velocity may jump at a knot, shape (N,);
-            see `cellplan.geometry.curves.curve.tangents`.
+    Knots increase, shape (N,); rotations have the shape (N, 3, 3); ``breaks`` says where the angular velocity may jump,
+    shape (N,), see `cellplan.geometry.curves.curve.tangents`.
     """
     width = np.diff(knots)[:, None]
     between = np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]
@@ -162,10 +159,7 @@ def leaning_frames(z: Array, dz: Array, x_hint: Array) -> tuple[Array, Array]:
     With x the unit vector along ``h - (h . z) z``, the angular velocity follows from the rates of the three axes:
     ``w = (x * dx + y * dy + z * dz) / 2`` with ``*`` the cross product.
 
-    Args:
-        z: Unit axes, shape (N, 3), nowhere parallel to the hint.
-        dz: Their derivatives, shape (N, 3).
-        x_hint: Direction h, shape (3,).
+    The unit axes, shape (N, 3), are nowhere parallel to h, shape (3,).
     """
     R = frame_from_axes(z, np.broadcast_to(x_hint, z.shape))
     x, y = R[:, :, 0], R[:, :, 1]

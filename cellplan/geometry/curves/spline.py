@@ -17,10 +17,8 @@ def spline_through(knots: Array, values: Array, *, is_closed: bool) -> BezierCur
     order in the spacing up to the ends; without a knot next to the end ("not a knot") it would be ten times larger
     there. Cubics are met exactly. A closed curve passes its start as smoothly as every other knot.
 
-    Args:
-        knots: Increasing parameters, shape (N,); at least two, of a closed curve at least four.
-        values: Points or vectors, shape (N, 3); the last repeats the first when the curve is closed.
-        is_closed: Whether the curve is periodic.
+    Knots increase, shape (N,): at least two, of a closed curve at least four. Values have the shape (N, 3); the last
+    repeats the first when the curve is closed.
     """
     rates = _periodic_rates(knots, values) if is_closed else _open_rates(knots, values)
     third = np.diff(knots)[:, None] / 3.0
@@ -73,11 +71,7 @@ def _periodic_rates(knots: Array, values: Array) -> Array:
 def _solve_tridiagonal(lower: Array, diagonal: Array, upper: Array, *, right: Array) -> Array:
     """Solution of a tridiagonal system by elimination without exchange; spline matrices need none.
 
-    Args:
-        lower: Entries below the diagonal, shape (n - 1,).
-        diagonal: Entries on it, shape (n,).
-        upper: Entries above it, shape (n - 1,).
-        right: Right-hand sides, shape (n, k).
+    Entries below and above the diagonal have the shape (n - 1,), those on it (n,), right-hand sides (n, k).
     """
     n = len(diagonal)
     x, pivots = right.copy(), diagonal.tolist()

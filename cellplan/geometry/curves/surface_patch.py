@@ -159,14 +159,9 @@ class ProjectedCurve:
 
 
 def patches_facing(shape: Box | Cylinder | Sphere, X: Array, direction: Array) -> tuple[Patch, ...]:
-    """Patches of a solid, placed by the pose ``X``, that can be seen from a direction.
+    """Patches of a solid, placed by the pose ``X``, that can be seen from a unit direction, shape (3,).
 
     A line meets a convex solid on one facing patch only, so a hit that lies within a patch's border is the first one.
-
-    Args:
-        shape: The solid.
-        X: Its pose in the frame of the points, shape (4, 4).
-        direction: Unit direction towards the viewer, shape (3,).
     """
     R, centre = X[:3, :3], X[:3, 3]
     match shape:

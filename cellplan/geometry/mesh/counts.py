@@ -55,9 +55,7 @@ def winding_numbers(triangles: Array, points: Array) -> Array:
 
     .. math:: \tan(\Omega/2) = \frac{a \cdot (b \times c)}{abc + (a \cdot b) c + (b \cdot c) a + (c \cdot a) b}
 
-    Args:
-        triangles: Corner points in [m], shape (M, 3, 3).
-        points: Shape (N, 3), in the frame of the mesh.
+    Corners are in [m], shape (M, 3, 3), points in the frame of the mesh, shape (N, 3).
     """
     winding = np.zeros(len(points))
     step = max(1, PAIR_CHUNK // max(1, len(triangles)))
@@ -77,9 +75,7 @@ def ray_winding(triangles: Array, points: Array) -> Indices:
     The side of each edge is evaluated from its lower end only, so that a ray through an edge or a vertex crosses the
     surface there as often as it does beside it.
 
-    Args:
-        triangles: Corner points in [m], shape (M, 3, 3).
-        points: Shape (N, 3), in the frame of the mesh.
+    Corners are in [m], shape (M, 3, 3), points in the frame of the mesh, shape (N, 3).
     """
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     low, high = np.minimum(np.minimum(a, b), c).T.copy(), np.maximum(np.maximum(a, b), c).T.copy()

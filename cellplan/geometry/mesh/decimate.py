@@ -23,14 +23,12 @@ class Decimated:
 
 
 def decimated(mesh: Mesh, limit: int, *, finest: float = FINEST) -> Decimated:
-    """Merge the points in each cell of a grid, as coarse as is needed for a number of triangles.
+    """Merge points in cells of a grid, first of ``finest`` cells along the longest edge, down to a number of triangles.
 
     Every point of the surface moves with the corners of its triangle, so none moves farther than the corner that moves
     most. Triangles that shrink to a line are dropped.
 
-    Args:
-        limit: Number of triangles that are enough; more are left only where the grid is as coarse as it may be.
-        finest: Cells along the longest edge that are tried first.
+    More are left only where the grid is as coarse as it may be.
     """
     points, triangles = _used(mesh.vertices, np.asarray(mesh.faces))
     if len(triangles) <= limit:

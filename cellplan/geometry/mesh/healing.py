@@ -16,11 +16,7 @@ BEHIND: Final = 1e-6  # [-] of the extent: by so much the points lie behind thei
 
 
 def require_few_pieces(faces: Indices, *, source: str) -> None:
-    """Refuse a heap of loose triangles: each piece would have to be tested against all others.
-
-    Raises:
-        InputError: There are more than 5000 connected pieces.
-    """
+    """Refuse a heap of loose triangles: each of more than 5000 pieces would have to be tested against all others."""
     label = shells(faces, count := int(faces.max(initial=-1)) + 1)
     pieces = int(np.count_nonzero(np.bincount(label[faces[:, 0]], minlength=count)))
     if pieces > MAX_PIECES:
@@ -69,8 +65,7 @@ def oriented_alike(faces: Indices) -> Indices:
 def turn_outward(vertices: Array, faces: Indices, *, source: str) -> Indices:
     """Flip the whole if it faces inward, then each shell that does and stands alone: the walls of a cavity stay.
 
-    Raises:
-        InputError: There are more shells than can be tested.
+    ``InputError`` where there are more shells than can be tested.
     """
     require_few_pieces(faces, source=source)
     if face_volumes(vertices, faces).sum() < 0.0:

@@ -89,15 +89,12 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
     What was read once is found again by the bytes of the file, as long as they and the reading code are the same. The
     unit of a COLLADA file is honoured, its up axis is not, as in the programs that URDFs are made for.
 
+    The mesh is in [m]: equal vertices welded, triangles without area dropped, outward facing when it is closed.
+    ``InputError`` where the file cannot be read, is damaged, too large, not finite or of an unlikely size.
+
     Args:
         scale: Metres per unit of the file, for COLLADA a factor after its own unit; one number or one for each axis;
             negative ones mirror.
-
-    Returns:
-        The mesh in [m]: equal vertices welded, triangles without area dropped, outward facing when it is closed.
-
-    Raises:
-        InputError: The file cannot be read, is damaged, too large, not finite or of an unlikely size.
     """
     return _cached_mesh(path, np.asarray(scale, dtype=float), unit=None, is_upright=False)
 
@@ -105,11 +102,7 @@ def read_mesh(path: Path, *, scale: float | ArrayLike = 1.0) -> Mesh:
 def read_drawing(path: Path, *, unit: str | None) -> Mesh:
     """Read a mesh file that stands alone, with z up: as `read_mesh`, but a COLLADA file's up axis is turned to z.
 
-    Args:
-        unit: A key of `MESH_UNITS`. A COLLADA file states its unit, so that it may be None, and must not differ.
-
-    Raises:
-        InputError: As for `read_mesh`; a COLLADA file states another unit.
+    The unit is a key of `MESH_UNITS`. A COLLADA file states its own: it may be None there, and must not differ.
     """
     factor = 1.0 if _is_collada(path.name) else MESH_UNITS[unit or ""]
     return _cached_mesh(path, np.asarray(factor), unit=unit, is_upright=True)
@@ -160,11 +153,7 @@ def _is_collada(name: str) -> bool:
 
 
 def require_solid(mesh: Mesh) -> None:
-    """Refuse a mesh that does not enclose a volume; several closed bodies that touch do.
-
-    Raises:
-        InputError: The surface is open or encloses nothing.
-    """
+    """Refuse a mesh that does not enclose a volume; several closed bodies that touch do."""
     if not mesh.is_closed:
         raise InputError(f"{_not_closed(mesh)}: repair the mesh")
     if is_flat(mesh) or mesh_volume(mesh) <= 0.0:
@@ -172,11 +161,7 @@ def require_solid(mesh: Mesh) -> None:
 
 
 def require_enclosing(mesh: Mesh) -> None:
-    """Refuse a mesh without a defined inside.
-
-    Raises:
-        InputError: The surface is open.
-    """
+    """Refuse a mesh without a defined inside: an open surface."""
     if not mesh.is_closed:
         raise InputError(
             f"{_not_closed(mesh)}: repair the mesh, or set open: true, with which no point counts as inside it"

@@ -52,10 +52,8 @@ class Crossings:
 def ray_hits(mesh: Mesh, origins: Array, directions: Array) -> RayHits:
     """First hit of each ray; a surface that an origin lies on is hit at distance zero.
 
-    Args:
-        mesh: The surface; triangles are hit from both sides.
-        origins: Starts of the rays in [m], shape (N, 3), in the frame of the mesh.
-        directions: Directions of any length, shape (N, 3), or (3,) for all rays.
+    Triangles are hit from both sides. Origins are in [m], shape (N, 3), in the frame of the mesh; directions have any
+    length, shape (N, 3), or (3,) for all rays.
 
     Raises:
         ValueError: An origin or a direction is not finite, or a direction is zero.
@@ -154,9 +152,7 @@ def _passes(low: Array, high: Array, rays: Array) -> NDArray[np.bool_]:
 def line_crossings(mesh: Mesh, points: Array, directions: Array) -> Crossings:
     """All crossings of endless lines with a mesh, in the order of the lines and along each of them.
 
-    Args:
-        points: A point of each line in [m], shape (N, 3), in the frame of the mesh.
-        directions: Unit directions, shape (N, 3).
+    A line has a point in [m] and a unit direction, shape (N, 3) each, in the frame of the mesh.
     """
     triangles = mesh.vertices[mesh.faces]
     tree = _tree(mesh)
@@ -189,10 +185,9 @@ def _first_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array, be
 
 
 def _all_hits(tree: _Tree, triangles: Array, starts: Array, *, rays: Array) -> tuple[Indices, Indices, Array, Array]:
-    """Each meeting of a ray's line with a triangle, shape (K,) each.
+    """Each meeting of a ray's line with a triangle, shape (K,) each: ray, triangle, way from the start, crossing.
 
-    Returns:
-        Ray, triangle, way from the start, and how the ray crosses: below zero against the triangle's normal.
+    The last is below zero where the ray crosses against the triangle's normal.
     """
     ray, face = tree.near(starts, rays)
     corner = triangles[face] - starts[ray, None, :]

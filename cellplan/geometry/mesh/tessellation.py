@@ -10,14 +10,12 @@ from cellplan.geometry.transforms import Array
 
 
 def tessellate(shape: Solid, segments: int = 48) -> Mesh:
-    """Closed mesh round a solid; every point of the solid lies inside or on it.
+    """Closed mesh, of at least 4 sides all round, round a solid; every point of the solid lies inside or on it.
 
     Distances measured to the mesh are therefore never above the true ones; they are below by at most
     ``radius (1/cos(pi/segments)^2 - 1)``, about.
 
-    Args:
-        shape: The solid; meshes come back as they are.
-        segments: Sides round the circumference, at least 4.
+    Meshes come back as they are.
     """
     if segments < 4:
         raise ValueError(f"a round body needs at least 4 segments, got {segments}")

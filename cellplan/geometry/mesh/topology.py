@@ -45,13 +45,8 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     A crack no wider than a millionth of the largest coordinate is closed if that closes the surface; nothing else is
     moved or filled in. Closed bodies that touch stay several solids.
 
-    Args:
-        vertices: Corner points in [m], finite, shape (V, 3).
-        faces: Corner indices, in range, shape (M, 3).
-        source: File name for messages.
-
-    Raises:
-        InputError: More than half of the triangles have no area; a closed surface is in thousands of pieces.
+    Corner points are in [m], finite, shape (V, 3), corner indices in range, shape (M, 3). ``InputError`` where more
+    than half of the triangles have no area, or a closed surface is in thousands of pieces.
     """
     welded, corners, edges = _weld(vertices, faces)
     whole = corners[_has_three_corners(corners)]
@@ -82,8 +77,7 @@ def mesh_volume(mesh: Mesh) -> float:
 def _weld(vertices: Array, faces: Indices) -> tuple[Array, Indices, EdgeCount]:
     """Merge equal vertices; where that leaves open edges, those of their ends that differ by rounding only.
 
-    Returns:
-        The vertices, the corners of all triangles, and the edges of those that still have three.
+    The vertices come with the corners of all triangles, and the edges of those that still have three.
     """
     points, corners = _merge(vertices + 0.0, faces, key=vertices + 0.0)  # + 0.0 makes -0 and 0 equal
     edges = count_edges(corners[_has_three_corners(corners)])

@@ -6,11 +6,7 @@ from cellplan.model.cell.cell import Cell
 
 
 def idle_robots(cell: Cell, tasks: Collection[str]) -> tuple[str, ...]:
-    """Names of the robots that neither hold the part nor have one of some tasks, in the order of the cell.
-
-    Args:
-        tasks: Names of the tasks that are worked on in a run.
-    """
+    """Names of the robots that neither hold the part nor have one of the tasks of a run, in the order of the cell."""
     busy = {*cell.positioners, *(task.robot for task in cell.tasks if task.name in tasks)}
     return tuple(robot.name for robot in cell.robots if robot.name not in busy)
 

@@ -71,14 +71,7 @@ class JointSpline:
 
 
 def basis(shares: Array, count: int, degree: int, derivative: int = 0) -> Array:
-    """What each coefficient of a joint spline contributes at shares of the clock, shape (N, count).
-
-    Args:
-        shares: Shares of the clock in 0..1, shape (N,).
-        count: Number of coefficients.
-        degree: Degree of the polynomials.
-        derivative: How many times to differentiate by the share.
-    """
+    """What each coefficient of a joint spline contributes at shares of the clock in 0..1, shape (N, count)."""
     values = _functions(count, degree).basis(shares, derivative)
     first, last = values[:, :REPEATED].sum(axis=1), values[:, -REPEATED:].sum(axis=1)
     return np.column_stack([first, values[:, REPEATED:-REPEATED], last])

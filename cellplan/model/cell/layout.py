@@ -170,12 +170,10 @@ class LayoutSettings:
 def mirror_image(pair: Mirrored, index: int) -> tuple[float, float]:
     """How a component of the second base follows from that of the first: factor, and term in [m] or [rad].
 
+    The components are x, y, z, roll, pitch, yaw.
+
     A robot is its own mirror image in the xz plane of its base, so that only roll and yaw change their signs; in the
     world's plane yz it then stands half a turn about the vertical away.
-
-    Args:
-        pair: The bases.
-        index: The component: x, y, z, roll, pitch, yaw.
     """
     if index == pair.axis:
         return -1.0, 2.0 * pair.at

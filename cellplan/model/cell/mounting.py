@@ -60,8 +60,7 @@ class Pedestal(Column):
     def solid(self, X_WB: Array) -> tuple[Solid, Array] | None:
         """The solid below a base and its pose in the base frame B; None below a base that stands on the floor.
 
-        Args:
-            X_WB: The base in the world, shape (4, 4).
+        ``X_WB`` is the base in the world, shape (4, 4).
         """
         height = float(X_WB[2, 3]) - self.floor
         return None if height < PEDESTAL_TOL else _upright(self, X_WB, bottom=self.floor, height=height)

@@ -61,11 +61,7 @@ class Rod:
         return self.length - (end - begin)
 
     def bodies(self) -> tuple[Body, ...]:
-        """Its solids in the flange frame: the holder, if there is one, and the rod.
-
-        Raises:
-            ValueError: The rod is too short for its round ends.
-        """
+        """Its solids in the flange frame: the holder, if there is one, and the rod."""
         begin, end = self.span
         if end <= begin:
             raise ValueError(f"rod: expected a length above {self.shortest:g} m, got {self.length:g} m")

@@ -16,11 +16,7 @@ def order_faults(
 ) -> Iterator[tuple[int | None, str]]:
     """Everything that is wrong with the order of a robot: the index in it, None for the whole, and what is wrong.
 
-    Args:
-        robot: Name of the robot.
-        order: Names of tasks and marks.
-        operators: Name of the robot of every task of the cell, by task.
-        marks: Names of all marks.
+    ``operators`` has the robot of every task of the cell, by task.
     """
     robot_tasks = [task for task, operator in operators.items() if operator == robot]
     known = ", ".join([*robot_tasks, *marks]) or "none"

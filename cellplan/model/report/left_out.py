@@ -54,9 +54,7 @@ class LeftOut:
 def left_out_lines(kinds: Iterable[tuple[str, tuple[str, ...], str]], *, most: int = 3) -> list[str]:
     """One line for each kind: its pairs with their reasons, each reason once; or that every pair was checked in full.
 
-    Args:
-        kinds: Kind, bodies and reason of everything that was left out.
-        most: Pairs that are named for each reason; the others are counted.
+    At most ``most`` pairs are named for each reason; the others are counted.
     """
     grouped: dict[str, dict[str, list[str]]] = {}
     for kind, bodies, reason in kinds:

@@ -302,12 +302,7 @@ def _frozen(values: list[float]) -> Array:
 
 
 def on_rail(model: RobotModel, rail: Joint) -> RobotModel:
-    """The robot on a rail; its base frame is the one it has while the rail reads zero.
-
-    Args:
-        model: The robot with a base that does not move.
-        rail: The joint that carries the base, its axis in the base frame.
-    """
+    """The robot on a rail; its base frame is the one it has while the rail reads zero, which states its axis there."""
     return replace(
         model,
         joints=(rail, *(replace(joint, parent=joint.parent + 1) for joint in model.joints)),

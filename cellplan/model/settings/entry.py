@@ -94,9 +94,7 @@ def require_unique(words: tuple[str, ...], key: str) -> None:
 def by_kind(words: str, **kinds: type | tuple[type, ...]) -> Discriminator:
     """Choice by the kind of value: a text takes the branch tagged ``<words>``, others the branch tagged by kind.
 
-    Args:
-        words: What is allowed, in words; also the tag of the branch for texts, so that its findings can say it.
-        **kinds: Types of value by the tag of their branch, without angle brackets.
+    The words say what is allowed; they are a tag so that findings can say it. Tags of kinds come without brackets.
     """
 
     def tag(value: object) -> str | None:

@@ -97,10 +97,7 @@ def si_or_none(value: Quantity | None) -> float | None:
 def file_number(value: float, *, is_revolute: bool, within: tuple[float, float] | None = None) -> float:
     """Number of degrees or millimetres with the fewest digits that reads back to the value, or else nearly so.
 
-    Args:
-        value: In [rad] or [m].
-        is_revolute: Whether it is an angle.
-        within: Lowest and highest value that it may read back to instead.
+    The value is in [rad] or [m], and so are the lowest and highest one that it may read back to instead.
     """
     quotient = value * joint_unit(is_revolute=is_revolute).scale
     candidates = [float(f"{quotient:.{digits}g}") for digits in range(1, 18)]

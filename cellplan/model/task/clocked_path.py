@@ -200,8 +200,7 @@ def distinct(times: Array) -> Array:
 def leaves_at(task: Task, corners: Array) -> float:
     """Time in [s] at which a tool leaves the end of its path: after the delay of its process, and a dwell.
 
-    Args:
-        corners: Times in [s] at which the stretches of its path begin, and the one at which the last ends; so below.
+    Corners are times in [s] at which the stretches of its path begin, and the one at which the last ends; so below.
     """
     return float(corners[-1]) + task.off_delay + task.dwell
 

@@ -31,8 +31,7 @@ def plane_axes(plane: PlaneName) -> tuple[Array, Array, Array]:
 def outside_of(task: Task, normal: Array) -> Array:
     """Direction that a path is seen from: the side of its projection, else against the tool axis, else ``normal``.
 
-    Args:
-        normal: Normal of the plane that the path lies in, shape (3,).
+    This is the normal of the plane that the path lies in, shape (3,).
     """
     if task.project is not None:
         return task.project

@@ -28,9 +28,7 @@ def advance(law: TimeLaw, tau: Array, ramp: Array | float | None = None) -> Adva
     both ends. Trapezoid: even speeding up and slowing down, each during ``ramp`` of the time, at rest at both ends.
     Steady: likewise, with accelerations that start and end at zero.
 
-    Args:
-        tau: Shares of the time, shape (N,).
-        ramp: Share of the time that a ramp takes, one for all or shape (N,); that of the law when left out.
+    ``ramp`` is the share of the time that a ramp takes, one for all or shape (N,); None for that of the law.
     """
     share = law.ramp if ramp is None else ramp
     match law.kind:
@@ -108,11 +106,8 @@ def stand_off(times: Array, task: Task, X_PT: Array, *, V_PT_P: Array, end: floa
     An approach goes straight along the tool's axis, from rest to rest, and is over when the path starts; leaving begins
     when the path ends. Before and after that the tool rests off the part.
 
-    Args:
-        times: Times in [s], shape (N,).
-        X_PT: Reference poses, held still before the start and after the end of the path, shape (N, 4, 4).
-        V_PT_P: Reference twists, zero there, shape (N, 6).
-        end: Time in [s] at which the tool leaves the end of its path.
+    Times and ``end``, at which the tool leaves the end of its path, are in [s], shape (N,). Poses are held still before
+    the start and after the end of the path, shape (N, 4, 4), and twists are zero there, shape (N, 6).
     """
     if task.approach is not None:
         _back_off(X_PT, V_PT_P, task.start - times, distance=task.approach.distance, duration=task.approach.duration)

@@ -23,14 +23,7 @@ class HandshakeStep(NamedTuple):
 
 
 def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]:
-    """Instructions of a robot at a mark; none in a cell of one robot.
-
-    Args:
-        frame: The robots that are exported; all robots of the cell take part in the handshake.
-
-    Raises:
-        InputError: A signal is not stated in the cell.
-    """
+    """Instructions of a robot at a mark, at which all robots of the cell meet; none in a cell of one robot."""
     leader, *others = [robot.name for robot in frame.cell.robots]
     if not others:
         return ()
@@ -48,12 +41,6 @@ def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:
     """The instruction before the first motion of a program with marks: the output of the robot is lowered.
 
     A program that was aborted at a mark may have left it raised, which would release others at the next start.
-
-    Args:
-        frame: The robots that are exported, of a cell of several robots.
-
-    Raises:
-        InputError: A signal is not stated in the cell.
     """
     return next(step for step in reversed(handshake_steps(frame, robot)) if not step.waits)
 
@@ -69,11 +56,7 @@ def signals_by_key(frame: ExportFrame, robot: str) -> dict[str, str]:
 
 
 def require_signals(frame: ExportFrame, robot: str) -> None:
-    """Require every signal of a robot.
-
-    Raises:
-        InputError: Signals are not stated in the cell: all of these.
-    """
+    """Require every signal of a robot; the ``InputError`` names all that are not stated in the cell."""
     names = [robot.name for robot in frame.cell.robots]
     others = names[1:] if robot == names[0] else names[:1]
     if others:

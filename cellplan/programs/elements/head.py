@@ -10,11 +10,7 @@ HOME_DECIMALS: Final = 3
 
 
 def head_notes(job: ExportJob, robot: str) -> list[str]:
-    """Notes for the comments at the head of a robot's files, of any characters; ``text.comment`` makes lines of them.
-
-    Raises:
-        InputError: The home cannot be written.
-    """
+    """Notes for comments at the head of a robot's files, of any characters; ``text.comment`` makes lines of them."""
     placed = job.frame.robot(robot)
     zero = placed.model.controller
     known = "not stated; the zero of the model is written" if zero is None else f"known from: {zero.source}"

@@ -47,14 +47,8 @@ class Axes:
 def to_numbers(robot: Robot, q: Array, *, decimals: int, angle: Angle = Angle.DEGREES) -> Array:
     """Positions of the controller as numbers of a file, rounded, none beyond a limit when they are read back.
 
-    Args:
-        q: Positions of the model in [rad] or [m], shape (N, n).
-
-    Returns:
-        The numbers, shape (N, n), exact multiples of the last decimal but for the last bit.
-
-    Raises:
-        InputError: A position cannot be written with the decimals.
+    Positions of the model in [rad] or [m], shape (N, n), become exact multiples of the last decimal but for the last
+    bit; ``InputError`` where one cannot be written with the decimals.
     """
     joints, quantum = robot.model.joints, 10.0**decimals
     scale = np.array([1.0 if angle is Angle.RADIANS else joint.display_unit.scale for joint in joints])
@@ -111,12 +105,8 @@ def rounded_inside(joint: Joint, q: Array, decimals: int) -> Array:
 
     Each is the nearest one, unless that lies outside: 169.99996 does not become 170.0000 where the limit is 169.99999.
 
-    Args:
-        q: Positions within its limits, in [rad] or [m], shape (N,).
-        decimals: Of a degree or a millimetre.
-
-    Raises:
-        InputError: No number with so few decimals lies within the limits, or a number is too large for them.
+    The positions are in [rad] or [m], shape (N,). ``InputError`` where no number with so few decimals lies within the
+    limits, or a number is too large for them.
     """
     quanta = rounded_quanta(to_file_unit(joint, q), decimals, what=f"joint {joint.name}")
     scale = 10.0**decimals
@@ -130,11 +120,7 @@ def rounded_inside(joint: Joint, q: Array, decimals: int) -> Array:
 
 
 def rounded_quanta(values: Array, decimals: int, *, what: str) -> Array:
-    """Whole numbers of the last decimal that are nearest to the values, shape (N,).
-
-    Raises:
-        InputError: A value is not finite or too large for so many decimals.
-    """
+    """Whole numbers of the last decimal nearest to the values, shape (N,), which are finite and not too large."""
     if not np.all(np.abs(values) < LARGEST):
         raise InputError(f"{what}: expected numbers below {LARGEST:g}, got one that is too large for its decimals")
     return np.rint(values * 10.0**decimals)

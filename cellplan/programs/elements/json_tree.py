@@ -49,11 +49,7 @@ class Value:
         return _refused(self.file, self.text, self.at, expected)
 
     def members(self, keys: Collection[str]) -> "dict[str, Value]":
-        """Values of an object that has exactly these keys, in any order.
-
-        Raises:
-            InputError: It is none, or has other keys.
-        """
+        """Values of an object that has exactly these keys, in any order."""
         if not isinstance(self.content, dict):
             raise self.refused(f"an object with the keys {', '.join(keys)}")
         for key, value in self.content.items():
@@ -65,11 +61,7 @@ class Value:
         return self.content
 
     def items(self) -> "list[Value]":
-        """Values of an array.
-
-        Raises:
-            InputError: It is none.
-        """
+        """Values of an array."""
         if isinstance(self.content, tuple):
             return [Value(self.file, self.text, self.at, number) for number in self.content]
         if not isinstance(self.content, list):
@@ -77,11 +69,7 @@ class Value:
         return self.content
 
     def numbers(self, pattern: re.Pattern[str], what: str) -> tuple[Raw, ...]:
-        """Numbers of an array, each of which matches a pattern.
-
-        Raises:
-            InputError: It is no such array.
-        """
+        """Numbers of an array, each of which matches a pattern."""
         if not isinstance(self.content, tuple):
             raise self.refused(f"an array of {what}")
         for place, number in enumerate(self.content):
@@ -91,24 +79,13 @@ class Value:
         return self.content
 
     def require_texts(self) -> None:
-        """Make sure that the value is an array of texts.
-
-        Raises:
-            InputError: Something else stands here.
-        """
+        """Make sure that the value is an array of texts."""
         for value in self.items():
             if not isinstance(value.content, str) or isinstance(value.content, Raw):
                 raise value.refused("a text in quotes")
 
     def require(self, expected: Written, *, free: Collection[str] = ()) -> None:
-        """Make sure that the value is a given one.
-
-        Args:
-            free: Keys of objects whose values may be any.
-
-        Raises:
-            InputError: Something else stands here.
-        """
+        """Make sure that the value is a given one, but for the values of some keys of objects, which are free."""
         if isinstance(expected, Mapping):
             for key, value in self.members(tuple(expected)).items():
                 if key not in free:
@@ -131,11 +108,7 @@ class Value:
 
 
 def parsed(text: str, file: str) -> Value:
-    """The value that a file holds.
-
-    Raises:
-        InputError: With file and line, when it is no JSON, or a key stands twice in one object.
-    """
+    """The value that a file holds; an ``InputError`` has the line of what is no JSON, or of a key that stands twice."""
     value, at = _value(file, text, _skip(text, 0), 0)
     at = _skip(text, at)
     if at != len(text):

@@ -26,11 +26,7 @@ SLOW: Final = 10  # [%] to the first row, and throughout where no times are know
 
 
 def robots_of(frame: ExportFrame, dialect: Dialect) -> tuple[str, ...]:
-    """The exported robots whose controllers play a format, in the order of the cell.
-
-    Raises:
-        InputError: A robot has no controller, or none of the robots has one that plays the format.
-    """
+    """The exported robots whose controllers play a format, in the order of the cell; ``InputError`` without any."""
     kinds = {name: _kind(frame, name, dialect) for name in frame.robots}
     robots = tuple(name for name, kind in kinds.items() if kind in dialect.kinds)
     if not robots:
@@ -53,11 +49,7 @@ def _kind(frame: ExportFrame, robot: str, dialect: Dialect) -> str:
 
 
 def require_six_axes(robot: Robot, *, external: int, what: str) -> Axes:
-    """The axes of an arm of six, with so many others before it as a language has external axes.
-
-    Raises:
-        InputError: It has no arm, or too many axes before it.
-    """
+    """The axes of an arm of six, with at most so many others before it as a language has external axes."""
     axes, count = Axes.of(robot), len(robot.model.joints)
     if not axes.arm:
         raise InputError(
@@ -86,9 +78,6 @@ def program_paths(frame: ExportFrame, dialect: Dialect, rules: ProgramNames) -> 
     """Path of each program by its name and robot, without an ending: ``alpha``, or ``alpha/weld`` of several programs.
 
     The last part may become longer by the ending of a page.
-
-    Raises:
-        InputError: A robot has no controller, or none that plays the format.
     """
     robots = robots_of(frame, dialect)
     if len(frame.programs) == 1:
@@ -116,11 +105,7 @@ def _page_names(names: Iterable[str], rules: ProgramNames) -> dict[str, str]:
 
 
 def pages_of(count: int, frame: ExportFrame, dialect: Dialect) -> list[range]:
-    """Rows of each page: as many as fit into each but the last one, the same for all robots of equally many rows.
-
-    Raises:
-        InputError: There are too many pages for three digits.
-    """
+    """Rows of each of up to 999 pages: as many as fit into all but the last, the same for equally many rows."""
     size = frame.split or dialect.split or max(count, 1)
     pages = [range(first, min(first + size, count)) for first in range(0, count, size)]
     if len(pages) > MOST_PAGES:
@@ -165,12 +150,7 @@ def render_programs(
 ) -> dict[str, str]:
     """Text of every file by its path, from the files of each robot in a program; each may keep other rows.
 
-    Args:
-        paths: Path of each program, by its name and robot.
-
-    Raises:
-        InputError: The robots do not meet at equally many marks, one of them has no row, or a position cannot be
-            written with the decimals.
+    ``InputError`` where robots do not meet at equally many marks, one has no row, or a position cannot be written.
     """
     robots, files = list(dict.fromkeys(robot for _, robot in paths)), dict[str, str]()
     for program in job.programs:
@@ -210,8 +190,7 @@ def _shares(shares: Array, numbers: Array, pages: Iterable[range]) -> Array:
 
     Rows that stand on a neighbour are no corner that could be rounded.
 
-    Args:
-        numbers: Positions as they are written, shape (N, n).
+    ``numbers`` are the positions as they are written, shape (N, n).
     """
     flags = np.ones(len(shares), dtype=bool)
     flags[[page[-1] for page in pages]] = False
@@ -231,12 +210,7 @@ def read_programs(
 ) -> tuple[ProgramRows, ...]:
     """Programs as a reader finds them, which takes the files of each robot out of those that are left.
 
-    Args:
-        paths: Path of each program, by its name and robot.
-        ending: Of the file that is named when robots have different numbers of marks.
-
-    Raises:
-        InputError: They have, or a file is one too many.
+    Robots have equally many marks, else the file with this ending is named; no file may be left.
     """
     programs: dict[str | None, dict[str, RobotRows]] = {program: {} for program in frame.programs}
     left = dict(files)

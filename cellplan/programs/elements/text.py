@@ -26,12 +26,7 @@ def ascii_text(text: str) -> str:
 
 
 def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
-    """Comment lines of a note, each with the sign of a comment before it.
-
-    Args:
-        sign: What begins a comment: ``;`` or ``!``.
-        forbidden: Characters that may not stand in one, which become question marks.
-    """
+    """Comment lines of a note behind a sign such as ``;``; forbidden characters become question marks."""
     words = [re.sub(f"[{re.escape(forbidden)}]", "?", word) if forbidden else word for word in ascii_text(note).split()]
     lines = [""]
     for word in words:
@@ -44,9 +39,7 @@ def comment(note: str, sign: str, *, forbidden: str = "") -> list[str]:
 def safe_names(names: Iterable[str], *, longest: int, reserved: Collection[str] = ()) -> dict[str, str]:
     """Names that a controller takes, by the name in the cell: letters, digits and underscores, unique without case.
 
-    Args:
-        names: Names in the cell, in their order: the same names always give the same result.
-        reserved: Words of the language, in any case.
+    The order of the names decides, and words of the language, in any case, are reserved.
     """
     taken = {word.lower() for word in reserved}
     chosen: dict[str, str] = {}
@@ -82,11 +75,7 @@ class Statement(NamedTuple):
         return line_error(self.file, self.line, expected, self.text if got is None else got)
 
     def read_by(self, patterns: Mapping[str, re.Pattern[str]]) -> "Statement":
-        """The same with its kind and words.
-
-        Raises:
-            InputError: It follows none of the patterns.
-        """
+        """The same with its kind and words, by the one of the patterns that it follows."""
         for kind, pattern in patterns.items():
             if match := pattern.fullmatch(self.text):
                 return self._replace(kind=kind, words=match.groups())
@@ -94,11 +83,7 @@ class Statement(NamedTuple):
 
 
 def split_lines(text: str, file: str) -> list[str]:
-    """Lines without their ends, which are all like the first one; what follows the last one comes last.
-
-    Raises:
-        InputError: With file and line, where a line ends otherwise.
-    """
+    """Lines without their ends, which must all be like the first one; what follows the last one comes last."""
     parts = text.split("\n")
     crossed = [part.endswith("\r") for part in parts[:-1]]
     for number, (part, is_crossed) in enumerate(zip(parts[:-1], crossed, strict=True), start=1):
@@ -110,20 +95,12 @@ def split_lines(text: str, file: str) -> list[str]:
 
 
 def line_error(file: str, line: int, expected: str, got: str) -> InputError:
-    """The error that a line of a file holds something else.
-
-    Args:
-        got: What stands there, of which the first characters are shown.
-    """
+    """The error that a line of a file holds something else; of what it holds the first characters are shown."""
     return mismatch_error(file, line, expected, repr(got[:60]))
 
 
 def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputError:
-    """The error that something else was found at a line of a file.
-
-    Args:
-        actual: What is there, in words.
-    """
+    """The error that something else, in words, was found at a line of a file."""
     return InputError(f"{file}:{line}: expected {expected}, got {actual}")
 
 
@@ -133,11 +110,7 @@ def truncated_error(file: str, line: int, expected: str) -> InputError:
 
 
 def lines_of(text: str, file: str) -> list[str]:
-    """Lines of a text of printable ASCII characters whose last line is ended, with one kind of line end.
-
-    Raises:
-        InputError: With file and line, when it is no such text.
-    """
+    """Lines of a text of printable ASCII characters whose last line is ended, with one kind of line end."""
     if not text.endswith("\n"):
         raise truncated_error(file, 1 + text.count("\n"), "an ended last line")
     end = "\r\n" if text.endswith("\r\n") else "\n"

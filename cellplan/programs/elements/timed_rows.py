@@ -35,11 +35,7 @@ def cycle_of(robot: Robot) -> float:
 
 
 def times_of(rows: RobotRows) -> Array:
-    """Times of rows in [s], shape (N,), from 0 and rising.
-
-    Raises:
-        InputError: They have none, or others.
-    """
+    """Times of rows in [s], shape (N,), which must be there, begin at 0 and rise."""
     times = rows.times
     if times is None:
         raise InputError(f"robot '{rows.robot}': expected rows with times, got none")
@@ -51,11 +47,7 @@ def times_of(rows: RobotRows) -> Array:
 
 
 def nanoseconds(times: Array, *, robot: str) -> list[int]:
-    """Times in [s], shape (N,), as whole nanoseconds that rise.
-
-    Raises:
-        InputError: Two times are the same nanosecond.
-    """
+    """Times in [s], shape (N,), as whole nanoseconds, no two of which may be the same."""
     whole = [round(time * NANO) for time in times.tolist()]
     if any(late <= early for early, late in pairwise(whole)):
         raise InputError(f"robot '{robot}': expected rows that are a nanosecond apart or more")
@@ -63,11 +55,7 @@ def nanoseconds(times: Array, *, robot: str) -> list[int]:
 
 
 def shared_clock(program: ProgramRows, robots: Collection[str]) -> Array:
-    """The one clock of some robots in a program in [s], shape (N,).
-
-    Raises:
-        InputError: They have different ones.
-    """
+    """The one clock of some robots in a program in [s], shape (N,); ``InputError`` where they have several."""
     first, *others = robots
     clock = times_of(program.robots[first])
     for name in others:
@@ -93,11 +81,7 @@ def are_within(sigma: Array, stretches: Iterable[Interval]) -> Flags:
 
 
 def require_paths(files: Mapping[str, str], expected: Collection[str]) -> None:
-    """Make sure that an export holds exactly some files.
-
-    Raises:
-        InputError: One is missing, or there is another one.
-    """
+    """Make sure that an export holds exactly some files."""
     missing = sorted(set(expected) - set(files))
     if missing:
         raise InputError(f"{missing[0]}:1: expected a file of the export, got none")

@@ -77,11 +77,7 @@ class Choice:
 def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tuple[str, ...]:
     """Names of the robots that a format writes, in the order of the cell.
 
-    Args:
-        chosen: Names of the robots that are asked for; empty for all whose controller plays the format.
-
-    Raises:
-        InputError: There is no such robot, or no controller that plays the format.
+    Without a choice these are all whose controller plays it; ``InputError`` where there is none, or no such robot.
     """
     names = [robot.name for robot in cell.robots]
     for name in chosen:

@@ -54,10 +54,7 @@ class PreparedExport:
 def prepare(
     run: VerifiedRun, dialect: Dialect, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
 ) -> PreparedExport:
-    """Choose promise, marks and rows of an export.
-
-    Args:
-        shared: What exports of the run share; None for this one only.
+    """Choose promise, marks and rows of an export; ``shared`` is None for one export only.
 
     Raises:
         InputError: The format cannot write this, or something is not stated in the cell.

@@ -49,22 +49,14 @@ EXPORTERS: Final[Mapping[str, Dialect | Exporter]] = ChainMap(TABLES, DIALECTS) 
 
 
 def require_format(name: str) -> None:
-    """Refuse a format that does not exist.
-
-    Raises:
-        InputError: There is none of that name.
-    """
+    """Refuse a format that does not exist."""
     if name not in EXPORTERS:
         hint = did_you_mean(name, EXPORTERS)
         raise InputError(f"--format: expected one of {listed(EXPORTERS)}, got '{name}'{hint}")
 
 
 def refuse_choice(form: str, choice: Choice) -> None:
-    """Refuse what a format cannot do whatever the run; call it early, before any long work.
-
-    Raises:
-        InputError: It cannot.
-    """
+    """Refuse what a format cannot do whatever the run; call it early, before any long work."""
     dialect = EXPORTERS[form]
     if isinstance(dialect, Dialect):
         choice.refuse_for(dialect)
@@ -78,11 +70,7 @@ def default_folder(run: Path, form: str) -> Path:
 
 
 def refuse_unless_exportable(folder: Path, run: Path) -> None:
-    """Refuse a place that programs must not be written to; call it early, before any long work.
-
-    Raises:
-        InputError: The place is part of the run, holds the run, or holds something else than an export.
-    """
+    """Refuse what is part of the run, holds it, or holds anything but an export; call it before any long work."""
     place, source = folder.resolve(), run.resolve()
     inside = place.relative_to(source).parts if place.is_relative_to(source) else None
     if source.is_relative_to(place) or (inside is not None and (len(inside) < 2 or inside[0] != PROGRAMS)):
@@ -128,11 +116,7 @@ def export_program(
 
 
 def write_export(folder: Path, files: Mapping[str, str], record: Record) -> None:
-    """Write the files of an export and its record; the folder appears whole or not at all.
-
-    Raises:
-        InputError: The folder cannot be written.
-    """
+    """Write the files of an export and its record; the folder appears whole or not at all."""
     with RunFolder(folder) as target:
         target.write_text(EXPORT, record_text(record))
         for name, text in files.items():
@@ -142,10 +126,7 @@ def write_export(folder: Path, files: Mapping[str, str], record: Record) -> None
 def exported(
     run: VerifiedRun, form: str, choice: Choice, *, shared: Shared | None = None, progress: Progress = silent
 ) -> tuple[dict[str, str], Record]:
-    """The files of an export and its record, after all checks were made on what is read from them.
-
-    Args:
-        shared: What exports of the run share; None for this one only.
+    """The files of an export and its record, after all checks on what is read from them; ``shared`` may be None.
 
     Raises:
         InputError: The format cannot hold what was chosen, or something is not stated in the cell.

@@ -49,14 +49,7 @@ class Exported:
 
 
 def chosen_formats(formats: Sequence[str]) -> dict[str, bool]:
-    """Formats that are meant, and whether each was asked for by its name: ``all`` stands for every one there is.
-
-    Args:
-        formats: Names of formats, or ``all``.
-
-    Raises:
-        InputError: There is no format of a name, or none is asked for.
-    """
+    """Formats that are meant, ``all`` for every one, and whether each was asked for by its name; at least one."""
     if not formats:
         raise InputError(f"--format: expected {ALL}, or one or more of {listed(EXPORTERS)}, got none")
     for name in formats:
@@ -117,11 +110,7 @@ class NothingFitsError(NotVerifiedError):
 
 
 def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, *, folder: Path) -> None:
-    """Refuse an export of which none of the formats can be, as the files of the run say already.
-
-    Args:
-        formats: Names of formats, and whether each was asked for by its name.
-        folder: Where the folders of the formats would go.
+    """Refuse an export to a folder of which, as the files of the run say already, none of the formats can be.
 
     Raises:
         InputError: There is no such robot; or the only format needs something that is not stated, or does not fit.
@@ -145,11 +134,7 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
 
 
 def refuse_unless_writable(folders: Iterable[Path], run: Path) -> None:
-    """Refuse places that programs must not be written to; call it early, before any long work.
-
-    Raises:
-        InputError: One is part of the run, holds the run, or holds something else than an export.
-    """
+    """Refuse places in or around the run, or with something else than an export; call it before any long work."""
     for folder in folders:
         refuse_unless_exportable(folder, run)
 

@@ -42,20 +42,12 @@ class StoredExport:
 
     @property
     def promise(self) -> Promise:
-        """What is promised, as the record says.
-
-        Raises:
-            InputError: It is no promise.
-        """
+        """What is promised, as the record says."""
         return self._one_of("promise", Promise)
 
     @property
     def choice(self) -> Choice:
-        """What was chosen, as the record says.
-
-        Raises:
-            InputError: It says something else than a choice.
-        """
+        """What was chosen, as the record says."""
         robots = required(self.record, "robots", list, file=self.where)
         thinning, split = self.record.get("thinning"), self.record.get("split")
         if split is not None:
@@ -105,11 +97,7 @@ def is_export(folder: Path) -> bool:
 
 
 def run_of_export(folder: Path) -> Path:
-    """The run folder around a folder of programs.
-
-    Raises:
-        InputError: There is none.
-    """
+    """The run folder around a folder of programs; ``InputError`` where there is none."""
     for above in folder.resolve().parents:
         if (above / MANIFEST).is_file():
             try:
@@ -120,11 +108,7 @@ def run_of_export(folder: Path) -> Path:
 
 
 def read_stored_export(folder: Path) -> StoredExport:
-    """Read a folder of programs: its record, and every file that this lists.
-
-    Raises:
-        InputError: With the file, when one is missing, one too many, or no text; the record is none of this version.
-    """
+    """Read a folder of programs: its record, which is of this version, and exactly the texts that this lists."""
     where = str(folder / EXPORT)
     record = parse_json(read_regular_file(folder / EXPORT, file=where, limit=SIZE_LIMIT), where)
     if record.get("schema") != SCHEMA:
@@ -141,11 +125,7 @@ def read_stored_export(folder: Path) -> StoredExport:
 
 
 def refuse_other_run(stored: StoredExport, run: VerifiedRun | ReadRun) -> None:
-    """Refuse a run that the programs were not made from.
-
-    Raises:
-        InputError: It is another one.
-    """
+    """Refuse a run that the programs were not made from."""
     if stored.record["run"] != run.digest:
         raise InputError(
             f"{stored.where}: run: expected {run.digest[:12]}… as of '{run.folder}', got "
@@ -175,11 +155,7 @@ def _entries(folder: Path, names: Mapping[str, Any]) -> Iterator[InputError]:
 
 
 def _text(folder: Path, name: str) -> str:
-    """A program as text.
-
-    Raises:
-        InputError: With the line, when it is no text in UTF-8.
-    """
+    """A program as text; the ``InputError`` has the line of what is not UTF-8."""
     data = read_regular_file(folder / name, file=str(folder / name), limit=FILE_LIMIT)
     try:
         return data.decode("utf-8")

@@ -40,11 +40,6 @@ def verify_export(stored: StoredExport, run: VerifiedRun, *, progress: Progress 
     A text that is no program of its format is refused with its line, one that was changed otherwise by its digest. With
     digests that fit, every check is made on what the texts hold; and the texts must be those that the run gives.
 
-    Args:
-        stored: The programs as they lie on disk.
-        run: The run that they were made from.
-        progress: Called with the stage and the fraction done.
-
     Raises:
         InputError: A file was changed, or is none of its format; the programs belong to another run.
         NotVerifiedError: A check fails on what the files hold.
@@ -72,12 +67,7 @@ def verify_export(stored: StoredExport, run: VerifiedRun, *, progress: Progress 
 def _made_again(
     stored: StoredExport, run: VerifiedRun, choice: Choice, *, read: Any, progress: Progress = silent
 ) -> tuple[Mapping[str, str], Mapping[str, Any]]:
-    """The files and the record that the run gives, after all checks were made on what was read.
-
-    Raises:
-        InputError: The run cannot be exported so, or what was read is no program of its rows.
-        NotVerifiedError: A check fails.
-    """
+    """The files and the record that the run gives, after all checks were made on what was read."""
     dialect = EXPORTERS[stored.form]
     try:
         if isinstance(dialect, Dialect):
@@ -95,11 +85,7 @@ def _made_again(
 
 
 def _read(stored: StoredExport, run: VerifiedRun, choice: Choice) -> Any:
-    """What the reader of the format finds in the files.
-
-    Raises:
-        InputError: With file and line, where a text is none of the format.
-    """
+    """What the reader of the format finds in the files."""
     dialect = EXPORTERS[stored.form]
     try:
         if not isinstance(dialect, Dialect):

@@ -52,22 +52,14 @@ def with_notes(run: VerifiedRun, prepared: PreparedExport, judgement: Judgement)
 
 
 def read_files(prepared: PreparedExport, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """What the reader of the format finds in files.
-
-    Raises:
-        InputError: With file and line, where a text is none of this format.
-    """
+    """What the reader of the format finds in files; an ``InputError`` has file and line."""
     return prepared.dialect.read(prepared.job.frame, files)
 
 
 def judged(
     run: VerifiedRun, prepared: PreparedExport, read: tuple[ProgramRows, ...], *, progress: Progress = silent
 ) -> Judgement:
-    """Make all checks on what was read.
-
-    Raises:
-        NotVerifiedError: A check fails.
-    """
+    """Make all checks on what was read; ``NotVerifiedError`` where one fails."""
     if prepared.job.frame.targets is Targets.PART:
         read = joints_of_part_poses(prepared.job.frame, prepared.job.programs, read)
     progress(STAGE, 0.0)

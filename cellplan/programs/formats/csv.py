@@ -24,9 +24,6 @@ def render_csv(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.csv``, or ``<task>/<robot>.csv``.
 
     A program from home to home is one file for each robot.
-
-    Raises:
-        InputError: A joint or a time cannot be written with the decimals of the format.
     """
     return {
         file_path(program.name, f"{name}.csv"): _render(job.frame.robot(name), program.robots[name])
@@ -36,11 +33,7 @@ def render_csv(job: ExportJob) -> dict[str, str]:
 
 
 def read_csv(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly: the rows of each program.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file; a file is missing, or is one too many.
-    """
+    """Read the files of an export back, strictly: the rows of each program; an ``InputError`` has file and line."""
     paths = {file_path(name, f"{robot}.csv"): (name, robot) for name in frame.programs for robot in frame.robots}
     refuse_other_files(files, paths)
     tables = {paths[path]: _table_of_program(frame.robot(paths[path][1]), files[path], path) for path in paths}
@@ -54,11 +47,7 @@ def read_csv(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows,
 
 
 def refuse_other_files(files: Mapping[str, str], expected: Mapping[str, object]) -> None:
-    """Refuse files that a format does not write, and those that are missing.
-
-    Raises:
-        InputError: There is such a file.
-    """
+    """Refuse files that a format does not write, and those that are missing."""
     for name in files:
         if name not in expected:
             raise InputError(f"{name}: expected no such file among the programs")
@@ -68,23 +57,12 @@ def refuse_other_files(files: Mapping[str, str], expected: Mapping[str, object])
 
 
 def time_fields(times: Array) -> list[str]:
-    """Times of rows in [s], shape (N,), as fields of a row.
-
-    Raises:
-        InputError: A time is too large for the decimals of the format.
-    """
+    """Times of rows in [s], shape (N,), as fields of a row; ``InputError`` beyond the decimals of the format."""
     return _fields(rounded_quanta(times, DECIMALS, what=CLOCK) / 10.0**DECIMALS)
 
 
 def joint_fields(robot: Robot, q: Array) -> dict[str, list[str]]:
-    """Positions of the joints of a robot as fields of rows, by the name of their column, none beyond a limit.
-
-    Args:
-        q: Its joint positions in [rad] or [m], shape (N, n).
-
-    Raises:
-        InputError: A position cannot be written with the decimals of the format.
-    """
+    """Joint positions in [rad] or [m], shape (N, n), as fields of rows by column, none beyond a limit."""
     return {
         f"{joint.name}_{joint.display_unit.name}": _fields(rounded_inside(joint, q[:, index], DECIMALS))
         for index, joint in enumerate(robot.model.joints)
@@ -108,11 +86,7 @@ def _names(robot: Robot) -> str:
 
 
 def read_table(robot: Robot, text: str, file: str) -> JointTable:
-    """Read the file of one robot, strictly.
-
-    Raises:
-        InputError: With file and line, when the text is not such a file.
-    """
+    """Read the file of one robot, strictly; an ``InputError`` has file and line."""
     names, _, rest = text.partition("\n")
     if names != _names(robot):
         raise InputError(f"{file}:1: expected the names '{_names(robot)}', got {names[:80]!r}")

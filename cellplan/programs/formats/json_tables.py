@@ -28,20 +28,12 @@ _FLAG: Final = re.compile("[01]")
 
 
 def render_json(job: ExportJob) -> dict[str, str]:
-    """Text of every file, by its path in the folder of the export: ``program.json``, or ``<task>/program.json``.
-
-    Raises:
-        InputError: A number cannot be written with nine decimals, or robots have different clocks.
-    """
+    """Text of every file, by its path: ``program.json``, or ``<task>/program.json``; all robots have one clock."""
     return {file_path(program.name, FILE): _document(job, program) for program in job.programs}
 
 
 def read_json(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly; spaces and line breaks between values may be others.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file.
-    """
+    """Read files back, strictly but for spaces and line breaks between values; an ``InputError`` has file and line."""
     paths = {name: file_path(name, FILE) for name in frame.programs}
     require_paths(files, tuple(paths.values()))
     return tuple(_program(frame, name, files[path], path) for name, path in paths.items())

@@ -92,14 +92,10 @@ class WideRows:
         return self.spread(lambda phase: phase.report.q[robot], width=len(self.cell.robot(robot).model.joints))
 
     def spread(self, values_of: Callable[[PhaseRows], Array | None], *, width: int | None = None) -> Array:
-        """Values of all rows from those of each phase, not a number where there is none.
+        """Values of all rows, shape (N,) or (N, width), from those of each phase, NaN where there is none.
 
-        Args:
-            values_of: Values of a phase in its n rows, or in its n - 1 steps; None where it has none.
-            width: Number of values in each row; None for plain numbers.
-
-        Returns:
-            The values, shape (N,), or (N, width).
+        A phase of n rows gives a value or ``width`` values for each row, or for each of its n - 1 steps; None where it
+        has none.
         """
         column = np.full((len(self.times), *([] if width is None else [width])), np.nan)
         for phase in self.phases:
@@ -111,11 +107,7 @@ class WideRows:
 
 
 def wide_columns(program: WideRows) -> Columns:
-    """The columns of the wide table by name, in the units of the names.
-
-    Raises:
-        InputError: Two columns would have the same name.
-    """
+    """The columns of the wide table by name, no two of the same, in the units of the names."""
     robots, tasks = program.cell.robots, program.tasks
     groups: list[Mapping[str, Column]] = [{TIME: program.times}]
     groups += [joint_columns(robot, program.positions(robot.name)) for robot in robots]
@@ -134,11 +126,7 @@ def wide_columns(program: WideRows) -> Columns:
 
 
 def joint_columns(robot: Robot, q: Array) -> dict[str, Array]:
-    """Positions of the joints of a robot by the name of their column.
-
-    Args:
-        q: Its joint positions in [rad] or [m], shape (N, n).
-    """
+    """Joint positions of a robot in [rad] or [m], shape (N, n), by the name of their column."""
     return {
         f"{robot.name}.{joint.name}_{joint.display_unit.name}": joint.display_unit.scale * values
         for joint, values in zip(robot.model.joints, q.T, strict=True)
@@ -221,11 +209,7 @@ def file_name(program: str | None) -> str:
 
 
 def render_wide(program: WideRows) -> str:
-    """Text of the table.
-
-    Raises:
-        InputError: A joint cannot be written with the decimals of the format, or two columns have the same name.
-    """
+    """Text of the table; ``InputError`` where a joint cannot be written with the decimals of the format."""
     exact = {TIME: time_fields(program.times)}
     for robot in program.cell.robots:
         robot_fields = joint_fields(robot, program.positions(robot.name))
@@ -236,11 +220,7 @@ def render_wide(program: WideRows) -> str:
 
 
 def read_wide(cell: Cell, text: str, file: str) -> dict[str, JointTable]:
-    """Read times and joint positions of a table back, strictly, by robot.
-
-    Raises:
-        InputError: With file and line, when the text is not such a table.
-    """
+    """Read times and joint positions of a table back, strictly, by robot; an ``InputError`` has file and line."""
     if "\r" in text:
         raise InputError(
             f"{file}:{1 + text.count(chr(10), 0, text.index(chr(13)))}: expected line breaks without '\\r'"

@@ -19,13 +19,11 @@ STANDS: Final = 1e-9  # [rad] or [m] axes that move less in a segment do not cou
 
 
 def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
-    """How far the tool is from each row in [m] when a share of the segment before or after it is left, shape (N,).
+    """Distance of the tool from each row in [m] when a share of the segment before or after it is left, shape (N,).
 
     It is the smaller one of both; zero at both ends.
 
-    Args:
-        q: Its rows in [rad] or [m], shape (N, n).
-        shares: Of the segments, 0 to 0.5, shape (N,).
+    Rows ``q`` are in [rad] or [m], shape (N, n), shares 0 to 0.5, shape (N,).
     """
     zones = np.zeros(len(q))
     if len(q) > 2:
@@ -35,10 +33,9 @@ def tool_zones(robot: Robot, q: Array, shares: Array) -> Array:
 
 
 def tool_tips(robot: Robot, q: Array) -> Array:
-    """Tool tip in the base frame in [m], shape (N, 3): the product of exponentials of all axes down to the flange.
+    """Tool tip in the base frame in [m], shape (N, 3), of positions of the model in [rad] or [m], shape (N, n).
 
-    Args:
-        q: Positions of the model in [rad] or [m], shape (N, n).
+    It is the product of exponentials of all axes down to the flange.
     """
     model = robot.model
     p = np.broadcast_to((model.X_BF @ robot.tool.X_FT)[:3, 3], (len(q), 3))
@@ -63,9 +60,7 @@ def on_scale(sizes: Array, scale: Sequence[int]) -> NDArray[np.int_]:
 def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
     """Largest share of the segments of a row within which the tool is nearer to it than a zone, 0 to 0.5, shape (N,).
 
-    Args:
-        q: Its rows in [rad] or [m], shape (N, n).
-        zones: Sizes in [m], 0 for a stop, shape (N,).
+    Rows ``q`` are in [rad] or [m], shape (N, n); zones in [m], 0 for a stop, shape (N,).
     """
     shares = np.zeros(len(q))
     rows = np.flatnonzero(zones > 0.0)
@@ -84,9 +79,7 @@ def tool_shares(robot: Robot, q: Array, zones: Array) -> Array:
 def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
     """Share of the way of the axis that moves most in the shorter segment of a row, in [deg] or [mm], shape (N,).
 
-    Args:
-        q: Its rows in [rad] or [m], shape (N, n).
-        share: Of the segments, 0 to 0.5, of all rows or of each, shape (N,).
+    Rows ``q`` are in [rad] or [m], shape (N, n); shares 0 to 0.5, of all rows or of each, shape (N,).
     """
     travels = _axis_travels(robot, q)
     zones: Array = share * np.min(np.max(np.where(np.isfinite(travels), travels, 0.0), axis=2), axis=0)
@@ -96,10 +89,7 @@ def axis_zones(robot: Robot, q: Array, share: Array | float) -> Array:
 def axis_shares(robot: Robot, q: Array, turns: Array, slides: Array) -> Array:
     """Largest share of its segments in which an axis is nearer to a row than a zone, 0 to 0.5, shape (N,).
 
-    Args:
-        q: Its rows in [rad] or [m], shape (N, n).
-        turns: Zones of turning axes in [deg], shape (N,).
-        slides: Zones of sliding axes in [mm], shape (N,).
+    Rows ``q`` are in [rad] or [m], shape (N, n); zones in [deg] of turning and in [mm] of sliding axes, shape (N,).
     """
     zones = np.stack([turns if joint.is_revolute else slides for joint in robot.model.joints], axis=1)
     with np.errstate(over="ignore"):

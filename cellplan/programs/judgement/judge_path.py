@@ -241,12 +241,7 @@ def schedule_at(schedule: Schedule, times: Array) -> Schedule:
 
     Times after the end of the phase have the poses of its end.
 
-    Args:
-        schedule: The tasks at the rows of a run, on the phase's own time.
-        times: Times in [s], increasing from 0, shape (M,), M at least 2.
-
-    Raises:
-        ValueError: The poses of a task are known at its rows only.
+    Times are in [s], increasing from 0, shape (M,), M at least 2.
     """
     if not schedule.is_continuous:
         raise ValueError("schedule: expected paths that are known between the rows of a run too")

@@ -43,12 +43,7 @@ def position_findings(played: ExecutedProgram) -> Iterator[str]:
 
 
 def joint_findings(played: ExecutedProgram, *, accelerations: bool) -> Iterator[str]:
-    """Speeds beyond the limits of a joint, and accelerations where they are what a controller plays.
-
-    Args:
-        accelerations: Whether accelerations and jerk count too: not where a controller rounds its rows or plans its
-            own profile between them.
-    """
+    """Speeds beyond the limits of a joint; accelerations and jerk too where a controller plays its rows as they are."""
     jumps = _jumps(played)
     for name in played.exported:
         robot = played.run.cell.robot(name)

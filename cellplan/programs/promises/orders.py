@@ -70,8 +70,7 @@ class Orders:
 def certified_orders(run: VerifiedRun, *, progress: Progress = silent) -> tuple[Orders, ...]:
     """Marks of every program of a run, between which every order of the robots is certified.
 
-    Raises:
-        NotVerifiedError: With the robots, the phase and the distance where marks do not suffice.
+    A ``NotVerifiedError`` has the robots, the phase and the distance where marks do not suffice.
     """
     scenes, orders = scenes_of(run), []
     for program in run_programs(run):
@@ -106,9 +105,7 @@ def certify_written(
 ) -> Iterator[str]:
     """Certify every order once more on rows that were read: findings, one for each pair that is not clear.
 
-    Args:
-        run: The run, whose rows are those of robots that are not exported.
-        corners: How far each robot may be off at its rows by rounding, see ``margins.robot_corners``, by program.
+    Robots that are not exported have the rows of the run. Corners are those of ``margins.robot_corners``, by program.
     """
     for order, rows, off in zip(orders, read, corners, strict=True):
         for name, robot_rows in rows.robots.items():
@@ -123,9 +120,8 @@ def blocked_orders(
 ) -> Iterator[tuple[int, str]]:
     """Places of the stretches of a program in which a pair is not clear in every order, with what is not.
 
-    Args:
-        run: The run, whose rows are those of robots that are not exported.
-        corners: How far each robot may be off at its rows by rounding, in [rad] or [m], shape (N, n), by robot.
+    Robots that are not exported have the rows of the run. Corners say how far each robot may be off at its rows by
+    rounding, in [rad] or [m], shape (N, n).
     """
     scenes = scenes_of(run)
     program = next(program for program in run_programs(run) if program.name == orders.program)
@@ -151,11 +147,7 @@ class PhaseSearch:
     """The search for the marks of one phase."""
 
     def __init__(self, cell: Cell, scene: Scene, program: RunProgram, phase: RunPhase) -> None:
-        """Take the rows of a phase.
-
-        Args:
-            scene: Its scene while the tasks of the phase are worked on.
-        """
+        """Take the rows of a phase, and the scene while its tasks are worked on."""
         self._scene, self._phase = scene, phase
         self._times = program.times[phase.first : phase.last + 1]
         rows = program.q[phase.first : phase.last + 1]
@@ -194,8 +186,7 @@ class PhaseSearch:
 
         A rectangle within one that is clear is clear: the row is found by bisection.
 
-        Raises:
-            NotVerifiedError: There is none.
+        ``NotVerifiedError`` where there is none.
         """
         rows = [row for row in self._free if row > first]
         low, high = 0, len(rows)  # all before low are clear, none from high on is known to be

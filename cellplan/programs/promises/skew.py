@@ -61,11 +61,7 @@ class RunSkew:
 
 
 def run_skew(run: VerifiedRun) -> RunSkew | None:
-    """How far the starts of the controllers of a run may be apart, the ends of its phases included.
-
-    Returns:
-        None where its cell states no two controllers.
-    """
+    """How far the starts of controllers may be apart, ends of phases included; None where a cell states no two."""
     least: dict[tuple[str, str], ClockPair] = {}
     for motion in run.motions:
         for pair in () if motion.report.skew is None else motion.report.skew.pairs:

@@ -86,12 +86,7 @@ def row_velocities(times: Array, q: Array, *, rests: Flags, lower: Array, upper:
     The central difference of uneven rows is the derivative of the parabola through three of them. Where the curve
     would pass a limit between two rows that keep it, the speeds at both are lowered until it is monotone there.
 
-    Args:
-        times: Times in [s], shape (N,), N at least 2.
-        q: Positions in [rad] or [m], shape (N, n).
-        rests: Rows at which the robot rests, shape (N,).
-        lower: Lower limits of the joints, shape (n,).
-        upper: Upper limits, shape (n,).
+    Times are in [s], shape (N,), N at least 2; positions in [rad] or [m], shape (N, n); limits have the shape (n,).
     """
     h = np.diff(times)[:, None]
     s = np.diff(q, axis=0) / h

@@ -35,10 +35,9 @@ SHORTEST: Final = 1e-6  # [s] between two rows
 
 
 def corner_vectors(rows: RobotRows, shares: Array) -> Array:
-    """How far a robot may be off at each of its rows by rounding, with sign, in [rad] or [m], shape (N, n).
+    """Signed distance of a robot from each of its rows by rounding, in [rad] or [m], shape (N, n).
 
-    Args:
-        shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
+    Each row is rounded within a share of the shorter neighbouring segment, shape (N,).
     """
     vectors = np.zeros_like(rows.q)
     h = np.maximum(np.diff(times_of(rows)), SHORTEST)
@@ -49,13 +48,11 @@ def corner_vectors(rows: RobotRows, shares: Array) -> Array:
 
 
 def corners_at(rows: RobotRows, shares: Array, times: Array) -> Array:
-    """How far a robot may be off at some times by rounding, with sign, in [rad] or [m], shape (M, n).
+    """Signed distance of a robot from its rows at times in [s], shape (M,), by rounding, in [rad] or [m].
 
     It may be off by any share of that, and falls evenly from each row to where its rounding begins and ends.
 
-    Args:
-        shares: Of the shorter neighbouring segment within which each row is rounded, shape (N,).
-        times: Times in [s], shape (M,).
+    The result has the shape (M, n). Each row is rounded within a share of the shorter neighbouring segment, shape (N,).
     """
     marks, largest = times_of(rows), corner_vectors(rows, shares)
     step = np.clip(np.searchsorted(marks, times, side="right") - 1, 0, len(marks) - 2)
@@ -89,8 +86,7 @@ def robot_corners(played: ExecutedProgram) -> dict[str, Array]:
 def off_chords(played: ExecutedProgram, times: Array) -> Array:
     """How far joints that run a cubic may be off straight motion between times, in [rad] or [m], shape (M - 1, nq).
 
-    Args:
-        times: Times in [s] that hold all its rows within them, shape (M,).
+    The times are in [s], shape (M,), and hold all its rows within them.
     """
     off = []
     for robot in played.run.cell.robots:
@@ -114,8 +110,7 @@ def in_steps(corners: Array) -> Array:
 def tool_margins(arms: LeverArms, scene: Scene, relation: Relation, off: Array) -> Array:
     """No tool point moves on the part by more in [m], nor turns by more in [rad], in each step, shape (M, 2).
 
-    Args:
-        off: How far all joints may be off, each by itself, in [rad] or [m], shape (M, nq).
+    All joints may be off, each by itself, by so much in [rad] or [m], shape (M, nq).
     """
     chain = arms.tool(relation.robot, seen_by=holder_of(scene, relation))
     axes = axes_off(arms, off)
@@ -130,9 +125,7 @@ def tool_corners(arms: LeverArms, scene: Scene, relation: Relation, q: Array, co
     much as that changes J, the second derivatives are added. Of two robots that take part each may be off or not: the
     largest of the three sums counts.
 
-    Args:
-        q: Straight motion in [rad] or [m], shape (M, nq).
-        corners: How far all joints may be off at these times, see ``corners_at``, shape (M, nq).
+    The straight motion is in [rad] or [m], shape (M, nq), and so are the corners, see ``corners_at``.
     """
     largest = np.zeros((len(q), 2))
     near = np.flatnonzero(np.any(corners != 0.0, axis=1))
@@ -188,9 +181,8 @@ def raised(arms: LeverArms, scene: Scene, off: Array, *, in_step: bool = True) -
 
     Pairs that need not keep a distance are to keep this much.
 
-    Args:
-        off: How far all joints may be off, in [rad] or [m], shape (M, nq).
-        in_step: Whether both bodies of a pair are off in the same step; or else each in any.
+    All joints may be off by so much in [rad] or [m], shape (M, nq): both bodies of a pair in the same step, or else
+    each in any.
     """
     off = off[np.any(off > 0.0, axis=1)]
     if not len(off):

@@ -44,12 +44,7 @@ class ToolsOnPart:
     def of(
         cls, cell: Cell, chains: Mapping[str, ScrewChain], *, tasks: Collection[str], robots: Collection[str]
     ) -> "ToolsOnPart":
-        """The relations that at least one of some robots moves.
-
-        Args:
-            cell: The cell, as it is in a phase.
-            tasks: Names of the tasks that are worked on in the phase.
-        """
+        """The relations of the tasks of a phase that some robots move; the cell is as it is in the phase."""
         holder = {grasp.robot for grasp in cell.part.held_by[:1]}
         limits = cell.checks.closure_mm.si, cell.checks.closure_deg.si
         related: list[tuple[Relation, str, frozenset[str], tuple[float, float]]] = []
@@ -68,19 +63,14 @@ class ToolsOnPart:
         return cls(cell=cell, chains=chains, relations=relations, names=names, movers=movers, allowed=allowed)
 
     def tips(self, q: Mapping[str, Array]) -> dict[str, Array]:
-        """Tool tips in the world of some robots that take part, shape (N, 4, 4), by robot; of others none.
-
-        Args:
-            q: Joint positions in [rad] or [m], shape (N, n), by robot.
-        """
+        """Tool tips in the world, shape (N, 4, 4), of robots that take part; joints in [rad] or [m], shape (N, n)."""
         taking_part = frozenset[str]().union(*self.movers)
         return {name: self.chains[name].tool_poses(positions) for name, positions in q.items() if name in taking_part}
 
     def poses(self, X_WT: Mapping[str, Array]) -> list[Array]:
         """Pose of each tool in the frame of its task, or on the part, shape (N, 4, 4) each.
 
-        Args:
-            X_WT: Tool tips in the world of all robots that take part, shape (N, 4, 4), by robot.
+        ``X_WT`` has the tool tips in the world of all robots that take part, shape (N, 4, 4).
         """
         part = self.cell.part
         X_PW = inverse(X_WT[part.held_by[0].robot] @ part.X_CP if self._is_carried else part.X_CP[None])
@@ -109,10 +99,8 @@ class ToolsOnPart:
     def shares(self, desired: Sequence[Array], poses: Sequence[Array], *, most: float) -> list[Array]:
         """Errors as shares of what is allowed, the larger one of each row, shape (N,).
 
-        Args:
-            desired: Poses as in the run, shape (N, 4, 4) each.
-            poses: Poses of the thinned rows, likewise.
-            most: Largest position error in [m], also where the cell allows more.
+        Desired poses as in the run and those of the thinned rows have the shape (N, 4, 4); no position error may exceed
+        ``most`` in [m], also where the cell allows more.
         """
         return [
             np.maximum(errors[:, 0] / min(most, LEFT_OVER * position), errors[:, 1] / (LEFT_OVER * orientation))
@@ -125,8 +113,7 @@ def with_part_poses(frame: ExportFrame, programs: Sequence[ProgramRows]) -> tupl
 
     These are the rows to which a tool moves while it is in process; all rows but the first where no process is stated.
 
-    Raises:
-        InputError: No robot has a task on a part that is held, or the robots are not synchronised.
+    ``InputError`` where no robot has a task on a part that is held, or the robots are not synchronised.
     """
     part_frame(frame)
     if not any(works_on_part(frame, name) for name in frame.robots):

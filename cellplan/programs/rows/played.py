@@ -153,9 +153,7 @@ class ExecutedProgram:
     def grid(self, begin: float, end: float, *, with_run: bool = True, with_corners: bool = False) -> Array:
         """Times in [s] from begin to end, between which joints move evenly, or on a part of a cubic taken as even.
 
-        Args:
-            with_run: Whether the rows of the run are among them.
-            with_corners: Whether the times are among them at which the rounding of a row begins and ends.
+        Rows of the run may be among them, and the times at which the rounding of a row begins and ends.
         """
         times = [times_of(self.rows[name]) for name in self.exported]
         if self.interpolation is Interpolation.CUBIC:

@@ -28,13 +28,8 @@ def resampled(cell: Cell, program: ProgramRows, cycle_of: Mapping[str, float]) -
     ``lead_time`` first, so every row is later by that time, and then for as long at least; they end together, after a
     whole number of cycles of each.
 
-    Args:
-        cell: The cell, whose joint limits no row passes.
-        program: Rows with times and speeds.
-        cycle_of: Cycle of the controller of each robot in [s]; robots without one are left out.
-
-    Raises:
-        InputError: The cycles have no common multiple within a second.
+    Cycles are in [s]; robots without one are left out. ``InputError`` where they have no common multiple within a
+    second.
     """
     lead = lead_time(cycle_of)
     common = _common_cycle(cycle_of)
@@ -51,8 +46,7 @@ def resampled(cell: Cell, program: ProgramRows, cycle_of: Mapping[str, float]) -
 def lead_time(cycle_of: Mapping[str, float]) -> float:
     """Time in [s] by which resampled rows are later: a tenth of a second, or what more all cycles go into.
 
-    Raises:
-        InputError: The cycles have no common multiple within a second.
+    ``InputError`` where the cycles have no common multiple within a second.
     """
     common = _common_cycle(cycle_of)
     return common * math.ceil(round(MICRO * REST) / common) / MICRO

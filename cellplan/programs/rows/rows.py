@@ -41,11 +41,7 @@ class EssentialRows(NamedTuple):
 
 
 def full_rows(run: VerifiedRun, robots: Collection[str] | None = None) -> tuple[ProgramRows, ...]:
-    """All rows of every program of a run, without marks.
-
-    Args:
-        robots: Names of the robots; None for all.
-    """
+    """All rows, without marks, of every program of a run; of all its robots when ``robots`` is None."""
     names = [robot.name for robot in run.cell.robots if robots is None or robot.name in robots]
     plan = run.motion.plan
     return tuple(
@@ -74,11 +70,7 @@ def essential_rows(run: VerifiedRun) -> tuple[EssentialRows, ...]:
 
 
 def times_of(rows: RobotRows) -> Array:
-    """Times of rows.
-
-    Raises:
-        ValueError: They have none.
-    """
+    """Times of rows that have them."""
     if rows.times is None:
         raise ValueError(f"rows of '{rows.robot}': expected times")
     return rows.times

@@ -130,12 +130,9 @@ class _RowGroup:
             stretches += [(first, row), (row, last)]
 
     def split_by_tools(self, tools: ToolsOnPart, phase: slice, full: Mapping[str, Array], count: Array) -> None:
-        """Choose rows of a phase until its tools and holders keep their tolerances.
+        """Choose rows of a phase, both ends chosen already, until its tools and holders keep their tolerances.
 
-        Args:
-            phase: The rows, both ends included, which are chosen already.
-            full: Positions of all robots in these rows, as in the run, by robot.
-            count: Groups that share the tolerance of each.
+        ``full`` has the positions of all robots in these rows, as in the run; ``count`` groups share each tolerance.
         """
         first, last = phase.start, min(phase.stop, len(self.times)) - 1
         self._is_chosen[[first, last]] = True
@@ -151,11 +148,7 @@ class _RowGroup:
             rows = self._split_where(off, " and ".join(tools.names))
 
     def _split_where(self, off: Array, what: str) -> Indices:
-        """Split every stretch in which something is off by more than 1 at a row, shape (N,), at the worst row.
-
-        Returns:
-            The rows within the stretches that were split.
-        """
+        """Split each stretch with a row that is off by more than 1, shape (N,), at the worst; rows in these."""
         chosen, split = self.chosen, [np.zeros(0, dtype=np.intp)]
         for place in np.unique(np.searchsorted(chosen, np.flatnonzero(off > 1.0))).tolist():
             first, last = int(chosen[place - 1]), int(chosen[place])

@@ -81,9 +81,6 @@ def checked_poses(poses: Sequence[Array]) -> BodyPoses:
     """Poses of bodies, shape (n, 4, 4) each, refused unless all of them are finite and rigid.
 
     The engine answers "free" to a pose that is not a number, and takes a scaled rotation for a rotation.
-
-    Raises:
-        CellplanError: A pose is not a rigid displacement.
     """
     count = len(poses[0]) if poses else 0
     R, p = np.empty((len(poses), count, 3, 3)), np.empty((len(poses), count, 3))
@@ -97,9 +94,6 @@ def require_rigid(R: Array, p: Array) -> None:
     """Refuse poses, shape (B, n, 3, 3) and (B, n, 3), that are not finite or not rigid; see ``checked_poses``.
 
     A matrix is a rotation when its first two columns are orthonormal and their cross product is the third one.
-
-    Raises:
-        CellplanError: A pose is not a rigid displacement.
     """
     step = max(1, RIGID_CHUNK // max(1, R.shape[1]))
     for first in range(0, len(R), step):

@@ -110,9 +110,7 @@ def nearest_points(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, s
 def point_above(engine: Engine, solid: int, poses: BodyPoses, *, X_WS: Array, sample: int) -> NearestPoints:
     """Lowest point of a solid above a half-space, and the point of its plane right below.
 
-    Args:
-        solid: Index of the solid.
-        X_WS: Pose of the half-space; everything below its xy plane is solid.
+    Everything below the xy plane of the half-space, with its pose ``X_WS``, is solid.
     """
     up = X_WS[:3, 2]
     R, p = poses.R[solid, sample], poses.p[solid, sample]

@@ -120,11 +120,7 @@ class Engine:
         return p + inner * along, q - outer * along
 
     def surface_distance(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> float:
-        """Distance in [m] between two bodies that do not touch, never above the truth; exact but slow.
-
-        Raises:
-            CellplanError: The engine's answer is not a number.
-        """
+        """Distance in [m] between two bodies that do not touch, never above the truth; exact but slow."""
         self.queries.distances += 1
         a, b = self._placed("core", first, poses, sample), self._placed("core", second, poses, sample)
         distance = float(fcl.distance(a, b, fcl.DistanceRequest(), fcl.DistanceResult()))

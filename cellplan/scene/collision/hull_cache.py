@@ -30,8 +30,7 @@ def convex_hull(mesh: Mesh) -> Mesh:
     Where that has more than 2000 corners, or a corner with more than 255 neighbours, it is a slightly larger one: the
     hull of the farthest vertices in many directions, blown up until it holds the others too.
 
-    Raises:
-        InputError: The mesh is flat.
+    ``InputError`` where the mesh is flat.
     """
     points = mesh.vertices
     if _is_flat(points):
@@ -142,9 +141,7 @@ def hull_of(mesh: Mesh) -> Mesh:
 
     One that was kept is proved once more to be convex and to hold these very vertices: that is cheap.
 
-    Raises:
-        InputError: The mesh is flat.
-        OverrunError: The search crashed, or took too long or too much memory.
+    ``InputError`` where the mesh is flat; ``OverrunError`` where the search crashed, or took too much.
     """
     cached = _recalled(mesh)
     if cached is not None:
@@ -156,11 +153,7 @@ def hull_of(mesh: Mesh) -> Mesh:
 
 
 def keep_hulls(meshes: Sequence[Mesh]) -> None:
-    """Find the hulls of some meshes and keep them for other processes; only in a process that the search may end.
-
-    Raises:
-        InputError: A mesh is flat.
-    """
+    """Find the hulls of some meshes and keep them for other processes; only in a process that the search may end."""
     for mesh in meshes:
         keep_mesh(_key(mesh), convex_hull(mesh))
 

@@ -37,9 +37,7 @@ class HullSupports:
     def reach(self, bodies: Indices, n: Array) -> Array:
         """How far each body reaches along a unit direction from the origin of its own frame in [m], shape (M,).
 
-        Args:
-            bodies: Which bodies, shape (M,).
-            n: Directions in their frames, shape (M, 3).
+        Bodies have the shape (M,), directions in their frames (M, 3).
         """
         sizes = self._sizes[bodies]
         extent = np.einsum("mi,mi->m", np.abs(n), sizes[:, :3])
@@ -51,15 +49,7 @@ class HullSupports:
         return extent
 
     def points(self, bodies: Indices, n: Array) -> Array:
-        """The farthest point of each body along a unit direction, in its own frame in [m]; see ``support_point``.
-
-        Args:
-            bodies: Which bodies, shape (M,).
-            n: Directions in their frames, shape (M, 3).
-
-        Returns:
-            Shape (M, 3).
-        """
+        """The farthest points along unit directions, shape (M, 3), in the frames of bodies, shape (M,), in [m]."""
         sizes, toward = self._sizes[bodies], np.where(np.abs(n) > FACING_TOL, np.sign(n), 0.0)
         points = toward * sizes[:, :3] + sizes[:, 4:] * n
         across = np.hypot(n[:, 0], n[:, 1])

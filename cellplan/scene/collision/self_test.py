@@ -32,11 +32,7 @@ DISTANCES: tuple[tuple[Solid, Solid, float, float], ...] = (
 
 @cache
 def prove_engine() -> None:
-    """Ask the engine what is known, once in each process.
-
-    Raises:
-        SelfTestError: An answer is wrong: no verdict on collisions can be trusted on this machine.
-    """
+    """Ask the engine what is known, once in each process; ``SelfTestError`` where no verdict can be trusted."""
     for first, second, y in HITS:
         engine, poses = _side_by_side(first, second, y)
         _expect(measure(engine, (0, 1), poses, sample=0).touches, f"{_names(first, second)} {y} m apart touch")

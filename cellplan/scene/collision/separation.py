@@ -18,10 +18,8 @@ def separation(
 ) -> float:
     """Distance in [m] that a direction proves between two convex solids; negative when it proves nothing.
 
-    Args:
-        n: Direction from the first to the second in the world, shape (3,), of any length.
-        X_first: Rotation and position of the first in the world.
-        X_second: Rotation and position of the second in the world.
+    The direction leads from the first to the second in the world, shape (3,), of any length; both solids have a
+    rotation and a position in the world.
     """
     length = float(np.linalg.norm(n))
     if not length > 0.0:
@@ -45,11 +43,8 @@ def supports(shape: Solid, directions: Array) -> Array:
 def heights(shape: Solid, R: Array, p: Array, *, X_WS: Array) -> Array:
     """Distance of a solid above a half-space at each sample in [m], exact; zero or less where they touch.
 
-    Args:
-        shape: Convex solid, or the hull of one: the lowest point is the same.
-        R: Its rotations in the world, shape (N, 3, 3).
-        p: Its positions in the world, shape (N, 3).
-        X_WS: Pose of the half-space; everything below its xy plane is solid.
+    The solid, or its hull, has rotations, shape (N, 3, 3), and positions in the world, shape (N, 3); everything below
+    the xy plane of the half-space is solid.
     """
     up = X_WS[:3, 2]
     return p @ up - X_WS[:3, 3] @ up - supports(shape, -rotated_back(R, up))

@@ -30,16 +30,11 @@ class SignedDistances:
     def below(
         self, bodies: tuple[CollisionBody, ...], ends: Indices, poses: BodyPoses, samples: Indices, *, within: float
     ) -> tuple[Indices, Array, Array]:
-        """Pairs of bodies nearer than a distance in [m].
+        """Places of queries, shape (F,), nearer than ``within`` in [m], their distances, and the points of both bodies.
 
-        Args:
-            ends: Two of them for each query, shape (M, 2).
-            samples: The sample of each query, shape (M,).
-            within: The distance.
-
-        Returns:
-            Places of these queries, shape (F,), their distances, negative where hulls overlap by so much, shape (F,),
-            and the points of both bodies that are so far from each other, in the world in [m], shape (F, 2, 3).
+        A query is a pair of bodies, ``ends`` of shape (M, 2), at a sample, shape (M,). Distances, shape (F,), are
+        negative where hulls overlap by so much; the points that are so far from each other are in the world in [m],
+        shape (F, 2, 3).
         """
         import coal  # a search needs it, a verification does not
 

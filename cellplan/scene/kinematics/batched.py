@@ -104,9 +104,7 @@ class BatchChains:
     def placements(self, X_WB: Array, X_FT: Array) -> Placement:
         """Bases and tool tips of many cells like this one, as a batch.
 
-        Args:
-            X_WB: Bases in the world, shape (cells, robots, 4, 4).
-            X_FT: Tool tips in the flange frames, shape (cells, robots, 4, 4).
+        Bases are in the world, tool tips in the flange frames, shape (cells, robots, 4, 4).
         """
         bases, tools = np.moveaxis(X_WB, 0, -1), np.moveaxis(self._X_BF @ X_FT, 0, -1)
         R_WB, R_LT = np.moveaxis(bases[:, :3, :3], 0, 2), np.moveaxis(tools[:, :3, :3], 0, 2)

@@ -20,11 +20,7 @@ class LinkForest:
     """
 
     def __init__(self, robots: Sequence[Robot]) -> None:
-        """Take the joint axes at the reference configuration, of each robot followers after driven joints.
-
-        Args:
-            robots: The robots in the order of the stacked joints.
-        """
+        """Take the axes at the reference configuration, of each robot followers after driven joints."""
         self._first: dict[str, int] = {}
         parents, order = list[int](), list[int]()
         model_links: list[tuple[int, int, RobotModel, int]] = []
@@ -61,17 +57,11 @@ class LinkForest:
         return WORLD if robot is None else self._first[robot] + 1 + link
 
     def displacements(self, q: Array, X_WB: Array) -> Array:
-        """Displacements of all links from their places at the reference configuration, see ``ScrewChain``.
+        """Displacements of links, shape (links, K, 4, 4), see ``ScrewChain``; all that comes is finite.
 
         Args:
             q: Stacked joint positions in [rad] or [m], shape (K, nq).
             X_WB: Bases of the robots in the world, shape (robots, 4, 4), or of each configuration (robots, K, 4, 4).
-
-        Returns:
-            Shape (links, K, 4, 4).
-
-        Raises:
-            ValueError: A joint position or a base is not finite.
         """
         if not (np.all(np.isfinite(q)) and np.all(np.isfinite(X_WB))):
             raise ValueError("links: a joint position or a base is not finite")
@@ -92,13 +82,9 @@ class LinkForest:
         return D
 
     def screws(self, D: Array) -> Array:
-        """Twist that unit speed of each axis gives what it carries, taken at the world origin, linear part first.
+        """Twist that unit speed of each axis gives what it carries, at the world origin, linear part first.
 
-        Args:
-            D: Displacements of the links, shape (links, K, 4, 4).
-
-        Returns:
-            Shape (axes, K, 6).
+        From displacements of the links, shape (links, K, 4, 4); the twists have the shape (axes, K, 6).
         """
         R, p = D[self._parents, :, :3, :3], D[self._parents, :, :3, 3]
         s = (R @ self._directions[:, None, :, None])[..., 0]

@@ -20,13 +20,10 @@ CELL_STREAM: Final = 0  # stream of random numbers of the cells; the measurement
 
 
 def draw_errors(cell: Cell, errors: CellErrors, trial: int) -> Draw:
-    """Draw one real cell.
+    """Draw one real cell, that of a trial from 0 on.
 
     The numbers are taken in the order of the cell (robot after robot: joint offsets, link lengths, base, tool; then
     the grasps), whatever the order of the file, and each trial has a stream of its own.
-
-    Args:
-        trial: Number of the trial, from 0.
     """
     rng = np.random.default_rng([errors.seed, trial, CELL_STREAM])
     robots = {
@@ -114,11 +111,10 @@ def _with_offsets(model: RobotModel, offsets: Array) -> RobotModel:
 
 
 def _displaced(model: RobotModel, D: Array, *, by_moved: bool) -> RobotModel:
-    """The model after displacements of its links, shape (links + 1, 4, 4), the base first.
+    """The model after displacements of its links at the reference configuration, expressed in B, the base first.
 
-    Args:
-        D: Displacements at the reference configuration, expressed in B.
-        by_moved: Whether a joint's axis goes with the link that it moves, rather than with the one that carries it.
+    They have the shape (links + 1, 4, 4). A joint's axis goes with the link that it moves, or else with the one that
+    carries it.
     """
     n = len(model.joints)
     joints = tuple(_moved(joint, D[k + 1 if by_moved else joint.parent + 1]) for k, joint in enumerate(model.joints))

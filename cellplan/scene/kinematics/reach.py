@@ -25,8 +25,7 @@ def arm_reach(model: RobotModel, *, rounds: int = SWEEP_COUNT) -> float:
     One joint after the other is moved to its best position on a grid that gets finer in each round, from several
     configurations. A first joint that slides has no axis to turn about: then the distance from its point is taken.
 
-    Args:
-        rounds: Number of rounds; five are enough for a drawing.
+    Five rounds are enough for a drawing.
     """
     placed = Robot(
         name=model.name,
@@ -58,9 +57,6 @@ def reach_outline(robot: Robot, *, rounds: int = SWEEP_COUNT) -> Array:
 
     The robot may stand on a rail, hang or be mounted on a wall. Between two of these places the outline bulges out by
     0.2 % of its radius of curvature at most.
-
-    Args:
-        rounds: Number of rounds of the search in each direction.
     """
     chain = ScrewChain(robot)
     corners = []

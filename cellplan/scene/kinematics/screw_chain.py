@@ -41,11 +41,8 @@ class ScrewChain:
         The displaced pose of anything fixed to link i is ``X_WS = D[:, i + 1] @ X_BS`` (the base is i = -1):
         ``D_i = D_parent A_i(q_i)`` with the screw displacement ``A_i`` ([Ribeiro2010]_ Eq. B.73).
 
-        Args:
-            q: Positions of the driven joints in [rad] or [m], shape (N, n).
-
-        Returns:
-            Displacements, shape (N, links + 1, 4, 4); they cannot be written to.
+        Positions of the driven joints are in [rad] or [m], shape (N, n); displacements have the shape (N, links + 1, 4,
+        4) and cannot be written to.
         """
         if self._last is not None and np.array_equal(self._last[0], q):
             return self._last[1]
@@ -76,24 +73,19 @@ class ScrewChain:
         return (D[..., :3, :3] @ points[..., None])[..., 0] + D[..., :3, 3]
 
     def flange_screws(self, q: Array) -> Array:
-        r"""Twist that unit speed of each driven joint gives the flange, taken at the world origin.
+        r"""Twist that unit speed of each driven joint gives the flange, at the world origin, shape (N, 6, n).
 
         ``$ = [s0 x s; s]`` for a revolute and ``[s; 0]`` for a prismatic joint (linear part first), expressed in W
         ([Ribeiro2010]_ Eqs. B.15, B.16); a follower on the way to the flange adds its share to its leader's column.
 
-        Returns:
-            Screws, shape (N, 6, n); zero for joints that do not carry the flange.
+        It is zero for joints that do not carry the flange.
         """
         return self._screws(self.link_displacements(q))
 
     def axis_screws(self, D: Array) -> Array:
-        """Twist that unit speed of each axis, followers included, gives what it carries, as ``flange_screws``.
+        """Twist that unit speed of each axis, followers included, gives what it carries, shape (N, axes, 6).
 
-        Args:
-            D: Displacements of the links, see ``link_displacements``.
-
-        Returns:
-            Screws, shape (N, axes, 6).
+        Displacements are those of ``link_displacements``, twists as in ``flange_screws``.
         """
         if not self._axes:
             return np.zeros((len(D), 0, 6))

@@ -199,8 +199,7 @@ def tool_directions(entry: TaskEntry) -> tuple[Direction | None, Direction]:
 def resolved_document(document: CellDocument, *, timed: Collection[str]) -> dict[str, Any]:
     """The file as plain values in its own units, with every default that follows from other entries filled in.
 
-    Args:
-        timed: Names of the tasks whose path brings its own clock.
+    ``timed`` are the names of the tasks whose path brings its own clock.
     """
     values = document.model_dump(exclude_none=True) | _written_program(document)
     motion = values["motion"]

@@ -52,13 +52,9 @@ class AddressError(Exception):
 
 
 def read_address(text: str, valid: ValidEntries, models: Mapping[str, RobotModel]) -> Address | None:
-    """What an address names; None for a robot or a part that has findings of its own.
+    """What an address, with or without ``robots.``, names; None for a robot or a part that has findings of its own.
 
-    Args:
-        text: The address as written, with or without ``robots.``.
-
-    Raises:
-        AddressError: It names nothing that a layout may change.
+    ``AddressError`` where it names nothing that a layout may change.
     """
     if text == "motion.mode":
         return Address(group=text, what="mode", name="")

@@ -47,8 +47,7 @@ RangeOrFinding = VaryRange | Finding
 def read_ranges(address: Address, value: Any, path: KeyPath, context: Context) -> Iterator[RangeOrFinding]:
     """Ranges that a value under ``layout.vary`` gives, and what is wrong with it.
 
-    Args:
-        value: True, a range, a list of ranges by joint, or a mapping of ranges.
+    The value is true, a range, a list of ranges by joint, or a mapping of ranges.
     """
     finding = context.document.finding
     if address.index is not None or address.what in {"spin_deg", "weights"}:

@@ -15,11 +15,7 @@ class Ties:
     def __init__(
         self, entry: LayoutEntry, ranges: dict[str, VaryRange], context: Context, findings: list[Finding]
     ) -> None:
-        """Keep what is read, and against what.
-
-        Args:
-            ranges: Its ranges by address; those of numbers that stay are taken out.
-        """
+        """Keep what is read, and against what; ranges, by address, of numbers that stay are taken out."""
         self._entry, self._ranges, self._context, self._findings = entry, ranges, context, findings
         self._tied = set[str]()
 

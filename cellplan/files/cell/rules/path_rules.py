@@ -28,11 +28,7 @@ def build_path(entry: JointPathEntry | None, model: RobotModel) -> JointSpline |
 
 
 def path_findings(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Everything about given joint paths that contradicts robots, part, motion and solver.
-
-    Args:
-        models: Robots whose model is known, by name.
-    """
+    """Everything about given joint paths that contradicts robots with a known model, part, motion and solver."""
     for name, robot in valid.robots.items():
         if robot.path is None:
             continue

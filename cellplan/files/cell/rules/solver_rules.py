@@ -42,11 +42,7 @@ def accurate_findings(valid: ValidEntries, document: YamlDocument) -> Iterator[F
 
 
 def solver_findings(valid: ValidEntries, models: Mapping[str, RobotModel], document: YamlDocument) -> Iterator[Finding]:
-    """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks.
-
-    Args:
-        models: Robots whose model is known, by name.
-    """
+    """Joints that the solver and the motion name exist; the method has a null space for goals besides the tasks."""
     solver, motion = valid.solver, valid.motion
     for index, lock in enumerate(motion.locked_joints if motion else ()):
         path: KeyPath = ("motion", "locked_joints", index)

@@ -36,11 +36,7 @@ class MeshShelf:
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 
     def mesh(self, desired: UrdfMesh, element: Element) -> Mesh:
-        """The mesh in [m] that an element names.
-
-        Raises:
-            InputError: It is not found, cannot be read, or is flat.
-        """
+        """The mesh in [m] that an element names; ``InputError`` where there is none, or it is flat."""
         name = PurePosixPath(desired.uri)
         if name.suffix and name.suffix.lower() not in FORMATS:
             raise unknown_format(name.name)
@@ -61,8 +57,7 @@ class MeshShelf:
 def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShelf) -> tuple[Body, ...]:
     """One body for each collision element, named after its link; further ones of a link are numbered from 2.
 
-    Raises:
-        InputError: With the line of the element, when its mesh is missing or unsound.
+    An ``InputError`` has the line of an element whose mesh is missing or unsound.
     """
     links = links_in_order(tree)
     taken = {link.name for link in links}
@@ -88,8 +83,7 @@ def find_mesh(
     below the URDF's folder, a package folder or a folder of ``within``; a name that only begins with a slash is looked
     up below the first two. Nothing outside the folders ``within`` is accessed.
 
-    Raises:
-        InputError: There is no such file; the message names every place that was tried.
+    An ``InputError`` names every place that was tried.
     """
     if uri.startswith(PACKAGE):
         packages = Packages(folder=folder, package_dirs=package_dirs, within=within)

@@ -37,11 +37,7 @@ LONGEST_NAME: Final = 40  # characters of the name of a robot in a cell
 def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescription:
     """What a URDF says for one flange: the named one, the usual one, or the one behind the most joints.
 
-    Args:
-        written: Its name as the lines for a cell have it.
-
-    Raises:
-        InputError: With file and line, for anything but missing limits and locks.
+    It has a name for lines of a cell. Missing limits and locks are no ``InputError``.
     """
     tree = build_tree(read_document(path, options.xacro))
     choices = tuple(_choices(tree))
@@ -76,11 +72,9 @@ def describe_urdf(path: Path, written: str, options: UrdfOptions) -> RobotDescri
 
 
 def size_along(bodies: tuple[Body, ...], X_BL: Array) -> Array:
-    """Edges of the box along the axes of a frame L that holds bodies, in [m], shape (3,).
+    """Edges of the box along the axes of a frame L that holds at least one body, in [m], shape (3,).
 
-    Args:
-        bodies: At least one.
-        X_BL: Pose of L in the base while all joints read zero.
+    ``X_BL`` is the pose of L in the base while all joints read zero.
     """
     X_LB = inverse(X_BL)
     return edges_of_box([(body.shape, X_LB @ body.X_BS) for body in bodies])

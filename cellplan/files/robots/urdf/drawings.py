@@ -21,8 +21,7 @@ LARGEST_DRAWING: Final = 20_000_000  # [bytes] of a mesh file that is read for n
 def shape_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -> list[tuple[Solid, Array]]:
     """Shapes that a link draws, with their poses in its frame, shape (4, 4); none where one cannot be read.
 
-    Args:
-        largest: Bytes of the largest mesh file that is read.
+    Mesh files of more bytes than ``largest`` are not read.
     """
     solids: list[tuple[Solid, Array]] = []
     try:
@@ -41,11 +40,7 @@ def shape_solids(link: UrdfLink, shelf: MeshShelf, *, largest: float = np.inf) -
 
 
 def edges_of_box(solids: Sequence[tuple[Solid, Array]]) -> Array:
-    """Edges of the box round some shapes along the axes of a frame L, in [m], shape (3,).
-
-    Args:
-        solids: At least one shape, with its pose in L.
-    """
+    """Edges of the box round at least one shape, posed in L, along the axes of the frame L, in [m], shape (3,)."""
     sides = np.vstack([np.eye(3), -np.eye(3)])
     reach = [support(shape, sides @ X_LS[:3, :3]) + sides @ X_LS[:3, 3] for shape, X_LS in solids]
     farthest = np.max(reach, axis=0)
@@ -58,8 +53,7 @@ def small_bodies(
 ) -> Iterator[str]:
     """Remarks on links whose collision bodies are far smaller than what is drawn of them.
 
-    Args:
-        shelf: Where meshes lie; what is read here is no input of the robot.
+    What is read from the shelf here is no input of the robot.
     """
     apart = MeshShelf(folder=shelf.folder, package_dirs=shelf.package_dirs, within=shelf.within)
     for link in links_in_order(tree):

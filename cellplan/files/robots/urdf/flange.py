@@ -24,9 +24,6 @@ def choose_flange(tree: UrdfTree, desired: str | None) -> str:
     One that is not named by the user has z along the axis of the last joint, or gives way to the link at its place that
     has: with x out of the mounting face (REP 199) tools would stick out sideways. After a sliding joint only ``tool0``
     is no guess.
-
-    Raises:
-        InputError: The desired link does not exist, or there is no obvious one.
     """
     if desired is not None:
         return known_link(tree, desired, "flange")
@@ -42,11 +39,7 @@ def choose_flange(tree: UrdfTree, desired: str | None) -> str:
 
 
 def usual_flange(tree: UrdfTree) -> str:
-    """``tool0``, else ``flange``, else the only moving leaf.
-
-    Raises:
-        InputError: There is none, or there are several.
-    """
+    """``tool0``, else ``flange``, else the only moving leaf; ``InputError`` where there is none, or several."""
     for name in FLANGE_NAMES:
         if name in tree.document.links:
             return name

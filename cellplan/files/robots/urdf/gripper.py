@@ -41,13 +41,9 @@ class Finger:
 
 
 def gripper_locks(tree: UrdfTree, flange: str, state: GripperState | None, locked: Collection[str]) -> dict[str, float]:
-    """Positions in [rad] or [m] at which a gripper's joints are held, by joint name.
+    """Positions in [rad] or [m] at which a gripper's joints are held, by joint name; none without a gripper.
 
-    Args:
-        state: How far the gripper is open; None without a gripper.
-
-    Raises:
-        InputError: The joints are no gripper's, have another unit, or do not reach so far.
+    ``InputError`` where joints are no gripper's, have another unit, or do not reach so far.
     """
     if state is None:
         return {}
@@ -77,12 +73,7 @@ def require_opposed(
 ) -> None:
     """Refuse two fingers that do not move against each other, or that close as their joints leave the closed ends.
 
-    Args:
-        state: How far the gripper is open; None without a gripper.
-        locks: Positions of its joints, by name.
-
-    Raises:
-        InputError: An opening says nothing about the distance between such fingers.
+    Without a state there is no gripper. The locks are positions of its joints, by name.
     """
     if state is None or state.opening is None:
         return

@@ -74,8 +74,7 @@ def with_blanks(text: str) -> str:
 def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJoint]) -> Range:
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
 
-    Raises:
-        InputError: A limit is missing or of an unlikely size, is widened by the cell, or leaves no range.
+    ``InputError`` where one is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
     stated = joint.limit.stated
     for key, text in limit_findings(stated, cell, is_revolute=joint.kind != "prismatic"):

@@ -103,11 +103,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     The root link is the base frame B. Joints between base and flange are driven; mimic joints follow them; every other
     movable joint must be locked. A link without collision elements is represented by its visual ones.
 
-    Args:
-        options: What the cell adds; None adds nothing.
-
-    Raises:
-        InputError: With file and line, for anything that cannot be taken over faithfully.
+    An ``InputError`` has file and line of anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
     tree = build_tree(with_moveit_limits(read_document(path, options.xacro), options.moveit))
@@ -141,11 +137,7 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
 
 
 def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStructure:
-    """What each joint does, with every unlocked joint at rest.
-
-    Raises:
-        InputError: A lock or a mimic is unsound, or no joint is driven.
-    """
+    """What each joint does, with every unlocked joint at rest; locks and mimics must be sound, one joint driven."""
     require_sound_locks(tree.document, options.locked, options.lock_units)
     unlocked = unlocked_joints(tree, flange, options.locked)
     held = {**{joint.name: rest_position(joint) for joint in unlocked}, **options.locked}
@@ -158,11 +150,7 @@ def urdf_structure(tree: UrdfTree, flange: str, options: UrdfOptions) -> UrdfStr
 def urdf_model(
     structure: UrdfStructure, bodies: tuple[Body, ...], *, limits: Mapping[str, StatedLimits], source: str
 ) -> RobotModel:
-    """The robot model.
-
-    Raises:
-        InputError: Limits are missing or unsound.
-    """
+    """The robot model; its limits must be there and sound."""
     document, roles, configuration = structure.tree.document, structure.roles, structure.configuration
     model = RobotModel(
         name=document.name,

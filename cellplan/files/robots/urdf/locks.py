@@ -33,8 +33,7 @@ def lock_positions(joints: Sequence[UrdfJoint], locked: Mapping[str, float]) -> 
 
     Those of joints at rest read back to positions within their limits.
 
-    Args:
-        locked: Position in [rad] or [m] of those of them that do not rest where `rest_position` says.
+    ``locked`` has the positions in [rad] or [m] of those that do not rest where `rest_position` says.
     """
     return {f"{joint.name}_{unit_of(joint).name}": _number(joint, locked.get(joint.name)) for joint in joints}
 
@@ -44,9 +43,7 @@ def unlocked_error(
 ) -> InputError:
     """What to write in the cell when joints are neither locked nor lead to the flange, in one line for all of them.
 
-    Args:
-        unlocked: These joints, at least one.
-        locked: Position in [rad] or [m] of the joints that are locked by name; the line repeats them.
+    The line repeats those that are locked, with their positions in [rad] or [m] by name.
     """
     named = [tree.document.joints[name] for name in locked]
     text = flow_text(lock_positions([*named, *unlocked], locked))
@@ -63,12 +60,7 @@ def unlocked_error(
 def require_sound_locks(document: UrdfDocument, locked: Mapping[str, float], units: Mapping[str, str]) -> None:
     """Only movable joints that lead can be locked, in their own unit, and only where they can go.
 
-    Args:
-        locked: Position in [rad] or [m] by joint name.
-        units: Unit that it was written in, ``deg`` or ``mm``, by joint name; none where it was not written.
-
-    Raises:
-        InputError: A lock is unsound.
+    Positions are in [rad] or [m] by name of the joint, units ``deg`` or ``mm`` as they were written, if they were.
     """
     for name, position in locked.items():
         joint = known_joint(document, name, "locked")

@@ -29,11 +29,7 @@ class MoveitLimits:
 
 
 def read_moveit_limits(path: Path, file: str) -> MoveitLimits:
-    """Read the limits that a file states; with ``has_velocity_limits: false`` it states no velocity, and so on.
-
-    Raises:
-        InputError: All findings about the file at once.
-    """
+    """Read the limits that a file states; with ``has_velocity_limits: false`` it states no velocity, and so on."""
     document = read_yaml(path, file=file)
     top: KeyPath = (ABOVE, TOP) if ABOVE in document.root else (TOP,)
     root = document.root.get(ABOVE, document.root)
@@ -54,8 +50,7 @@ def read_moveit_limits(path: Path, file: str) -> MoveitLimits:
 def with_moveit_limits(document: UrdfDocument, moveit: MoveitLimits | None) -> UrdfDocument:
     """The document whose joints keep the limits of MoveIt too, with remarks on what was not used.
 
-    Raises:
-        InputError: The robot has none of the joints: the file is another robot's.
+    ``InputError`` where the robot has none of the joints: the file is another robot's.
     """
     if moveit is None:
         return document

@@ -56,14 +56,9 @@ class Srdf:
 
 
 def read_srdf(path: Path, settings: XacroSettings | None = None) -> Srdf:
-    """Read the disabled pairs and the named configurations of an SRDF; groups, end effectors and the like are not used.
+    """Read disabled pairs and named configurations of an SRDF; groups, end effectors and the like are not used.
 
-    Args:
-        path: The file; one whose name ends in ``.xacro`` is expanded.
-        settings: What a xacro file needs to be expanded.
-
-    Raises:
-        InputError: With file and line: it is no plain SRDF, or an entry that is used is incomplete.
+    A file called ``.xacro`` is expanded. An ``InputError`` has file and line.
     """
     remarks = Remarks()
     root, included = read_elements(path, settings, remarks)
@@ -99,8 +94,7 @@ def disabled_bodies(srdf: Srdf, model: RobotModel) -> tuple[tuple[str, str, str]
 
     Pairs with a link that the robot does not have, such as one of a gripper that it does not carry, say nothing.
 
-    Raises:
-        InputError: The robot has none of the links: the file is another robot's.
+    ``InputError`` where the robot has none of the links: the file is another robot's.
     """
     links = {link.name for link in model.links}
     named = {link for pair in srdf.pairs for link in pair.links}

@@ -54,11 +54,7 @@ class ZeroConfiguration:
 
 
 def build_tree(document: UrdfDocument) -> UrdfTree:
-    """Put the joints in order from the one root.
-
-    Raises:
-        InputError: A joint names an unknown link, a link hangs on two joints, there are several roots, or a cycle.
-    """
+    """Put the joints in order from the one root; links are known, hang on one joint each, and in no cycle."""
     above: dict[str, UrdfJoint] = {}
     below: dict[str, list[UrdfJoint]] = {name: [] for name in document.links}
     for joint in document.joints.values():
@@ -105,11 +101,8 @@ def moving_leaves(tree: UrdfTree) -> list[str]:
 def assign_roles(tree: UrdfTree, flange: str, locked: Mapping[str, float]) -> Roles:
     """Say for every joint whether it is driven, follows a driven one or stands still.
 
-    Args:
-        locked: Position in [rad] or [m] of every joint that is held still, those off the chain included.
-
-    Raises:
-        InputError: A mimic is unsound, or there is no driven joint, or there are too many.
+    ``locked`` has the position in [rad] or [m] of every joint that is held still, those off the chain included.
+    ``InputError`` for an unsound mimic, and for no driven joint or too many.
     """
     driven: list[UrdfJoint] = []
     followers: list[UrdfJoint] = []
@@ -150,22 +143,14 @@ def zero_configuration(tree: UrdfTree, roles: Roles) -> ZeroConfiguration:
 
 
 def known_joint(document: UrdfDocument, name: str, key: str) -> UrdfJoint:
-    """The joint that an option names.
-
-    Raises:
-        InputError: There is no such joint.
-    """
+    """The joint that an option names."""
     if name not in document.joints:
         raise InputError(f"{document.file}: {key}: unknown joint '{name}'{_known(name, document.joints)}")
     return document.joints[name]
 
 
 def known_link(tree: UrdfTree, name: str, key: str) -> str:
-    """The name of a link that an option names.
-
-    Raises:
-        InputError: There is no such link.
-    """
+    """The name of a link that an option names."""
     links = tree.document.links
     if name not in links:
         raise InputError(f"{tree.document.file}: {key}: unknown link '{name}'{_known(name, links)}")

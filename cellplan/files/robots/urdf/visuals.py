@@ -24,9 +24,6 @@ def read_visuals(path: Path, options: UrdfOptions) -> tuple[Visual, ...]:
     """Visual elements of all links that have collision elements too; the bodies of all others are drawn already.
 
     A link of which one cannot be read is left out: it is drawn by its bodies.
-
-    Raises:
-        InputError: The file is no URDF.
     """
     shelf = MeshShelf(folder=path.parent, package_dirs=options.package_dirs, within=options.within)
     visuals: list[Visual] = []

@@ -32,8 +32,6 @@ def parse_collada(data: bytes, name: str, *, is_upright: bool) -> tuple[Triangle
     """Vertices in [m] and triangles of all geometries of the scene, and the metres of one unit of the file.
 
     Args:
-        data: Bytes of the file.
-        name: Name of the file for messages.
         is_upright: Whether the axis that the file calls up becomes z. The links of URDFs are drawn in the frames of
             their links, whatever axis is called up: neither RViz nor pinocchio turns them, and files that are called
             Y_UP agree with the STL drawing of the same link only as they are. The unit is always applied, as by RViz;

@@ -75,11 +75,7 @@ class Located(ET.Element):
 
 
 def read_collada(data: bytes, file: str) -> Located:
-    """Root of a COLLADA file whose numbers are whole: as many as it declares, finite, each index within its source.
-
-    Raises:
-        InputError: With the line, for anything else.
-    """
+    """Root of a COLLADA file whose numbers are whole: as many as it declares, finite, each index within its source."""
     root = _Reader(file).parse(data)
     if root.tag != "COLLADA":
         raise root.error("expected a COLLADA file with <COLLADA> as its root element")

@@ -12,22 +12,14 @@ CHUNK: Final = 1_000_000  # [bytes] of text made into numbers at once
 
 
 def plain_word(word: str) -> str:
-    """The word, if it is written as other programs write numbers: Python alone also takes ``1_000`` and ``٣``.
-
-    Raises:
-        ValueError: It holds an underscore, or a digit of another script.
-    """
+    """The word, if it is written as other programs write numbers: Python alone also takes ``1_000`` and ``٣``."""
     if "_" in word or not word.isascii():
         raise ValueError(f"not a plain number: {word!r}")
     return word
 
 
 def text_numbers(body: bytes) -> NDArray[np.float64]:
-    """All numbers of a text.
-
-    Raises:
-        ValueError: A word is no number, or there are more than any sound mesh has.
-    """
+    """All numbers of a text; ``ValueError`` where a word is none, or there are more than any sound mesh has."""
     is_ink = np.concatenate([[False], np.frombuffer(body, dtype=np.uint8) > ord(" ")])
     words = int(np.count_nonzero(is_ink[1:] & ~is_ink[:-1]))
     if words > MAX_WORDS:

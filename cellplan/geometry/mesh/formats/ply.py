@@ -95,11 +95,7 @@ class _Values:
 
 
 def parse_ply(data: bytes, name: str) -> Triangles:
-    """Vertices and triangles of a PLY file; columns other than x, y, z and the corner lists are passed over.
-
-    Raises:
-        InputError: The file is damaged or holds no faces.
-    """
+    """Vertices and triangles of a PLY file; columns other than x, y, z and the corner lists are passed over."""
     order, elements, body = _header(data, name)
     vertices: NDArray[np.float64] | None = None
     polygons: Polygons | None = None

@@ -31,14 +31,8 @@ def cut_polygons(vertices: Array, flat: NDArray[np.int64], sizes: NDArray[np.int
     cover it once, whatever its shape: a fan round one corner where that succeeds, ears cut off one by one elsewhere.
     Polygons of one or two corners cover nothing.
 
-    Args:
-        vertices: Corner points, shape (V, 3).
-        flat: Corners of all polygons, one after the other.
-        sizes: Number of corners of each polygon.
-        name: File name for messages.
-
-    Raises:
-        InputError: A corner is not among the vertices, or a polygon crosses itself.
+    Vertices have the shape (V, 3); ``flat`` lists the corners of all polygons, one after the other, ``sizes`` their
+    numbers. ``InputError`` where a corner is none of the vertices, or a polygon crosses itself.
     """
     outside = flat[(flat < 0) | (flat >= len(vertices))]
     if outside.size:

@@ -51,9 +51,6 @@ def parse_mesh(data: bytes, name: str) -> Triangles:
     """Vertices, shape (V, 3), and triangles, shape (M, 3), of an STL, OBJ or PLY file in its own unit.
 
     The suffix of the name gives the format.
-
-    Raises:
-        InputError: The format is not read, or the file is damaged.
     """
     with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused by name later
         match name.lower().rpartition(".")[2]:
@@ -73,21 +70,13 @@ def unknown_format(name: str) -> InputError:
 
 
 def require_likely_count(triangles: int, name: str) -> None:
-    """Refuse meshes with too few or too many triangles.
-
-    Raises:
-        InputError: The number is out of range.
-    """
+    """Refuse meshes with too few or too many triangles."""
     if not MIN_TRIANGLES <= triangles <= MAX_TRIANGLES:
         raise InputError(f"{name}: expected {MIN_TRIANGLES} to {MAX_TRIANGLES} triangles, got {triangles}")
 
 
 def require_no_more(count: int, most: int, what: str, *, place: str) -> None:
-    """Refuse a file as soon as it holds more than any sound one, before it fills the memory.
-
-    Raises:
-        InputError: The count is above the limit.
-    """
+    """Refuse a file as soon as it holds more than any sound one, before it fills the memory."""
     if count > most:
         raise InputError(f"{place}: expected at most {most} {what}, got more")
 

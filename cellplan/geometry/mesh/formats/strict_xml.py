@@ -6,11 +6,7 @@ from cellplan.errors import InputError
 
 
 def parse_strictly(parser: expat.XMLParserType, data: bytes, file: str) -> None:
-    """Run a parser, whose handlers for elements and text are set, over the bytes of a file.
-
-    Raises:
-        InputError: The bytes are not well-formed, of an unknown encoding, or declare a document type or an entity.
-    """
+    """Run a parser, whose handlers are set, over well-formed XML of a known encoding without types and entities."""
 
     def refuse(*_declared: object) -> None:
         line = parser.CurrentLineNumber

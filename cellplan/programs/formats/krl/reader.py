@@ -23,11 +23,7 @@ def read_krl(
 ) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly: positions and marks; these programs state neither times nor process.
 
-    Args:
-        paths: Path of each main module without its ending, by program and robot.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
+    A main module has its path without ending by program and robot. An ``InputError`` has file and line.
     """
     return read_programs(frame, files, paths, _rows, ending=".src")
 

@@ -53,11 +53,7 @@ _FIRST: Final = re.compile(r"(DEF|DEFDAT)\s+(\w+)\s*(\(\s*\)|)(?:\s+PUBLIC)?", r
 
 
 def require_numbers(frame: ExportFrame, robot: str) -> None:
-    """Refuse handshake signals that are not the numbers of inputs and outputs.
-
-    Raises:
-        InputError: With the key path.
-    """
+    """Refuse handshake signals that are not the numbers of inputs and outputs."""
     for path, signal in signals_by_key(frame, robot).items():
         if not re.fullmatch(r"[1-9][0-9]{0,3}", signal) or int(signal) > LAST_SIGNAL:
             raise InputError(
@@ -84,15 +80,7 @@ class KrlModule:
 
 
 def read_module(left: dict[str, str], path: str) -> KrlModule:
-    """Read both files of a module.
-
-    Args:
-        left: Files that were not read yet, by path; those of the module are taken out.
-        path: Path of the module without the ending.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file, or one is missing.
-    """
+    """Read both files of a module, by its path without ending, and take them out of those that are left."""
     files = f"{path}.src", f"{path}.dat"
     for file in files:
         if file not in left:

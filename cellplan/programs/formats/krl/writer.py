@@ -26,9 +26,8 @@ LINE_END: Final = "\r\n"
 def render_krl(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>.src`` and ``.dat``, or ``<robot>/<program>.src`` and ``.dat``.
 
-    Raises:
-        InputError: A robot cannot be written: it has no KUKA controller, is no arm of six axes with at most six others
-            before it, lacks a signal, or a position cannot be written with the decimals.
+    ``InputError`` for a robot without a KUKA controller, that is no arm of six axes with at most six others before it,
+    lacks a signal, or has a position that cannot be written with the decimals.
     """
     paths = program_paths(job.frame, KRL, MODULES)
     raise_findings(refusals(*_demands(job.frame, 0)))

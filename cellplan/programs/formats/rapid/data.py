@@ -36,22 +36,14 @@ class RapidData:
         self._data, self.part = data, part
 
     def require(self, statement: RapidStatement, name: str, kind: str) -> Datum:
-        """The declaration of a name that a statement refers to.
-
-        Raises:
-            InputError: It is not declared, or of another type.
-        """
+        """The declaration, of this type, of a name that a statement refers to."""
         get = self._data.get(name.lower())
         if get is None or get.kind != kind:
             statement.refuse(f"{kind} that is declared", name if get is None else f"{name}, which is {get.kind}")
         return get
 
     def target(self, statement: RapidStatement, name: str, *, is_cartesian: bool) -> str:
-        """Text of a target that is declared.
-
-        Raises:
-            InputError: It is not declared.
-        """
+        """Text of a target that is declared."""
         return self.require(statement, name, "robtarget" if is_cartesian else "jointtarget").value or ""
 
     def tasks(self, name: str) -> list[str]:
@@ -62,14 +54,7 @@ class RapidData:
 def read_data(
     frame: ExportFrame, unit: RapidUnit, modules: list[tuple[str, RapidModule]], part: PartFrame | None
 ) -> RapidData:
-    """Declarations of a robot, their values compared with the cell.
-
-    Args:
-        part: Where the part is held; None for a robot without targets on it.
-
-    Raises:
-        InputError: With file and line, when a declaration is not as it must be.
-    """
+    """Declarations of a robot, their values compared with the cell; ``part`` is None without targets on it."""
     data: dict[str, Datum] = {}
     for _, module in modules:
         for name, datum in module.data.items():

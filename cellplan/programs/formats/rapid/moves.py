@@ -59,11 +59,7 @@ class RapidMove(NamedTuple):
 
 
 def read_move(statement: RapidStatement, unit: RapidUnit, data: RapidData, place: Place) -> RapidMove:
-    """One move; everything that it refers to is declared.
-
-    Raises:
-        InputError: With file and line, when it is no such move.
-    """
+    """One move; everything that it refers to is declared."""
     match = _MOVE.fullmatch(statement.text)
     if match is None:
         statement.refuse("a move")

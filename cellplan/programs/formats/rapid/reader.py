@@ -51,11 +51,7 @@ class _Task(NamedTuple):
 
 
 def read_rapid(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """The rows of each program that exported files hold.
-
-    Raises:
-        InputError: With file and line, where a text is not such a program or breaks a rule of MultiMove.
-    """
+    """The rows of each program that files hold, by the rules of MultiMove; an ``InputError`` has file and line."""
     units, part = rapid_units(frame), part_frame(frame)
     left, programs = dict(files), []
     for name in frame.programs:

@@ -30,11 +30,7 @@ _ABSENT: Final = 9e9
 
 
 def rows_of(unit: RapidUnit, moves: Sequence[RapidMove], marks: tuple[int, ...]) -> RobotRows:
-    """Rows of a robot; ``q`` of an arm is NaN at targets on the part.
-
-    Raises:
-        InputError: With file and line, when a target is none of this robot.
-    """
+    """Rows of a robot, whose targets must be its own; ``q`` of an arm is NaN at targets on the part."""
     is_cartesian = np.array([move.is_cartesian for move in moves])
     arm, external = np.zeros((len(moves), 6)), np.zeros((len(moves), EXTERNAL_AXES))
     X_PT, turns = np.full((len(moves), 4, 4), np.nan), np.full((len(moves), 4), 0, dtype=int)
@@ -71,9 +67,8 @@ def rows_of(unit: RapidUnit, moves: Sequence[RapidMove], marks: tuple[int, ...])
 def _rounding(unit: RapidUnit, moves: Sequence[RapidMove], q: Array, p: Array) -> Array:
     """Share of the shorter neighbouring segment within which each row is rounded, shape (N,).
 
-    Args:
-        q: Its rows, NaN at targets on the part, shape (N, n).
-        p: Tool on the part in [m] at these, NaN at all others, shape (N, 3).
+    Rows ``q`` are NaN at targets on the part, shape (N, n); the tool ``p`` on the part in [m] at all others, shape (N,
+    3).
     """
     tool, turns, slides = (np.array([move.zone[place] for move in moves]) for place in range(3))
     if not unit.has_tool:

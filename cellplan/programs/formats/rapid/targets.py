@@ -27,11 +27,7 @@ FORWARD_TOL: Final = 1e-3  # [m] an arm whose wrist is nearer than this to the p
 
 
 def joint_targets(unit: RapidUnit, q: Array) -> list[str]:
-    """Joint targets ``[[6],[6]]`` of positions in [rad] or [m], shape (N, n).
-
-    Raises:
-        InputError: A position cannot be written with the decimals.
-    """
+    """Joint targets ``[[6],[6]]`` of positions in [rad] or [m], shape (N, n)."""
     numbers = to_numbers(unit.robot, q, decimals=unit.decimals)
     arm = _fields(numbers[:, unit.axes.arm], unit.decimals) if unit.has_tool else [",".join([ABSENT] * 6)] * len(q)
     return [f"[[{axes}],[{rest}]]" for axes, rest in zip(arm, _external(unit, numbers), strict=True)]
@@ -43,9 +39,6 @@ def part_targets(unit: RapidUnit, q: Array, X_PT: Array) -> list[str]:
     Args:
         q: Its joints in [rad] or [m], shape (N, n), whose configuration is stated.
         X_PT: Its tool tip in the part frame, shape (N, 4, 4), in [m].
-
-    Raises:
-        InputError: A position cannot be written, or the configuration of such an arm is not known.
     """
     places = _fields(X_PT[:, :3, 3] * MM, unit.decimals)
     turns = _fields(quaternions(X_PT[:, :3, :3]), QUATERNION_DECIMALS)
@@ -64,16 +57,11 @@ def frame_text(X: Array, decimals: int) -> str:
 
 
 def configuration(robot: Robot, q: Array) -> NDArray[np.int_]:
-    """Configuration data cf1, cf4, cf6, cfx of an arm, shape (N, 4).
+    """Configuration data cf1, cf4, cf6, cfx, shape (N, 4), of an arm with joints ``q`` in [rad] or [m], shape (N, n).
 
     Which side is in front follows from the zero of the controller, at which the arm is stretched forward.
 
-    Args:
-        robot: A robot whose last six joints are those of an arm with a wrist of three axes that meet.
-        q: Its joints in [rad] or [m], shape (N, n).
-
-    Raises:
-        InputError: The robot is no such arm.
+    ``InputError`` unless the last six joints are those of an arm with a wrist of three axes that meet.
     """
     arm = list(Axes.of(robot).arm)
     zero = from_numbers(robot, np.zeros((1, len(robot.model.joints))))

@@ -30,11 +30,7 @@ class RapidStatement:
     line: int  # its first line there
 
     def refuse(self, expected: str, got: str | None = None) -> NoReturn:
-        """Raise an ``InputError`` that says what was expected here.
-
-        Raises:
-            InputError: Always.
-        """
+        """Raise an ``InputError`` that says what was expected here."""
         shown = repr(self.text[:_SHOWN]) if got is None else got[:_SHOWN]
         raise InputError(f"{self.file}:{self.line}: expected {expected}, got {shown}")
 
@@ -63,11 +59,7 @@ class RapidModule:
 
 
 def read_module(text: str, file: str) -> RapidModule:
-    """A module of declarations and routines, with unknown statements left in the routines.
-
-    Raises:
-        InputError: With file and line, when the text is no such module.
-    """
+    """A module of declarations and routines, with unknown statements left in the routines."""
     statements = _statements(text, file)
     first = next(statements, None)
     if first is None or not first.text.lower().startswith("module "):
@@ -99,11 +91,7 @@ def read_module(text: str, file: str) -> RapidModule:
 
 
 def value_of(datum: Datum) -> Any:
-    """Value of a declaration as nested lists of booleans, strings and numbers.
-
-    Raises:
-        InputError: It is no such value.
-    """
+    """Value of a declaration as nested lists of booleans, strings and numbers."""
     plain = re.sub(r"\b(true|false)\b", lambda match: match[0].lower(), datum.value or "", flags=re.I)
     try:
         return json.loads(plain, parse_int=float, parse_constant=_no_number)

@@ -74,11 +74,7 @@ class PartFrame:
 
 
 def rapid_units(frame: ExportFrame) -> tuple[RapidUnit, ...]:
-    """Robots of an export in the order of the cell.
-
-    Raises:
-        InputError: A robot has no controller of the kind, or what is promised needs another arrangement of tasks.
-    """
+    """Robots of an export in the order of the cell; controllers and tasks must be such as the promise needs."""
     modules = safe_names(frame.robots, longest=LONGEST_MODULE, reserved=WORDS | DECLARED_NAMES)
     is_synchronised = frame.promise is Promise.SYNCHRONISED
     if is_synchronised:
@@ -116,8 +112,7 @@ def part_frame(frame: ExportFrame) -> PartFrame | None:
     The holder's flange carries the part without moving in it, so its work object states no user frame, and the part in
     the flange as object frame: ``X_FP = X_FT X_TP`` of the holder.
 
-    Raises:
-        InputError: No robot of the export carries the part, or the robots are not synchronised.
+    ``InputError`` where no robot of the export carries the part, or the robots are not synchronised.
     """
     if frame.targets is not Targets.PART:
         return None

@@ -74,11 +74,7 @@ TURN: Final = 0.1  # [deg] of a turn for each [mm] of a zone, as the zones of th
 
 
 def render_rapid(job: ExportJob) -> dict[str, str]:
-    """Text of every file: a program file and the modules of each robot, in a folder for each of several programs.
-
-    Raises:
-        InputError: Something cannot be written or promised.
-    """
+    """Text of every file: a program file and the modules of each robot, in a folder for each of several programs."""
     raise_findings(refusals(*_demands(job.frame, 0)))
     units, part = rapid_units(job.frame), part_frame(job.frame)
     files: dict[str, str] = {}

@@ -34,13 +34,10 @@ class _Part:
 
 
 def read_ros2(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly; spaces, comments and empty lines may be others.
+    """Read files back, strictly but for spaces, comments and empty lines; an ``InputError`` has file and line.
 
     Speeds have to fit the positions: each lies among the slopes of the two steps before it and of the two after it,
     or beyond them by no more than they differ. The parts of a split trajectory follow on one another.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file.
     """
     paths = {(name, robot): _paths(frame, files, name, robot) for name in frame.programs for robot in frame.robots}
     require_paths(files, [path for trajectory in paths.values() for path in trajectory])

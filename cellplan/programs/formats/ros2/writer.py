@@ -33,9 +33,8 @@ REST: Final = 1e-6  # [rad/s] or [m/s] a slower joint rests
 def render_ros2(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>.yaml``, or ``<robot>_1_of_3.yaml`` where ``--split`` is given.
 
-    Raises:
-        InputError: Rows have no speeds or do not rest at their ends, a number cannot be written, or robots rest
-            nowhere within the largest number of points.
+    ``InputError`` where rows have no speeds or do not rest at their ends, a number cannot be written, or robots rest
+    nowhere within the largest number of points.
     """
     files = {}
     for program in job.programs:
@@ -53,11 +52,7 @@ def render_ros2(job: ExportJob) -> dict[str, str]:
 
 
 def _rest_velocities(rows: RobotRows) -> Array:
-    """Speeds of rows, exactly zero at both ends, shape (N, n).
-
-    Raises:
-        InputError: There are none, or the robot moves at an end.
-    """
+    """Speeds of rows, which must be there and zero at both ends, to rounding; exactly zero there, shape (N, n)."""
     if rows.qd is None:
         raise InputError(f"robot '{rows.robot}': expected rows with speeds, got none")
     qd = rows.qd.copy()
@@ -77,11 +72,7 @@ def _rest_velocities(rows: RobotRows) -> Array:
 
 
 def _parts(job: ExportJob, clock: Array, velocities: Mapping[str, Array]) -> list[tuple[int, int]]:
-    """First and last row of each part: as few parts as hold no more points than a controller takes.
-
-    Raises:
-        InputError: Robots do not rest together often enough.
-    """
+    """First and last row of each part: as few parts as hold no more points than a controller takes."""
     count, most = len(clock), job.frame.split
     _require_split(job.frame, count)
     if most is None:

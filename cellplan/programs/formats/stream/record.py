@@ -46,11 +46,7 @@ def stream_axes(robot: Robot) -> tuple[StreamAxis, ...]:
 
 
 def whole_cycle(robot: Robot) -> int:
-    """Cycle of a robot's controller in whole microseconds.
-
-    Raises:
-        InputError: It is no whole number of them.
-    """
+    """Cycle of a robot's controller, which is a whole number of microseconds."""
     cycle = cycle_of(robot) * MICRO
     if cycle < 0.5 or abs(cycle - round(cycle)) > 1e-6 * cycle:
         raise InputError(
@@ -69,15 +65,10 @@ def stream_record(
     digest: str,
     notes: Sequence[str] = (),
 ) -> dict[str, Written]:
-    """The record beside a stream.
+    """The record beside a stream with this SHA-256.
 
-    Args:
-        quanta: Written positions as whole numbers of the last decimal, in the order of the columns, shape (N, n).
-        digest: SHA-256 of the stream.
-
-    Raises:
-        InputError: The controller follows a stream with a latency that is not stated, or counts an axis in a way that
-            is not stated.
+    Quanta are written positions as whole numbers of the last decimal, in the order of the columns, shape (N, n).
+    ``InputError`` where latency or counting is needed and not stated.
     """
     placed = frame.robot(robot)
     cycle, zero = whole_cycle(placed), placed.model.controller
@@ -110,11 +101,7 @@ def stream_record(
 
 
 def stated_controller(frame: ExportFrame, robot: Robot) -> ControllerEntry | None:
-    """The controller of a robot; None when none is stated.
-
-    Raises:
-        InputError: It needs something that is not stated.
-    """
+    """The controller of a robot; None when none is stated; ``InputError`` where it needs what is not stated."""
     if robot.control is None:
         return None
     controller = frame.cell.controllers[robot.control.id]

@@ -40,12 +40,8 @@ RESERVED: Final = "export"  # the record of an export has that name
 def render_stream(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>.csv`` and ``<robot>.json``, in a folder of each task.
 
-    Args:
-        job: What is written; the rows of a robot are on the cycle of its controller.
-
-    Raises:
-        InputError: Rows are not on the cycle, robots end at different times, or something that a controller needs is
-            not stated.
+    ``InputError`` where rows are not on the cycle of the controller, robots end at different times, or something that a
+    controller needs is not stated.
     """
     raise_findings(refusals(*_demands(job.frame, 0)))
     files = {}
@@ -77,11 +73,7 @@ def _require_name(frame: ExportFrame, name: str) -> None:
 
 
 def read_stream(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly: rows at rest at both ends, and figures that are those of the rows.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file.
-    """
+    """Read files back, strictly: rows at rest at both ends, and figures that are those of the rows."""
     endings = (".csv", ".json")
     require_paths(
         files, [file_path(name, robot + end) for name in frame.programs for robot in frame.robots for end in endings]

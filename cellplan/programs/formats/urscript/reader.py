@@ -58,14 +58,7 @@ class _Statements:
         self.last = len(lines)
 
     def call_routines(self, most: int) -> None:
-        """Put the instructions of all routines where the program calls these, in their order.
-
-        Args:
-            most: Most rows of a routine, or of a program without any.
-
-        Raises:
-            InputError: A routine has more rows, another name, or is not called next.
-        """
+        """Put the instructions of routines, of at most so many rows, where the program calls them in order."""
         inside, called = list[UrscriptStatement](), list[str]()
         while self.peek().text.startswith("def "):
             called.append(page_name(len(called) + 1))
@@ -102,43 +95,27 @@ class _Statements:
             raise InputError(f"{self.file}:{line}: expected {most} rows at most in a routine, got {len(moves)}")
 
     def peek(self) -> UrscriptStatement:
-        """The next instruction.
-
-        Raises:
-            InputError: There is none.
-        """
+        """The next instruction; ``InputError`` where there is none."""
         if self.place == len(self.all):
             raise truncated_error(self.file, self.last, "an instruction")
         return self.all[self.place]
 
     def take(self, expected: str) -> None:
-        """Go past an instruction that has to be a given one.
-
-        Raises:
-            InputError: It is another one.
-        """
+        """Go past an instruction that has to be a given one."""
         statement = self.peek()
         if statement.text != compact(expected):
             raise line_error(self.file, statement.line, expected.strip(), statement.shown)
         self.place += 1
 
     def end(self) -> None:
-        """Make sure that nothing follows.
-
-        Raises:
-            InputError: Something does.
-        """
+        """Make sure that nothing follows."""
         if self.place < len(self.all):
             statement = self.all[self.place]
             raise line_error(self.file, statement.line, "the end of the file", statement.shown)
 
 
 def read_urscript(frame: ExportFrame, files: Mapping[str, str]) -> tuple[ProgramRows, ...]:
-    """Read the files of an export back, strictly; spaces, comments and empty lines may be others.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file.
-    """
+    """Read files back, strictly but for spaces, comments and empty lines; an ``InputError`` has file and line."""
     keys = [(program, robot) for program in frame.programs for robot in frame.robots]
     paths = {key: file_path(key[0], f"{key[1]}{ENDING}") for key in keys}
     require_paths(files, tuple(paths.values()))
@@ -182,11 +159,7 @@ class _Points:
         self.expected = f"{ARM} positions with {decimals} decimals"
 
     def add(self, statements: _Statements, pattern: re.Pattern[str], what: str) -> re.Match[str]:
-        """Take in the row of the next instruction.
-
-        Raises:
-            InputError: It is another instruction.
-        """
+        """Take in the row of the next instruction, which has to match the pattern."""
         statement = statements.peek()
         match = pattern.fullmatch(statement.text)
         if match is None:
@@ -197,11 +170,7 @@ class _Points:
         return match
 
     def rows(self, *, times: bool, marks: tuple[int, ...] = ()) -> RobotRows:
-        """All rows.
-
-        Raises:
-            InputError: A position is beyond two turns.
-        """
+        """All rows, none beyond two turns."""
         where = [f"{self.file}:{line}" for line in self.lines]
         numbers = np.array(self.numbers)
         require_turns(self.robot.model.joint_names, numbers, row_of=where)

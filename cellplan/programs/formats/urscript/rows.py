@@ -59,8 +59,7 @@ def blend_radii(robot: Robot, rows: RobotRows, blend: Array | float) -> Array:
     It is that of the tool tip after its share ``blend`` of the shorter neighbouring segment. Which
     rows are stops: ``corners.may_round``.
 
-    Args:
-        blend: Share of a segment, 0 to 0.5, of all rows or of each, shape (N,).
+    The share ``blend`` is 0 to 0.5, of all rows or of each, shape (N,).
     """
     if not np.any(np.asarray(blend) > 0.0):
         return np.zeros(len(rows))

@@ -45,11 +45,7 @@ def function_names(frame: ExportFrame) -> dict[tuple[str | None, str], str]:
 
 
 def decimals_of_urscript(frame: ExportFrame, robot: Robot) -> int:
-    """Decimals of a robot's positions, which has six joints.
-
-    Raises:
-        InputError: It has other joints, or states so few decimals that rounding would be felt as acceleration.
-    """
+    """Decimals of the positions of a robot of six joints: enough that rounding is not felt as acceleration."""
     joints = robot.model.joints
     if len(joints) != ARM or not all(joint.is_revolute for joint in joints):
         raise InputError(f"robots.{robot.name}: expected {ARM} turning joints for urscript, got {len(joints)} joints")
@@ -74,15 +70,7 @@ def page_name(number: int) -> str:
 
 
 def require_turns(joints: Sequence[str], numbers: Array, *, row_of: Sequence[str]) -> None:
-    """Make sure that no position is beyond two turns.
-
-    Args:
-        numbers: Written positions in [rad], shape (N, 6).
-        row_of: Where each row stands, for messages.
-
-    Raises:
-        InputError: One is.
-    """
+    """Make sure that no written position in [rad], shape (N, 6), is beyond two turns; rows have places."""
     beyond = np.argwhere(np.abs(numbers) > TURNS)
     if len(beyond):
         row, place = (int(index) for index in beyond[0])
@@ -92,11 +80,7 @@ def require_turns(joints: Sequence[str], numbers: Array, *, row_of: Sequence[str
 
 
 def servo_call(frame: ExportFrame, robot: Robot) -> str:
-    """Arguments of ``servoj`` after the joints.
-
-    Raises:
-        InputError: The cycle is none of the controller, or the latency is not stated or too short.
-    """
+    """Arguments of ``servoj`` after the joints; cycle and latency are stated, and such as the controller takes."""
     cycle = cycle_of(robot)
     if not any(abs(cycle - known / 1000.0) <= OFF_CYCLE for known in CYCLES):
         raise InputError(
@@ -126,11 +110,7 @@ def stop_call(robot: Robot) -> str:
 
 
 def handshake_lines(frame: ExportFrame, robot: str) -> list[str]:
-    """Instructions of a robot at a mark; none in a cell of one robot.
-
-    Raises:
-        InputError: A signal is not stated, or is none of the standard digital ones.
-    """
+    """Instructions of a robot at a mark, by standard digital signals; none in a cell of one robot."""
     lines = []
     for step in handshake_steps(frame, robot):
         require_standard_signals(frame, robot)

@@ -44,9 +44,8 @@ from cellplan.programs.formats.urscript.text import (
 def render_urscript(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path in the folder of the export: ``<robot>.script``, in a folder of each task.
 
-    Raises:
-        InputError: A robot has other joints than six, a position beyond two turns, or lacks something
-            that its program needs.
+    ``InputError`` for a robot that has other joints than six, a position beyond two turns, or lacks something that its
+    program needs.
     """
     raise_findings(refusals(*_demands(job.frame, 0)))
     names, files = function_names(job.frame), {}

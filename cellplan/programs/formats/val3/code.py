@@ -38,14 +38,7 @@ Node = Statement | Loop
 
 
 def read_code(code: Val3Element, counters: Collection[str]) -> tuple[list[Node], Statement]:
-    """Statements of a program between ``begin`` and ``end``, and its ``end``.
-
-    Args:
-        counters: Names of the numbers that loops may count with.
-
-    Raises:
-        InputError: With file and line, where a statement is none of those that such programs have.
-    """
+    """Statements of a program between ``begin`` and ``end``, whose loops use these counters, and its ``end``."""
     texts = (line.partition("//")[0].strip() for line in code.text.split("\n"))
     lines = [Statement(code.file, line, text) for line, text in enumerate(texts, start=code.text_line) if text]
     first, last = (lines[0], lines[-1]) if lines else [Statement(code.file, code.line, "")] * 2
@@ -64,11 +57,7 @@ class _CodeReader:
     counters: Collection[str]  # names of the numbers that loops may count with
 
     def statements(self, inside: tuple[str, ...], line: Statement) -> list[Node]:
-        """Statements after a line up to the end of the loop, or of the program.
-
-        Args:
-            inside: What the loops around them count with.
-        """
+        """Statements after a line up to the end of the loop, or of the program; ``inside`` are the counters around."""
         nodes = list[Node]()
         while self.lines:
             line = self.lines.pop()

@@ -53,11 +53,7 @@ class Data:
 
 
 def read_data(text: str, file: str) -> dict[str, Data]:
-    """Data of a project by name.
-
-    Raises:
-        InputError: With file and line.
-    """
+    """Data of a project by name."""
     database = parse(text, file, "Database", DATA_SPACE)
     database.require()
     database.only("Datas")

@@ -35,8 +35,7 @@ PROJECTS: Final = ProgramNames(NAME, WORDS, DATA)
 def signal_names(steps: Iterable[HandshakeStep]) -> dict[tuple[bool, str], str]:
     """Names of the data of signals: the signal itself where it can be one, else a name of this format.
 
-    Returns:
-        The names by whether it is an input, and by the signal, in the order of their first use.
+    They are given by whether it is an input, and by the signal, in the order of their first use.
     """
     used = {word.lower() for word in WORDS}
     names: dict[tuple[bool, str], str] = {}
@@ -59,11 +58,7 @@ def link(signal: str, *, is_input: bool) -> str:
 
 
 def require_links(frame: ExportFrame, robot: str) -> None:
-    """Refuse handshake signals that are no links.
-
-    Raises:
-        InputError: With the key path.
-    """
+    """Refuse handshake signals that are no links."""
     for path, signal in signals_by_key(frame, robot).items():
         if not re.fullmatch(r"[A-Za-z0-9_%.:/\\-]+", signal):
             raise InputError(

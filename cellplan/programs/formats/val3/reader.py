@@ -28,11 +28,7 @@ def read_val3(
 ) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly: positions, marks, zones; they state neither times nor process.
 
-    Args:
-        paths: Folder of each project, by program and robot.
-
-    Raises:
-        InputError: With file and line, when a text is not such a file, or a file is missing or is one too many.
+    A project has its folder by program and robot. An ``InputError`` has file and line.
     """
     return read_programs(frame, files, paths, _rows)
 
@@ -169,11 +165,7 @@ class _Val3Player:
     steps: int = 0  # number of statements that were done
 
     def play_all(self) -> None:
-        """Follow ``start`` and what it calls, and make sure that all that the project holds was used.
-
-        Raises:
-            InputError: With file and line.
-        """
+        """Follow ``start`` and what it calls, and make sure that all that the project holds was used."""
         start, stop = (self.project.programs[name] for name in (START, STOP))
         for node in stop.code:
             if _statement(node).kind != "RESET":

@@ -54,9 +54,8 @@ class _Move(NamedTuple):
 def render_val3(job: ExportJob) -> dict[str, str]:
     """Text of every file, by its path: ``<robot>/<robot>.pjx`` and so on, or ``<robot>/<program>/<program>.pjx``.
 
-    Raises:
-        InputError: A robot cannot be written: it has no Staubli controller, is no arm of six axes alone, lacks a
-            signal, or a position cannot be written with the decimals.
+    ``InputError`` for a robot without a Staubli controller, that is no arm of six axes alone, lacks a signal, or has a
+    position that cannot be written with the decimals.
     """
     paths = program_paths(job.frame, VAL3, PROJECTS)
     raise_findings(refusals(*_demands(job.frame, 0)))

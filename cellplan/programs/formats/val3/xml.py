@@ -35,11 +35,7 @@ class Val3Element:
         return InputError(f"{self.file}:{self.line}: expected {expected}, got {got[:60]!r}")
 
     def require(self, *, needed: Collection[str] = (), allowed: Collection[str] = ()) -> None:
-        """Make sure that it has the attributes that it needs, and no unknown one.
-
-        Raises:
-            InputError: With file and line.
-        """
+        """Make sure that it has the attributes that it needs, and no unknown one."""
         for name in needed:
             if name not in self.attributes:
                 raise self.error(f"the attribute {name.rpartition(' ')[2]}", "none")
@@ -48,11 +44,7 @@ class Val3Element:
                 raise self.error("no other attributes", name.rpartition(" ")[2])
 
     def only(self, *names: str) -> list["Val3Element"]:
-        """Its elements, which all have one of some names and its own namespace; it has no text.
-
-        Raises:
-            InputError: With file and line.
-        """
+        """Its elements, which all have one of some names and its own namespace; it has no text."""
         for child in self.children:
             if child.space != self.space or child.name not in names:
                 raise child.error(" or ".join(names) or "no element", child.name)
@@ -61,11 +53,7 @@ class Val3Element:
         return self.children
 
     def one(self, name: str) -> "Val3Element":
-        """The only element of a name in its own namespace.
-
-        Raises:
-            InputError: With file and line: there is none, or another one.
-        """
+        """The only element, of this name and in its own namespace."""
         matching = [child for child in self.children if (child.space, child.name) == (self.space, name)]
         if len(matching) != 1:
             raise self.error(f"{name} once", f"{len(matching)} of them")
@@ -73,16 +61,7 @@ class Val3Element:
 
 
 def parse(text: str, file: str, root: str, space: str) -> Val3Element:
-    """Read a file.
-
-    Args:
-        text: Its text; a mark of the byte order before it is left out.
-        root: Name of the element that holds all others.
-        space: Its namespace.
-
-    Raises:
-        InputError: With file and line, where it is no well-formed XML or something else.
-    """
+    """The root element of a text, of this name and namespace; a mark of the byte order before it is left out."""
     split_lines(text, file)  # refuses two kinds of line ends
     parser = expat.ParserCreate(namespace_separator=" ")
     top = Val3Element(file=file, line=1, space="", name="", attributes={})

@@ -98,22 +98,15 @@ class PairMotion:
         return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING_TOL
 
     def displacement(self, sample: int, others: slice | Indices) -> tuple[Array, Array]:
-        """Farthest that a point of the second body seen from the first, and of the first seen from the second, moved.
-
-        Returns:
-            Two arrays in [m], shape (m,).
-        """
+        """Farthest that a point of either body moved, seen from the other, in [m]: the second's, the first's."""
         turn = _turns(self._R_AB[others] - self._R_AB[sample])
         return self._b_in_A.displacement(sample, others, turn), self._a_in_B.displacement(sample, others, turn)
 
     def carry(self, reading: Reading, sample: int, *, first: int, last: int, low: Array) -> None:
         """Raise the lower bounds of the steps from one sample to a later one by what a reading proves there.
 
-        Args:
-            reading: What is known at ``sample``.
-            first: First sample of the steps, at most ``sample``.
-            last: Last sample of the steps, at least ``sample``.
-            low: Bounds of all steps in [m], shape (n - 1,).
+        The reading is at ``sample``, no earlier than ``first`` and no later than ``last``, between which the steps lie;
+        bounds are those of all steps in [m], shape (n - 1,).
         """
         if last <= first:
             return

@@ -90,9 +90,7 @@ def read_piece(engine: Engine, pair: Pair, poses: BodyPoses, *, sample: int, goa
     Where the hulls do not prove the goal, small pieces are measured exactly; large ones are not, as their own pieces
     are less work.
 
-    Args:
-        pair: The piece and the other body, or the other way round.
-        goal: Distance in [m] that is to be proved.
+    The piece may come first or second; the goal is a distance in [m].
     """
     reading = quick_reading(engine, pair, poses, sample=sample)
     if reading.touches or reading.is_exact or reading.bound >= goal:

@@ -16,18 +16,13 @@ ROUND_SIDE_COUNT: Final = 96  # [-] sides of a sphere or the caps of a capsule: 
 
 
 def outside_zone(shape: Solid, centre: Array, radius: float) -> tuple[Mesh | None, bool]:
-    """Surface of a solid outside a ball, and whether the ball holds any of it.
+    """Surface of a solid outside a ball, None when there is none, and whether the ball holds any of it.
 
     Triangles across the border are cut down to 1/16 of the radius and kept unless they lie wholly inside, so the
     surface reaches into the zone by no more than that: the strict side.
 
-    Args:
-        shape: The solid; a round one is taken a little larger than it is.
-        centre: Centre of the zone in the solid's frame in [m], shape (3,).
-        radius: Radius of the zone in [m].
-
-    Returns:
-        The surface outside, None when there is none; and whether some of it was inside.
+    A round solid is taken a little larger than it is. The ball has its centre in the solid's frame in [m], shape (3,),
+    and a radius in [m].
     """
     return _outside_zone(shape, (float(centre[0]), float(centre[1]), float(centre[2])), radius)
 

@@ -59,23 +59,14 @@ def overlap_depth(
 
 
 def ground_depth(body: CollisionBody, poses: BodyPoses, index: int, *, X_WS: Array) -> Array:
-    """How deep a solid reaches below the surface of a half-space at each sample in [m], shape (N,); exact.
-
-    Args:
-        index: Which of them the solid is.
-        X_WS: Pose of the half-space.
-    """
+    """How deep solid ``index`` of some poses reaches below a half-space at each sample in [m], shape (N,); exact."""
     return np.maximum(0.0, body.looseness - heights(body.hull, poses.R[index], poses.p[index], X_WS=X_WS))
 
 
 def convex_depth(first: Solid, second: Solid, R_AB: Array, p_AB: Array) -> float:
-    """Depth of two convex solids in [m], never less than the truth; zero where they do not overlap.
+    """Depth of convex solids A and B in [m], never less than the truth; zero where they do not overlap.
 
-    Args:
-        first: Convex solid A.
-        second: Convex solid B.
-        R_AB: Rotation of B in A, shape (3, 3).
-        p_AB: Position of B in A in [m], shape (3,).
+    B has the rotation ``R_AB``, shape (3, 3), and the position ``p_AB`` in [m], shape (3,), in A.
     """
     n = _octants()
     v = _difference(first, second, R_AB, p_AB, n)

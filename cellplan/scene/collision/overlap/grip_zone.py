@@ -17,14 +17,9 @@ def outside_grip(shape: Solid, X_ST: Array, *, radius: float, layer: float) -> t
 
     The layer is what lets a broad pad lie flat on the part; behind it nothing may touch.
 
-    Args:
-        shape: The solid; a round one is taken a little larger than it is.
-        X_ST: Pose of the tool tip in the solid's frame, z out of the tool.
-        radius: Radius of the ball in [m].
-        layer: Half the thickness of the layer in [m].
-
-    Returns:
-        The surface outside, None when there is none; and whether some of it was inside.
+    None when there is none; and whether some of it was inside. A round solid is taken a little larger than it is. The
+    tip has its pose in the solid's frame, z out of the tool; the radius of the ball and half the thickness of the layer
+    are in [m].
     """
     surface, is_in_ball = outside_zone(shape, X_ST[:3, 3], radius)
     if surface is None:

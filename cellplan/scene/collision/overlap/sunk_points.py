@@ -158,11 +158,9 @@ def _probe(body: CollisionBody) -> Engine:
 def _depths(probe: Engine, points: Array, *, worth: Array, sides: Array) -> Array:
     """Depth of points in a solid in [m], shape (N,): exact inside, zero or less outside, changing evenly.
 
-    Args:
-        probe: The solid, and a point.
-        points: Shape (N, 3), in the frame of the solid in [m].
-        worth: Of points nearer to the surface than that in [m], shape (N,), their side is not determined.
-        sides: Points that are known to be outside, 1, or inside, -1, of all others 0, shape (N,).
+    Points are in the frame of the solid in [m], shape (N, 3). Of those nearer to the surface than ``worth`` in [m],
+    shape (N,), the side is not determined. ``sides`` is 1 for points known to be outside, -1 inside, else 0, shape
+    (N,).
     """
     match probe.bodies[0].shape:
         case Box(size):

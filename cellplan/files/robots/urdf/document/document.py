@@ -102,14 +102,9 @@ Named = TypeVar("Named", UrdfLink, UrdfJoint)
 
 
 def read_document(path: Path, settings: XacroSettings | None = None) -> UrdfDocument:
-    """Read a URDF, or expand a xacro file into one, and check every element for itself.
+    """Read a URDF, or expand a file ``.xacro`` with its settings into one, and check every element for itself.
 
-    Args:
-        path: The file; one whose name ends in ``.xacro`` is expanded.
-        settings: What a xacro file needs to be expanded.
-
-    Raises:
-        InputError: With file and line, for anything that is missing, double, misspelt, out of range or not supported.
+    An ``InputError`` has file and line of what is missing, double, misspelt, out of range or not supported.
     """
     remarks = Remarks()
     root, included = read_elements(path, settings, remarks)

@@ -35,9 +35,6 @@ class Packages:
 
         Returns:
             Paths within the allowed folders, at least one, those of existing files first; and the remark or None.
-
-        Raises:
-            InputError: There is no such package.
         """
         folders = dict.fromkeys(self._named(package))
         stated = [folder for folder in folders if _stated_name(folder) in ("", package)]

@@ -51,13 +51,9 @@ NEEDED_LIMITS: Final = {"continuous": ("velocity",)}  # of other moving joints t
 
 
 def check_spelling(links: Iterable[Element], joints: Iterable[Element], remarks: Remarks) -> None:
-    """Compare all names below links and joints with the known ones.
+    """Compare all names below links and joints with the known ones; unknown ones go into the remarks.
 
-    Args:
-        remarks: Takes the names that are not known.
-
-    Raises:
-        InputError: A name resembles one that is missing and needed.
+    ``InputError`` where one resembles a name that is missing and needed.
     """
     for link in links:
         owner = f"link '{link.attributes.get('name', '')}'"

@@ -46,11 +46,7 @@ class UrdfLimit:
 
 
 def read_limit(joint: Element, owner: str, *, kind: str, remarks: Remarks) -> UrdfLimit:
-    """Limits of a joint; what leaves no room, is not positive or is beyond all machines counts as not given.
-
-    Args:
-        remarks: Takes what is stated and not used.
-    """
+    """Limits of a joint; what leaves no room, is not positive or is beyond all machines goes into the remarks."""
     limit = joint.one("limit", owner)
     if kind == "fixed":
         return UrdfLimit()
@@ -73,13 +69,7 @@ def read_limit(joint: Element, owner: str, *, kind: str, remarks: Remarks) -> Ur
 def within_range(
     limit: UrdfLimit, lower: float | None, upper: float | None, *, slides: bool
 ) -> tuple[StatedLimits, str]:
-    """A narrower range as far as it makes sense, and what was not used of it; empty for nothing.
-
-    Args:
-        lower: Lowest position; None where none is stated.
-        upper: Highest position; None where none is stated.
-        slides: Whether the joint slides rather than turns.
-    """
+    """A narrower range, None where no end is stated, as far as it makes sense, and what was not used of it."""
     unit, (lowest, highest) = joint_unit(is_revolute=not slides), limit.ends
     low, high = -np.inf if lower is None else lower, np.inf if upper is None else upper
     texts = [f"{unit.scale * value:.6g}" for value in (low, high)]

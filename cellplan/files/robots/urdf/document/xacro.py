@@ -51,12 +51,7 @@ class XacroSettings:
 def read_elements(
     path: Path, settings: XacroSettings | None, remarks: Remarks
 ) -> tuple[Element, tuple[Path, ...] | None]:
-    """The root element of an XML file, and the files that a xacro file includes, each once; None for another file.
-
-    Args:
-        path: The file; one whose name ends in ``.xacro`` is expanded.
-        settings: What a xacro file needs to be expanded.
-    """
+    """The root element of a file, and the files that one called ``.xacro`` includes; None for another file."""
     if path.suffix.lower() == XACRO_SUFFIX:
         return _Expansion(path, settings or XacroSettings(), remarks).run()
     return read_xml(path), None
@@ -80,12 +75,7 @@ class _Files:
         self.known: dict[Path, None] = {}
 
     def read(self, filename: str) -> tuple[Path, bytes]:
-        """Path and content of a file within the allowed folders.
-
-        Raises:
-            FileNotFoundError: There is none.
-            InputError: It is elsewhere, or cannot be read.
-        """
+        """Path and content of a file within the allowed folders; ``FileNotFoundError`` where there is none."""
         path = self.path_of(filename)
         if self._within is not None and not self._within.holds(path):
             what = "expected files below the folder of the cell file"

@@ -82,20 +82,12 @@ class Element:
 
 
 def read_xml(path: Path) -> Element:
-    """Read the root element of an XML file without document type, entities or anything else that reaches out.
-
-    Raises:
-        InputError: The file cannot be read, is too large, not well-formed or declares a document type.
-    """
+    """Read the root element of an XML file without document type, entities or anything else that reaches out."""
     return parse_xml(read_regular_file(path, file=path.name, limit=MAX_BYTES), path.name)
 
 
 def parse_xml(data: bytes, file: str) -> Element:
-    """The same of the bytes of a file.
-
-    Raises:
-        InputError: They are not well-formed or declare a document type.
-    """
+    """The same of the bytes of a file."""
     return _Builder(file).parse(data)
 
 
