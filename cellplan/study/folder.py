@@ -11,7 +11,7 @@ from cellplan.errors import InputError
 from cellplan.files.input.files import digest
 from cellplan.files.run.content import LEFT_ALONE, foreign_within, is_run_folder
 from cellplan.files.run.whole_file import refuse_unless_writable, write_whole
-from cellplan.study.running import STATE, require_idle
+from cellplan.study.running import STATE, cannot_write, require_idle
 
 SCHEMA: Final = "cellplan.study/1"
 JOURNAL: Final = "study.jsonl"
@@ -44,7 +44,7 @@ def refuse_unless_study(folder: Path) -> None:
             )
         require_idle(folder)
     except OSError as error:
-        raise _cannot_write(folder, error) from error
+        raise cannot_write(folder, error) from error
 
 
 def prepare_folder(folder: Path, *, resume: bool) -> None:
@@ -57,7 +57,7 @@ def prepare_folder(folder: Path, *, resume: bool) -> None:
             if entry.name not in expected:
                 shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
     except OSError as error:
-        raise _cannot_write(folder, error) from error
+        raise cannot_write(folder, error) from error
 
 
 def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -67,7 +67,7 @@ def write_results(folder: Path, files: Mapping[str, bytes]) -> None:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(folder / name, content)
         except OSError as error:
-            raise _cannot_write(folder / name, error) from error
+            raise cannot_write(folder / name, error) from error
 
 
 def _foreign(folder: Path) -> str | None:
@@ -125,8 +125,3 @@ def _has_journal(folder: Path) -> bool:
         return False
     with journal.open("rb") as file:
         return f'"schema": "{SCHEMA}"'.encode() in file.read(MARK_WITHIN)
-
-
-def _cannot_write(path: Path, error: OSError) -> InputError:
-    """The error that users see."""
-    return InputError(f"{path}: cannot write the study: {(error.strerror or str(error)).lower()}")

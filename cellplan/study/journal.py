@@ -19,12 +19,7 @@ MAX_BYTES: Final = 500_000_000
 
 
 class Journal:
-    """Writer of a journal, to be used in a ``with`` statement; every line is on the disk before the next trial counts.
-
-    Attributes:
-        trials: The trials that are recorded, in their order; those of an earlier journal need not be repeated.
-        ahead: Trials that are known although one before them is not, by number.
-    """
+    """Writer of a journal, for a ``with`` statement; every line is on the disk before the next trial counts."""
 
     def __init__(self, folder: Path, header: Mapping[str, Any], *, resume: bool) -> None:
         """Name the journal; it is opened by the ``with`` statement.
@@ -39,8 +34,8 @@ class Journal:
         self._header = json.dumps({"schema": SCHEMA, **header}, ensure_ascii=False, allow_nan=False)
         self._files: dict[Path, IO[bytes]] = {}
         self._written = f"{self._header}\n".encode()
-        self.trials: list[StudyTrial] = []
-        self.ahead: dict[int, StudyTrial] = {}
+        self.trials: list[StudyTrial] = []  # recorded ones in order; those of an earlier journal need not be repeated
+        self.ahead: dict[int, StudyTrial] = {}  # known although one before them is not, by number
         if resume:
             self._read()
 

@@ -32,7 +32,7 @@ def running(folder: Path, state: RunningState) -> Iterator[None]:
     try:
         file = path.open("a+b")
     except OSError as error:
-        raise InputError(f"{path}: cannot write the study: {(error.strerror or str(error)).lower()}") from error
+        raise cannot_write(path, error) from error
     with file:
         for _ in range(TRIES):
             if _locked(file):
@@ -82,6 +82,11 @@ def _locked(file: IO[bytes]) -> bool:
     except OSError:  # a file system without locks
         return True
     return True
+
+
+def cannot_write(path: Path, error: OSError) -> InputError:
+    """The error that users see where the disk refuses."""
+    return InputError(f"{path}: cannot write the study: {(error.strerror or str(error)).lower()}")
 
 
 def _busy(folder: Path) -> InputError:

@@ -37,22 +37,18 @@ class Study:
     workers, not on which trial ends first, not on interruptions. A shorter study is a prefix of a longer one.
 
     Attributes:
-        header: What the study is about, as plain data, without what only ends it: an earlier study with another header
-            is not continued.
         propose: Values of the trials of the next round, plain data, from all trials of the rounds before. Fewer than
             ``size`` make the last round, none end the study.
-        enough: Whether a trial ends the study; the trials after it do not count. None for never.
-        total: Number of trials where they are given from the start, all in one round; None where rounds are proposed.
     """
 
     folder: Path  # folder of the study; an earlier study there is replaced, or continued
-    header: Mapping[str, Any]
+    header: Mapping[str, Any]  # what it is about, in plain data; one with another header is not continued
     size: int  # number of trials in a round
     propose: Propose
     best: Best | None = None  # what makes one trial better than another; part of the header. None for nothing
-    enough: Callable[[StudyTrial], bool] | None = None
+    enough: Callable[[StudyTrial], bool] | None = None  # whether a trial ends the study, so later ones do not count
     noun: str = "trial"  # what a trial is called in texts
-    total: int | None = None
+    total: int | None = None  # number of trials, all in one round; None where rounds are proposed
 
     @classmethod
     def of_variants(cls, folder: Path, header: Mapping[str, Any], variants: Sequence[Variant]) -> Self:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options
-from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Quiet, Settings, Watch
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
@@ -22,12 +22,12 @@ class CheckOptions(Options):
 
     SCHEMA = "cellplan.check/1"
 
-    cell: CellFile
-    settings: Settings = ()
-    watch: Watch = False
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.CellFile
+    settings: shared.Settings = ()
+    watch: shared.Watch = False
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def check(options: CheckOptions) -> Result:

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options
-from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Settings
 from cellplan.cli.terminal.output import Result
 from cellplan.errors import ExitStatus
 
@@ -14,10 +14,10 @@ class ExplainOptions(Options):
 
     SCHEMA = "cellplan.explain/1"
 
-    cell: CellFile
-    settings: Settings = ()
-    as_json: AsJson = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.CellFile
+    settings: shared.Settings = ()
+    as_json: shared.AsJson = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def explain(options: ExplainOptions) -> Result:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, argument, option
-from cellplan.cli.options.shared import AsJson
 from cellplan.cli.terminal.output import Result, say, say_json
 from cellplan.errors import ExitStatus
 
@@ -40,7 +40,7 @@ class InitOptions(Options):
         str | None, option("--template, -t NAME", "What to begin with (default: two-robots).", autocompletion=_names)
     ] = None
     show_list: Annotated[bool, option("--list", "List the templates, one line each, and write nothing.")] = False
-    as_json: AsJson = False
+    as_json: shared.AsJson = False
 
 
 def init(options: InitOptions) -> Result | None:

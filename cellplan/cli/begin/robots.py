@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import robot_models
 from cellplan.cli.options.request import Options, argument, option
-from cellplan.cli.options.shared import AsJson
 from cellplan.cli.terminal.output import say, say_json, show
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class RobotsOptions(Options):
     xacro_args: Annotated[
         tuple[str, ...], option("--xacro-arg NAME=VALUE", "Set an argument of a xacro file; may be repeated.")
     ] = ()
-    as_json: AsJson = False
+    as_json: shared.AsJson = False
 
 
 def robots(options: RobotsOptions) -> None:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import robot_names
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Mode, PlotFormats, Quiet, Settings
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder, say
 from cellplan.cli.terminal.progress import progress_listener
@@ -19,7 +19,7 @@ class MapOptions(Options):
 
     SCHEMA = "cellplan.map/1"
 
-    cell: CellFile
+    cell: shared.CellFile
     robot: Annotated[str, option("--robot NAME", "Operator whose base is tried.", autocompletion=robot_names)]
     x: Annotated[str | None, option("--x FROM:TO", "Range of x in mm (default: all within reach of the part).")] = None
     y: Annotated[str | None, option("--y FROM:TO", "Range of y in mm (default: likewise).")] = None
@@ -32,17 +32,17 @@ class MapOptions(Options):
     output: Annotated[
         Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-map-<robot>).")
     ] = None
-    mode: Mode = None
-    settings: Settings = ()
+    mode: shared.Mode = None
+    settings: shared.Settings = ()
     workers: Annotated[
         int | None, option("--workers N", "Processes that judge (default: one for each processor).", min=1)
     ] = None
     resume: Annotated[bool, option("--resume", "Continue the map in the folder.")] = False
     status: Annotated[bool, option("--status", "Say how far the map in the folder is, and do nothing.")] = False
-    formats: PlotFormats = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    formats: shared.PlotFormats = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def base_map(options: MapOptions) -> Result | None:

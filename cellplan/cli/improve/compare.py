@@ -4,19 +4,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
 from cellplan.cli.options.request import Options, argument, option
-from cellplan.cli.options.shared import (
-    AllowDirs,
-    AsJson,
-    KeepRuns,
-    PlotFormats,
-    Quiet,
-    ResumeStudy,
-    Settings,
-    Solvers,
-    TaskName,
-)
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
@@ -40,15 +30,15 @@ class CompareOptions(Options):
     output: Annotated[
         Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-compare).")
     ] = None
-    settings: Settings = ()
-    task: TaskName = None
-    workers: Solvers = None
-    resume: ResumeStudy = False
-    keep_runs: KeepRuns = False
-    formats: PlotFormats = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    settings: shared.Settings = ()
+    task: shared.TaskName = None
+    workers: shared.Solvers = None
+    resume: shared.ResumeStudy = False
+    keep_runs: shared.KeepRuns = False
+    formats: shared.PlotFormats = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def compare(options: CompareOptions) -> Result:

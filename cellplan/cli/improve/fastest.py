@@ -4,24 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import (
-    AllowDirs,
-    AsJson,
-    Budget,
-    CellFile,
-    Distance,
-    HowTimed,
-    Margin,
-    Method,
-    Mode,
-    Quiet,
-    ResumeSearch,
-    Seed,
-    Settings,
-    TaskName,
-    Trials,
-)
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
@@ -35,7 +19,7 @@ class FastestOptions(Options):
     misplacement: ClassVar[None] = None  # which layout searches have beside these
     scheduler: ClassVar[None] = None
 
-    cell: CellFile
+    cell: shared.CellFile
     output: Annotated[
         Path | None, option("-o, --output DIR", "Write record, page, curve and a run folder per program.")
     ] = None
@@ -45,10 +29,10 @@ class FastestOptions(Options):
     points: Annotated[
         int, option("--points N", "Calmer cycles of each law on the production curve.", min=0, max=50)
     ] = 4
-    mode: Mode = None
-    method: Method = None
-    settings: Settings = ()
-    task: TaskName = None
+    mode: shared.Mode = None
+    method: shared.Method = None
+    settings: shared.Settings = ()
+    task: shared.TaskName = None
     workers: Annotated[
         int | None,
         option("--workers N", "Processes for the production curve (default: one for each processor).", min=1),
@@ -62,16 +46,16 @@ class FastestOptions(Options):
             "axes. The options below --free belong to it.",
         ),
     ] = None
-    timing: HowTimed = "laws"
-    clearance: Distance = None
-    margin: Margin = None
-    budget: Budget = None
-    trials: Trials = None
-    seed: Seed = 0
-    resume: ResumeSearch = False
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    timing: shared.HowTimed = "laws"
+    clearance: shared.Distance = None
+    margin: shared.Margin = None
+    budget: shared.Budget = None
+    trials: shared.Trials = None
+    seed: shared.Seed = 0
+    resume: shared.ResumeSearch = False
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
     @property
     def schema(self) -> str:

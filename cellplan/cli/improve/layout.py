@@ -4,22 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files, one_of
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import (
-    AllowDirs,
-    AsJson,
-    Budget,
-    CellFile,
-    Distance,
-    HowTimed,
-    Margin,
-    Quiet,
-    ResumeSearch,
-    Seed,
-    Settings,
-    Trials,
-)
 from cellplan.cli.terminal.output import Result, say
 
 
@@ -29,7 +16,7 @@ class LayoutOptions(Options):
 
     SCHEMA = "cellplan.layout/1"
 
-    cell: CellFile
+    cell: shared.CellFile
     output: Annotated[
         Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-layout).")
     ] = None
@@ -42,12 +29,12 @@ class LayoutOptions(Options):
             autocompletion=one_of("cellplan.search.programs.objective:Objective"),
         ),
     ] = "cycle"
-    timing: HowTimed = "laws"
+    timing: shared.HowTimed = "laws"
     duration: Annotated[float | None, option("--duration S", "Duration at which the limits must hold, in seconds.")] = (
         None
     )
-    clearance: Distance = None
-    margin: Margin = None
+    clearance: shared.Distance = None
+    margin: shared.Margin = None
     misplacement: Annotated[
         str | None,
         option(
@@ -66,14 +53,14 @@ class LayoutOptions(Options):
     fixed: Annotated[
         tuple[str, ...], option("--fix KEY", "What may not change, such as kuka.base.z_mm; may be repeated.")
     ] = ()
-    settings: Settings = ()
+    settings: shared.Settings = ()
     attempts: Annotated[
         tuple[Path, ...],
         option("--try CELL2", "A cell file whose layout is tried too; may be repeated.", autocompletion=cell_files),
     ] = ()
-    budget: Budget = None
-    trials: Trials = None
-    seed: Seed = 0
+    budget: shared.Budget = None
+    trials: shared.Trials = None
+    seed: shared.Seed = 0
     workers: Annotated[
         int | None, option("--workers N", "Processes that search (default: one for each processor).", min=1)
     ] = None
@@ -88,11 +75,11 @@ class LayoutOptions(Options):
     repair: Annotated[
         bool, option("--repair", "Find the smallest change with which the cell passes, and other remedies.")
     ] = False
-    resume: ResumeSearch = False
+    resume: shared.ResumeSearch = False
     status: Annotated[bool, option("--status", "Say how far the search in the folder is, and do nothing.")] = False
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def layout(options: LayoutOptions) -> Result | None:

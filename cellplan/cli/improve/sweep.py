@@ -4,20 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import (
-    AllowDirs,
-    AsJson,
-    CellFile,
-    KeepRuns,
-    Mode,
-    PlotFormats,
-    Quiet,
-    ResumeStudy,
-    Settings,
-    Solvers,
-    TaskName,
-)
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
@@ -30,7 +18,7 @@ class SweepOptions(Options):
 
     SCHEMA = "cellplan.study/1"
 
-    cell: CellFile
+    cell: shared.CellFile
     vary: Annotated[
         tuple[str, ...],
         option(
@@ -41,16 +29,16 @@ class SweepOptions(Options):
     output: Annotated[Path | None, option("-o, --output DIR", "Study folder (default: outputs/<cell name>-sweep).")] = (
         None
     )
-    mode: Mode = None
-    settings: Settings = ()
-    task: TaskName = None
-    workers: Solvers = None
-    resume: ResumeStudy = False
-    keep_runs: KeepRuns = False
-    formats: PlotFormats = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    mode: shared.Mode = None
+    settings: shared.Settings = ()
+    task: shared.TaskName = None
+    workers: shared.Solvers = None
+    resume: shared.ResumeStudy = False
+    keep_runs: shared.KeepRuns = False
+    formats: shared.PlotFormats = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def sweep(options: SweepOptions) -> Result:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.given_options import require_choice
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, RunDir, WithoutCell
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
@@ -20,7 +20,7 @@ class RecoverOptions(Options):
 
     SCHEMA = "cellplan.recovery/1"
 
-    run: RunDir
+    run: shared.RunDir
     at: Annotated[float, option("--at S", "Time of the program at which the cell stands.")]
     frozen: Annotated[
         tuple[str, ...],
@@ -31,11 +31,11 @@ class RecoverOptions(Options):
     ] = ()
     keep: Annotated[tuple[str, ...], option("--keep ROBOT", "This robot is to stand still; may be repeated.")] = ()
     output: Annotated[Path | None, option("-o, --output DIR", "Folder (default: RUN/recover).")] = None
-    cell: OriginalCell = None
-    without_cell: WithoutCell = False
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.OriginalCell = None
+    without_cell: shared.WithoutCell = False
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def recover(options: RecoverOptions) -> Result:

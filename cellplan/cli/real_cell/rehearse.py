@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, PlotFormats, Quiet, Settings
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -18,7 +18,7 @@ class RehearseOptions(Options):
 
     SCHEMA = "cellplan.rehearse/1"
 
-    cell: CellFile
+    cell: shared.CellFile
     errors: Annotated[Path, option("--errors FILE", "Errors of the real cell (YAML).", autocompletion=cell_files)]
     feedback: Annotated[
         bool, option("--feedback", "Correct the references from pass to pass until the true error converges.")
@@ -29,14 +29,14 @@ class RehearseOptions(Options):
     rounds: Annotated[int, option("--rounds N", "Maximum number of corrections.")] = 20
     trials: Annotated[int | None, option("--trials N", "Number of sampled cells (default: as in the file).")] = None
     seed: Annotated[int | None, option("--seed N", "Seed of the samples (default: as in the file).")] = None
-    settings: Settings = ()
+    settings: shared.Settings = ()
     output: Annotated[Path | None, option("-o, --output DIR", "Folder (default: outputs/<cell name>/rehearsal).")] = (
         None
     )
-    plots: PlotFormats = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    plots: shared.PlotFormats = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def rehearse(options: RehearseOptions) -> Result:

@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of
 from cellplan.cli.options.given_options import require_choice
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, RunDir, WithoutCell
 from cellplan.cli.solve.exported import SCHEMA, result_of_one, result_of_several
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
@@ -24,7 +24,7 @@ class ExportOptions(Options):
 
     SCHEMA = SCHEMA
 
-    run: RunDir
+    run: shared.RunDir
     forms: Annotated[
         tuple[str, ...],
         option(
@@ -66,11 +66,11 @@ class ExportOptions(Options):
     thin_deg: Annotated[
         float | None, option("--thin-deg DEG", "How far a turning joint may be off there (default: 0.05).")
     ] = None
-    cell: OriginalCell = None
-    without_cell: WithoutCell = False
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.OriginalCell = None
+    without_cell: shared.WithoutCell = False
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def export(options: ExportOptions) -> Result:

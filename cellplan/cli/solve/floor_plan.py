@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.request import Options, argument, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, Settings
 from cellplan.cli.terminal.output import say, say_json
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
@@ -27,11 +27,11 @@ class FloorPlanOptions(Options):
     form: Annotated[
         str | None, option("--format FORMAT", "svg or dxf (default: that of FILE by its ending, or svg).")
     ] = None
-    cell: OriginalCell = None
-    settings: Settings = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.OriginalCell = None
+    settings: shared.Settings = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def floor_plan(options: FloorPlanOptions) -> None:

@@ -6,20 +6,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import one_of, run_folders
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import (
-    AllowDirs,
-    AsJson,
-    CellFile,
-    Method,
-    Mode,
-    PlotFormats,
-    Quiet,
-    Settings,
-    TaskName,
-    Watch,
-)
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import Listener, progress_listener
 from cellplan.errors import ExitStatus
@@ -37,10 +26,10 @@ class SolveOptions(Options):
 
     SCHEMA = "cellplan.solve/1"
 
-    cell: CellFile
+    cell: shared.CellFile
     output: Annotated[Path | None, option("-o, --output DIR", "Run folder (default: outputs/<cell name>).")] = None
-    mode: Mode = None
-    method: Method = None
+    mode: shared.Mode = None
+    method: shared.Method = None
     integrator: Annotated[
         str | None,
         option(
@@ -51,8 +40,8 @@ class SolveOptions(Options):
     ] = None
     duration: Annotated[float | None, option("--duration S", "Duration of the motion in seconds.")] = None
     clearance_mm: Annotated[float | None, option("--clearance-mm MM", "Required clearance in millimetres.")] = None
-    settings: Settings = ()
-    task: TaskName = None
+    settings: shared.Settings = ()
+    task: shared.TaskName = None
     near: Annotated[
         Path | None,
         option(
@@ -61,15 +50,15 @@ class SolveOptions(Options):
             autocompletion=run_folders,
         ),
     ] = None
-    as_json: AsJson = False
+    as_json: shared.AsJson = False
     keep_rejected: Annotated[bool, option("--keep-rejected", "Write the tables of a failed run below rejected/.")] = (
         False
     )
     with_view: Annotated[bool, option("--view", "Write the 3-D page view.html too, as cellplan view does.")] = False
-    watch: Watch = False
-    plots: PlotFormats = ()
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    watch: shared.Watch = False
+    plots: shared.PlotFormats = ()
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def solve(options: SolveOptions) -> Result:

@@ -5,9 +5,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import run_folders
 from cellplan.cli.options.request import Options, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, RunDir
 from cellplan.cli.solve.exported import promise_lines
 from cellplan.cli.terminal.output import Result, notes
 from cellplan.cli.terminal.progress import progress_listener
@@ -26,8 +26,8 @@ class VerifyOptions(Options):
 
     SCHEMA = "cellplan.verify/1"
 
-    run: RunDir
-    cell: OriginalCell = None
+    run: shared.RunDir
+    cell: shared.OriginalCell = None
     of_run: Annotated[
         Path | None,
         option(
@@ -36,9 +36,9 @@ class VerifyOptions(Options):
             autocompletion=run_folders,
         ),
     ] = None
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def verify(options: VerifyOptions) -> Result:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from cellplan.cli.options import shared
 from cellplan.cli.options.completion import cell_files
 from cellplan.cli.options.request import Options, argument, option
-from cellplan.cli.options.shared import AllowDirs, AsJson, OriginalCell, Quiet, Settings
 from cellplan.cli.terminal.output import Result
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus
@@ -29,11 +29,11 @@ class ViewOptions(Options):
             "The page (default: RUN/view.html, STUDY/study-view.html, or outputs/<cell name>-view.html).",
         ),
     ] = None
-    cell: OriginalCell = None
-    settings: Settings = ()
-    as_json: AsJson = False
-    quiet: Quiet = False
-    allow_dirs: AllowDirs = ()
+    cell: shared.OriginalCell = None
+    settings: shared.Settings = ()
+    as_json: shared.AsJson = False
+    quiet: shared.Quiet = False
+    allow_dirs: shared.AllowDirs = ()
 
 
 def view(options: ViewOptions) -> Result:

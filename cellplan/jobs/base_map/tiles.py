@@ -25,14 +25,10 @@ PAIRS: Final = frozenset({"joint", "fast", "pair"})  # of names, lists in plain 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Tiles:
-    """The places of a map that have a start within limits, in tiles whose places lie all over the map.
-
-    Attributes:
-        values: Values of each tile: ``places`` and ``starts``, those of a place in the order in which they are tried.
-    """
+    """The places of a map that have a start within limits, in tiles whose places lie all over the map."""
 
     known: Sequence[PlaceVerdict]  # what is known of every place before its motions
-    values: Sequence[Mapping[str, Any]]
+    values: Sequence[Mapping[str, Any]]  # ``places`` and ``starts`` of each tile, those of a place in order of trying
 
     @classmethod
     def of(cls, job: MapJob, q: Array, at: Indices) -> Self:

@@ -30,22 +30,15 @@ RANK_TOL = 1e-10  # [-] singular values below this share of the largest one are 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MatrixShape:
-    """The cooperation Jacobian of one phase, at the start postures of the cell.
-
-    Attributes:
-        blocks: Names of the block rows: the tasks of the phase, then the grasps of further holders that move.
-        signs: Sign of each block for each robot, shape (blocks, robots): -1 the robot that carries the part, +1 the one
-            that has the tool, 0 empty.
-        singular_values: Largest first, one for each row or column, whichever are fewer; None where a start is missing.
-    """
+    """The cooperation Jacobian of one phase, at the start postures of the cell."""
 
     phase: Phase  # tasks and moving robots
-    blocks: tuple[str, ...]
+    blocks: tuple[str, ...]  # names of the block rows: tasks of the phase, then grasps of further holders that move
     rows: tuple[int, ...]  # constrained components of each block row
     columns: tuple[int, ...]  # joints of each robot, in the order of the cell, that move and carry a tool or the part
-    signs: Array
+    signs: Array  # sign of each block for each robot, (blocks, robots): -1 carries the part, +1 has the tool, 0 empty
     missing: tuple[str, ...]  # robots whose start posture is to be found before there is a rank
-    singular_values: Array | None
+    singular_values: Array | None  # largest first, one a row or column, whichever are fewer; None without a start
 
     @property
     def rank(self) -> int | None:
@@ -62,14 +55,10 @@ class MatrixShape:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Structure:
-    """The structure of a cell.
-
-    Attributes:
-        plane: Plane of the part in which everything moves, with PPR chains; None for space, with PPPS chains.
-    """
+    """The structure of a cell."""
 
     cell: Cell
-    plane: PlaneName | None
+    plane: PlaneName | None  # of the part in which everything moves, with PPR chains; None for space, with PPPS
     graph: CouplingGraph  # links and joints, virtual chains included
     circuits: tuple[Circuit, ...]  # the independent ways round, one per chord
     matrices: tuple[MatrixShape, ...]  # one per phase of the program

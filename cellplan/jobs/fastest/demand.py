@@ -21,14 +21,10 @@ NEAR: Final = 1e-9  # [s] of a cycle: rounding
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MetDemand:
-    """The calmest program that meets a demand.
-
-    Attributes:
-        allowed: Longest cycle in whole steps that makes them, in [s].
-    """
+    """The calmest program that meets a demand."""
 
     per_hour: float
-    allowed: float
+    allowed: float  # longest cycle in whole steps that makes them, in [s]
     program: TimedProgram
 
     def certified(self, progress: Progress) -> Self:

@@ -35,16 +35,11 @@ LONGEST: Final = 3.0  # [-] times the shortest cycle: where the curve ends
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurvePoint:
-    """One cycle on the production curve.
-
-    Attributes:
-        values: What is set in the cell for it, by address.
-        figures: Its load, ``LOAD`` of it; empty where there is no program.
-    """
+    """One cycle on the production curve."""
 
     law: Law
-    values: Mapping[str, object]
-    figures: Mapping[str, object]
+    values: Mapping[str, object]  # what is set in the cell for it, by address
+    figures: Mapping[str, object]  # its load, ``LOAD`` of it; empty where there is no program
     reason: str = ""
 
 

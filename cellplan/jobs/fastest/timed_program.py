@@ -42,21 +42,14 @@ RETIMED: Final = (Law.COMMON_SPEED, Law.REDUCED_SPEED)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Binding:
-    """The joint or tool and the limit that ask for most time in a phase.
-
-    Attributes:
-        joint: Name of the joint; that of the task for its feed and its tolerance between rows.
-        kind: Its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows.
-        share: What is reached of it, 0..1.
-        time_share: Share of the time of the phase that it asks for, 0..1.
-    """
+    """The joint or tool and the limit that ask for most time in a phase."""
 
     phase: str
     robot: str
-    joint: str
-    kind: str
-    share: float
-    time_share: float
+    joint: str  # name of the joint; that of the task for its feed and its tolerance between rows
+    kind: str  # its limit: velocity, acceleration, jerk, tool speed, feed or tolerance between rows
+    share: float  # what is reached of it, 0..1
+    time_share: float  # share of the time of the phase that it asks for, 0..1
 
     @property
     def text(self) -> str:
@@ -73,20 +66,14 @@ class Binding:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TimedProgram:
-    """A program at a cycle time of its own.
-
-    Attributes:
-        values: What was set in the cell for it, by address; see ``Cell.with_values``.
-        bindings: What binds each of its phases with tasks; transfer moves go as fast as they can anyway.
-        load: Share of its time in which the limits of joints, tools and part would allow the same motion.
-    """
+    """A program at a cycle time of its own."""
 
     law: Law
-    values: Mapping[str, object]
+    values: Mapping[str, object]  # what was set in the cell for it, by address; see ``Cell.with_values``
     solution: Solution
     scene: Scene = field(repr=False)
-    bindings: tuple[Binding, ...]
-    load: float
+    bindings: tuple[Binding, ...]  # what binds each phase with tasks; transfer moves are as fast as can be anyway
+    load: float  # share of its time in which the limits of joints, tools and part would allow the same motion
 
     @classmethod
     def solved(

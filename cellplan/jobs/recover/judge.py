@@ -52,15 +52,11 @@ class TimedPhase:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecoveryJudgement:
-    """What was found on the written tables of a recovery.
-
-    Attributes:
-        apart: Pairs that begin nearer than is demanded, with the time in [s] from which on each keeps its demand.
-    """
+    """What was found on the written tables of a recovery."""
 
     checks: tuple[Check, ...]  # all checks
     phases: tuple[TimedPhase, ...]  # the phases on their clock
-    apart: tuple[Apart, ...]
+    apart: tuple[Apart, ...]  # pairs that begin too near, with the time in [s] from which each keeps its demand
 
     @property
     def passed(self) -> bool:

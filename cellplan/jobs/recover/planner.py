@@ -21,11 +21,7 @@ from cellplan.scene.scene import Scene
 
 
 class RecoveryPlanner:
-    """Ways from one stopped state to the homes.
-
-    Attributes:
-        refused: Why ways were not taken, in the order in which they were tried.
-    """
+    """Ways from one stopped state to the homes."""
 
     def __init__(self, places: RunPlaces, state: StoppedState, progress: Progress) -> None:
         """Prepare; nothing is planned yet."""
@@ -37,7 +33,7 @@ class RecoveryPlanner:
         self._group = held if len(held) > 1 else ()
         self._fixed = {*state.standing, *(held if set(held) & set(state.standing) and self._group else ())}
         self._off_start: Array | None = None
-        self.refused: list[str] = []
+        self.refused: list[str] = []  # why ways were not taken, in the order of trying
 
     def phases(self) -> tuple[RecoveryPhase, ...]:
         """The first way that is found: straight off and home; else back along the program, then off and home."""

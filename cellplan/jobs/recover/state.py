@@ -31,19 +31,14 @@ END: Final = 1e-9  # [s] by which a time may lie beyond the end: the rounding of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunPlaces:
-    """The phases of a run and their scenes.
-
-    Attributes:
-        tipped: The same with a small ball at the tip of every tool that works on the part: not every tool has a body
-            as far as there.
-    """
+    """The phases of a run and their scenes."""
 
     cell: Cell  # the cell, in which no cycle is to be closed any more
     motion: Motion  # all rows of the program
     phases: tuple[Phase, ...]  # its phases with rows, those of all cycles
     stages: tuple[Stage, ...]  # the stages of one cycle of a program from home to home; empty for any other
     scenes: StageScenes  # what the scenes are made by
-    tipped: StageScenes
+    tipped: StageScenes  # the same with a small ball at tool tips that work on the part: not all have a body there
 
     @classmethod
     def of(cls, run: VerifiedRun) -> "RunPlaces":

@@ -59,28 +59,6 @@ class Attempt:
     values: Mapping[str, Any] = field(default_factory=dict)  # in place of both: values by address
 
     @property
-    def record(self) -> dict[str, Any]:
-        """As values of a variant, which a process can be sent."""
-        return {
-            "kind": str(self.kind),
-            "robots": list(self.robots),
-            "addresses": list(self.addresses),
-            "vary": dict(self.vary),
-            "values": dict(self.values),
-        }
-
-    @classmethod
-    def from_record(cls, record: Mapping[str, Any]) -> "Attempt":
-        """The attempt of a variant."""
-        return cls(
-            kind=RemedyKind(record["kind"]),
-            robots=tuple(record["robots"]),
-            addresses=tuple(record["addresses"]),
-            vary=record["vary"],
-            values=record["values"],
-        )
-
-    @property
     def text(self) -> str:
         """What may change, in words."""
         names = listed_names(self.robots)

@@ -126,8 +126,7 @@ class Case:
     @property
     def failed(self) -> list[dict[str, Any]]:
         """Checks that fail as the cell is given."""
-        names: Any = self.given.figures.get("failed", ())
-        return list(names)
+        return failed_checks(self.given)
 
     @property
     def no_motion(self) -> str:
@@ -142,6 +141,12 @@ class Case:
         if self.remedies:
             return "repaired"
         return "no_motion" if self.no_motion else "no_remedy"
+
+
+def failed_checks(given: TrialOutcome) -> list[dict[str, Any]]:
+    """Failed checks of a cell that was solved."""
+    checks: Any = given.figures.get("failed", ())
+    return list(checks)
 
 
 def advice_schema() -> dict[str, Any]:

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.jobs.layout.trials.limits import LimitRecord, standing_of
 from cellplan.jobs.layout.trials.prepared import PreparedSearch
 from cellplan.jobs.layout.trials.searched import searched_cell
 from cellplan.jobs.repair.attempts import (
@@ -23,9 +22,9 @@ from cellplan.jobs.repair.attempts import (
     owners,
 )
 from cellplan.jobs.repair.prepare import ready_cell, start_posture
-from cellplan.jobs.repair.record import AdviceRecord, Case, Tried, advice_record, remedy_values
+from cellplan.jobs.repair.record import AdviceRecord, Case, Tried, advice_record, failed_checks, remedy_values
 from cellplan.jobs.repair.solved import required_step, required_time
-from cellplan.jobs.repair.trial import EFFORT, FACTOR, GIVEN, evaluate
+from cellplan.jobs.repair.trial import ATTEMPT, FACTOR, evaluate, violations
 from cellplan.model.cell.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
@@ -87,15 +86,10 @@ def repair(request: LayoutRequest, *, workers: int = 1, progress: Progress = sil
     point = None if reason else ready.coarse.evaluate(ready.variables.given, start)
     faults = () if point is None else start_faults(ready, point)
     work = _Work(request=sought, workers=workers, progress=progress, faults=faults)
-    work.try_all(ready, point is not None and not _violations(ready, point))
+    work.try_all(ready, point is not None and not violations(ready, point))
     case = Case(ready=ready, given=work.given, remedies=work.remedies, failures=work.failures)
     best = ready.cell.with_values(remedy_values(case.remedies[0][1])) if case.remedies else None
     return Repair(record=advice_record(case), given=ready.cell, best=best)
-
-
-def _violations(ready: PreparedSearch, point: Point) -> list[LimitRecord]:
-    """What a motion breaks at the nodes of a search."""
-    return standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +125,7 @@ class _Work:
             self._run([None])
             if self.given.status is TrialStatus.PASSED:
                 return
-        names = {check["name"] for check in _failed(self.given)}
+        names = {check["name"] for check in failed_checks(self.given)}
         can_help = not seems_sound or bool(names & (JOINT_LIMITS | DISTANCES))  # a search knows of nothing else
         self._run([*([] if seems_sound else [None]), *(_first(ready) if can_help else [])])
         sizes = range(2, len(owners(ready.cell, ready.variables.settings)) + 1) if can_help else ()
@@ -150,7 +144,7 @@ class _Work:
                 jobs.append(job)
             else:
                 self.tried.append((job, TrialOutcome(status=TrialStatus.FAILED, reason=fault.text, figures={})))
-        variants = [Variant(place, {"kind": GIVEN} if job is None else job.record) for place, job in enumerate(jobs)]
+        variants = [Variant(place, {ATTEMPT: job}) for place, job in enumerate(jobs)]
         workers = self.workers if len(jobs) > FEW else 1
         with outcomes(variants, partial(evaluate, self.request), workers) as every:
             for place, (attempt, outcome) in enumerate(zip(jobs, every, strict=True)):
@@ -182,7 +176,7 @@ def _first(ready: PreparedSearch) -> list[Attempt]:
 
 def _about_limits(ready: PreparedSearch, given: TrialOutcome) -> list[Attempt]:
     """Attempts where the verdict is about limits of joints, or what a slower motion keeps, alone."""
-    checks, step = _failed(given), ready.cell.motion.step
+    checks, step = failed_checks(given), ready.cell.motion.step
     failed = {check["name"] for check in checks}
     attempts: list[Attempt] = []
     if failed and failed <= JOINT_LIMITS:
@@ -195,12 +189,6 @@ def _about_limits(ready: PreparedSearch, given: TrialOutcome) -> list[Attempt]:
     if failed and failed <= PASSED_BY_TIME:
         attempts.append(Attempt(kind=RemedyKind.DURATION, robots=(), values={FACTOR: required_time(checks)}))
     return attempts
-
-
-def _failed(given: TrialOutcome) -> list[dict[str, Any]]:
-    """Failed checks of the cell as it is given."""
-    names: Any = given.figures.get("failed", ())
-    return list(names)
 
 
 def _size(tried: Tried) -> tuple[bool, int, float, int]:

@@ -11,7 +11,7 @@ from cellplan.files.cell.changes import plain_values
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.fastest.timed_program import refuse_fixed_times, scaled_values, whole_steps
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.jobs.layout.trials.limits import standing_of
+from cellplan.jobs.layout.trials.limits import LimitRecord, standing_of
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch
 from cellplan.jobs.repair.attempts import CONTINUOUS, Attempt, RemedyKind
 from cellplan.jobs.repair.neat import changed_values, neat
@@ -25,7 +25,7 @@ from cellplan.runs.solve import solve
 from cellplan.search.programs.improve import Improved, improve
 from cellplan.search.programs.measures import reserves
 from cellplan.search.programs.objective import Demands, Effort, Reserve
-from cellplan.search.programs.problem import Problem
+from cellplan.search.programs.problem import Point, Problem
 from cellplan.search.variables.written import written_starts
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
@@ -37,7 +37,7 @@ TENTHS: Final = 10.0  # [-] cost of a motion that lasts twice as long
 SLOWEST: Final = 100.0  # [-] times as long as the given motion
 FACTOR: Final = "factor"  # in the values of an attempt: how many times as long a motion is to last at least
 DIGITS: Final = 9  # of a time in [s]
-GIVEN: Final = "given"
+ATTEMPT: Final = "attempt"  # the value of a variant
 NO_MOTION: Final = "no layout nearby was found in which all tools follow their paths"
 SOLVES: Final = 4  # [-] times that a layout is corrected and solved before it is given up
 NODES: Final = 129  # [-] of a correction
@@ -52,10 +52,9 @@ MORE_TIME: Final = 0.002  # [-] likewise
 
 def evaluate(request: LayoutRequest, variant: Variant) -> TrialOutcome:
     """The least change of one attempt that passes every check, or why there is none; the cell as given for none."""
-    ready = ready_cell(request)
-    if variant.values.get("kind") == GIVEN:
+    ready, attempt = ready_cell(request), variant.values[ATTEMPT]
+    if not isinstance(attempt, Attempt):
         return _outcome(_of_values(ready, {}, 0.0))
-    attempt = Attempt.from_record(variant.values)
     try:
         return _outcome(_least(ready, attempt))
     except (InputError, NoSolutionError) as error:
@@ -109,9 +108,14 @@ def _of_variables(ready: PreparedSearch, start: Array, attempt: Attempt) -> Conf
     return reason
 
 
+def violations(ready: PreparedSearch, point: Point) -> list[LimitRecord]:
+    """What a motion breaks at the nodes of a search, the worst first."""
+    return standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
+
+
 def _shortfall(ready: PreparedSearch, improved: Improved) -> str:
     """What the best layout of a search still breaks."""
-    left = standing_of(ready.coarse, improved.point, ready.demands(), EFFORT).violations()
+    left = violations(ready, improved.point)
     return f"at best {left[0]['text']}" if left else "at best less room than is asked for beyond the demands"
 
 
@@ -127,8 +131,7 @@ def _of_branch(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
     point = ready.coarse.evaluate(ready.variables.given, start)
     if point is None:
         return f"{NOT_FOLLOWED} from there"
-    left = standing_of(ready.coarse, point, ready.demands(), EFFORT).violations()
-    if left:
+    if left := violations(ready, point):
         return left[0]["text"]
     key = next(iter(attempt.values))
     values = written_starts(ready.cell, ready.variables.settings, start)
@@ -142,7 +145,7 @@ def _of_spin(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
     point = opened.coarse.evaluate(opened.variables.given, start_posture(ready)[0])
     if point is None:
         return NOT_FOLLOWED
-    left = standing_of(opened.coarse, point, opened.demands(), EFFORT).violations()
+    left = violations(opened, point)
     return left[0]["text"] if left else _of_values(ready, attempt.values, 0.0)
 
 

@@ -28,12 +28,11 @@ class Geometries:
 
     Attributes:
         visuals: What the file of each robot draws, by its name; read when it is first asked for.
-        weights: Number of triangles that each mesh has in its file, by its key.
     """
 
     records: list[Record] = field(default_factory=list)  # the shapes
     visuals: dict[str, tuple[Visual, ...]] = field(default_factory=dict)
-    weights: dict[Hashable, int] = field(default_factory=dict)
+    weights: dict[Hashable, int] = field(default_factory=dict)  # triangles of each mesh in its file, by its key
     _places: dict[Hashable, int] = field(default_factory=dict)
 
     def announce(self, shapes: list[Shape]) -> None:

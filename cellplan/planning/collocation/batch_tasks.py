@@ -27,17 +27,13 @@ class ToolPoses:
 
 
 class BatchTasks:
-    """The tasks of one run, and the joints that may move for them.
-
-    Attributes:
-        is_refined: Whether speeds are exact to rounding even where operators cannot do their tasks alone.
-    """
+    """The tasks of one run, and the joints that may move for them."""
 
     def __init__(
         self, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str], *, is_refined: bool = False
     ) -> None:
         """Gather what stays the same from configuration to configuration; refined speeds are exact to rounding."""
-        self.is_refined = is_refined
+        self.is_refined = is_refined  # speeds are exact to rounding even where operators cannot do their tasks alone
         self.chains, self.joint_count = BatchChains(cell), cell.joint_count
         constraints = TaskConstraints.of(cell, tasks, moving)
         self._robots, self._holder, self._X_CP = constraints.operators, constraints.carrier, cell.part.X_CP
@@ -186,11 +182,7 @@ class BatchTasks:
 
 
 class Linearisation:
-    """The tasks at many configurations, to first order.
-
-    Attributes:
-        errors: Pose errors, see `BatchTasks.errors`, shape (6, tasks, batch).
-    """
+    """The tasks at many configurations, to first order."""
 
     def __init__(
         self,
@@ -205,7 +197,7 @@ class Linearisation:
         """Keep what was found; ``rows`` turn errors and twists into the frame of the columns, if it is another."""
         self._tasks, self._arrow, self._rows, self._desired, self._mobile = tasks, arrow, rows, desired, mobile
         self._velocities = arrow.refined_velocities if tasks.is_refined else arrow.velocities
-        self.errors = errors
+        self.errors = errors  # pose errors, see `BatchTasks.errors`, shape (6, tasks, batch)
 
     def velocities(self, drift: Array | None = None) -> Array:
         r"""Joint velocities ``J^# x_dot + (I - J^# J) u`` for the desired twists and a drift ``u``, shape (nq, batch).

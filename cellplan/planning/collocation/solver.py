@@ -40,28 +40,19 @@ CONFIGURATION_SHARE: Final = 10.0  # times as far from their limit as tools may 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowResult:
-    """What came of one window.
-
-    Attributes:
-        errors: Bound of the tool errors at the nodes and between them, [m] or [rad], by panel, shape (panels, cells).
-    """
+    """What came of one window."""
 
     q: Array  # configurations at the nodes, shape (nq, cells, nodes)
     is_settled: NDArray[np.bool_]  # whether the passes came to an end, shape (cells,)
-    errors: Array
+    errors: Array  # bound of the tool errors in the panels, between nodes too, in [m] or [rad], shape (panels, cells)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Precision:
-    """How exact a motion has to be, and how fine it may become.
-
-    Attributes:
-        configuration_tol: Distance of configurations from the limit of the passes, in [rad] and [m]; None for ten
-            times the accuracy.
-    """
+    """How exact a motion has to be, and how fine it may become."""
 
     accuracy: float  # largest tool error at the nodes and between them, in [m] and [rad]
-    configuration_tol: float | None = None
+    configuration_tol: float | None = None  # [rad] and [m] from the limit of the passes; None: 10 accuracies
     shortest: float = 0.0  # length in [s] below which no panel is made by halving
 
 

@@ -20,16 +20,11 @@ class StartOffset:
 
     Targets are moved by ``v (1 - \sigma(t / T))`` with the quintic law ``\sigma``: from the tool's own pose to the
     path, from rest to rest.
-
-    Attributes:
-        linear: Desired tip minus actual one at the start in the frame of each task, in [m], shape (3, tasks).
-        angular: Rotation vector from the actual to the desired orientation, in [rad], shape (3, tasks).
-        until: Times in [s] from which on nothing is left of it, shape (tasks,).
     """
 
-    linear: Array
-    angular: Array
-    until: Array
+    linear: Array  # desired tip minus actual one in the frame of each task, in [m], shape (3, tasks)
+    angular: Array  # rotation vector from the actual to the desired orientation, in [rad], shape (3, tasks)
+    until: Array  # times in [s] from which on nothing is left of it, shape (tasks,)
 
     def applied(self, times: Array, X: Array, V: Array) -> Desired:
         """Targets moved so that they begin where the tools are.

@@ -40,22 +40,16 @@ IN_PLANE: Final = np.sin(np.deg2rad(1.0))  # [-] a side seen at a flatter angle 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PathCurve:
-    """The curve of a tool tip in P: as its task states it, or projected onto the part.
-
-    Attributes:
-        patch: The smooth patch of the part that the curve lies on; None on a mesh or where it is not projected.
-        bulge: Largest distance in [m] of a smooth curve from the straight lines between its points, before it is
-            projected; None for other curves.
-    """
+    """The curve of a tool tip in P: as its task states it, or projected onto the part."""
 
     curve: Curve
     stops: Array  # parameters at which the tool rests: the start, corners that are not rounded, the end
     given: Array  # parameters of the points as they were listed, shape (N,); a closed path ends with its start
     is_closed: bool  # whether the end is the start
     runs_on: bool = False  # whether a closed curve passes its start without a corner
-    patch: Patch | None = None
+    patch: Patch | None = None  # the smooth patch of the part under it; None on a mesh or where it is not projected
     inward: BezierCurve | None = None  # inward normals of a mesh along the curve; None elsewhere
-    bulge: float | None = None
+    bulge: float | None = None  # greatest distance in [m] of a smooth curve from its chords, unprojected; else None
 
 
 def path_curve(task: Task) -> PathCurve:

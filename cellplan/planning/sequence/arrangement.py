@@ -14,13 +14,9 @@ from cellplan.model.task.task import Task
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Tasks that begin together with everything at rest; the next block begins when all of them are done.
+    """Tasks that begin together with everything at rest; the next block begins when all of them are done."""
 
-    Attributes:
-        tasks: Names of the tasks in the order of the cell, at most one for each robot; none for a rest after them all.
-    """
-
-    tasks: tuple[str, ...]
+    tasks: tuple[str, ...]  # in the order of the cell, at most one for each robot; none for a rest after them all
     dwell: float = 0.0  # time in [s] for which all robots stand still before the tasks begin
 
 

@@ -12,15 +12,11 @@ from cellplan.scene.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StageScenes:
-    """The scenes that the stages of a program are judged in; each is built once.
-
-    Attributes:
-        lying: Those with the part lying somewhere, by its pose.
-    """
+    """The scenes that the stages of a program are judged in; each is built once."""
 
     cell: Cell  # the cell; its starts and homes do not matter
     held: Scene  # its scene with the part held, or fixed
-    lying: dict[bytes, Scene] = field(default_factory=dict, repr=False)
+    lying: dict[bytes, Scene] = field(default_factory=dict, repr=False)  # those with the part lying, by its pose
 
     @classmethod
     def of(cls, cell: Cell) -> "StageScenes":

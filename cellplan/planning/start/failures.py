@@ -27,14 +27,13 @@ class Failures:
 
     Attributes:
         arrived: Configurations within the limits that reach a goal, each with that of the positioner.
-        beyond: Configurations that reach a goal with a joint outside its limits.
         off: Smallest distance in [m] and [rad] of a given start from its task or grasp, as the part was held.
     """
 
     arrived: dict[str, list[tuple[Array, Array | None]]] = field(default_factory=dict)
     missed: dict[str, list[MissedGoal]] = field(default_factory=dict)  # goals that no configuration reaches
     misses: dict[str, int] = field(default_factory=dict)  # how many such goals there were
-    beyond: dict[str, list[Array]] = field(default_factory=dict)
+    beyond: dict[str, list[Array]] = field(default_factory=dict)  # reaching a goal with a joint out of its limits
     off: dict[str, tuple[float, float]] = field(default_factory=dict)
     touching: list[Array] = field(default_factory=list)  # configurations of the whole cell in which something touches
 

@@ -40,15 +40,11 @@ LOST: Final = -1e6  # stands for the share that a motion leaves free which loses
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartTrial:
-    """What is known of the motion from one start configuration of the whole cell.
-
-    Attributes:
-        speeds: Share of its speed limit that each joint leaves free at least, shape (nq,); negative above the limit.
-    """
+    """What is known of the motion from one start configuration of the whole cell."""
 
     start: Array  # stacked start configuration on the turns that leave its joints most room, shape (nq,)
     ranges: Array  # share of half its range that each joint leaves free at least, shape (nq,); negative beyond a limit
-    speeds: Array
+    speeds: Array  # share of its speed limit that each joint leaves free, shape (nq,); negative above the limit
     is_followed: bool = True  # whether every tool keeps to its path
     contact: str = ""  # what collides first on the way, and where; empty where nothing does
 

@@ -118,7 +118,6 @@ class Retimer:
     Attributes:
         feed_share: Share of the tools' speed limits that is taken up at the speed of the nominal time, at nominal times
             in [s], shape (N,) to shape (N,).
-        slower: By which factor the rows have to be slower for every limit to hold in them; at most 1 where all hold.
         errors: Errors of the tools between rows, which ``feed_share`` then bounds the speed by; None for no such limit.
             Where they cannot be kept by a slower motion they are left to the checks.
     """
@@ -126,7 +125,7 @@ class Retimer:
     bounds: JointLimitsInTime  # limits of all joints
     step: float  # time between two rows in [s]
     feed_share: Callable[[Array], Array]
-    slower: Slower
+    slower: Slower  # factor by which rows must be slower for every limit to hold in them; at most 1 where all do
     fixed_rates: tuple[FixedRate, ...] = ()  # where the rate of the nominal time is demanded
     errors: StepTolerance | None = None
 

@@ -16,16 +16,11 @@ HEADING_DAMPING: Final = 1e-4  # squared damping factor of the motion that tells
 
 
 class JointWeights:
-    """The diagonal of W along the motion; it depends on sample and configuration only, not on what went before.
-
-    Attributes:
-        constant: The weights that the cell states, shape (nq,).
-        varies: Whether the weights of a sample are others than these.
-    """
+    """The diagonal of W along the motion; it depends on sample and configuration only, not on what went before."""
 
     def __init__(self, cell: Cell, model: CombinedModel) -> None:
         """Take the constant weights, the limits and the masses of all robots."""
-        self.constant = np.concatenate([robot.weights for robot in cell.robots])
+        self.constant = np.concatenate([robot.weights for robot in cell.robots])  # stated by the cell, shape (nq,)
         self._near_limits, self._load = cell.solver.weighting.near_limits, cell.solver.weighting.load
         self._lower, self._upper = cell.joint_limits.lower, cell.joint_limits.upper
         self._turning = TURNING * cell.joint_limits.velocity
@@ -33,7 +28,7 @@ class JointWeights:
         self._tools = np.array([robot.tool.mass or 0.0 for robot in cell.robots])
         self._shares = np.array([_part_share(cell, robot.name) for robot in cell.robots])
         self._p_PS = cell.part.X_PS[:3, 3]
-        self.varies = self._near_limits > 0.0 or self._load > 0.0
+        self.varies = self._near_limits > 0.0 or self._load > 0.0  # whether any sample has other weights
 
     def at(self, state: CellState, q: Array, *, J: Array, xdot: Array, secondary: Array | None) -> Array:
         r"""Weights at one sample and configuration.

@@ -17,14 +17,10 @@ BETWEEN_THINGS: Final = frozenset({ClearanceClass.ENVIRONMENT, ClearanceClass.PA
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ClosestPair:
-    """Two bodies that are near each other.
-
-    Attributes:
-        distance: In [m]; negative where their convex hulls overlap by so much. Reports state 0 for bodies in contact.
-    """
+    """Two bodies that are near each other."""
 
     row: int  # index into ``Scene.pairs``
-    distance: float
+    distance: float  # in [m]; negative where their convex hulls overlap by so much, where reports state 0
     point_a: Array  # nearest point of the pair's first body in the world, shape (3,), in [m]
     point_b: Array  # nearest point of its second body
     gradient: Array  # change of the distance per joint, shape (nq,), in [m/rad] or [m/m]

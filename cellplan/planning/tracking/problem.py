@@ -26,18 +26,14 @@ LOST_DISTANCE: Final = 0.5  # [m] a tool this far from its path has left it: the
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstOrder:
-    """All tasks at one sample and configuration, to first order; only the components that they constrain.
-
-    Attributes:
-        bounds: Lowest and highest joint speeds that goals may lead to, shape (nq,) each; None when there are no goals.
-    """
+    """All tasks at one sample and configuration, to first order; only the components that they constrain."""
 
     J: Array  # rows of the cooperation Jacobian, shape (m, nq); zero columns for joints that may not move
     twist: Array  # reference tool twists relative to the part, shape (m,)
     error: Array  # pose errors, desired minus actual, shape (m,)
     weights: Array  # joint weights, the diagonal of W, shape (nq,)
     secondary: Array | None  # joint velocities that the secondary goals ask for, shape (nq,); None when there are none
-    bounds: tuple[Array, Array] | None = None
+    bounds: tuple[Array, Array] | None = None  # lowest and highest speeds of goals, shape (nq,) each; None without any
 
     def bounded(self, null_space_projection: Array, *, velocities: Array) -> Array:
         """Share of null-space velocities that may be added to the velocities that the tasks need, shape (nq,).

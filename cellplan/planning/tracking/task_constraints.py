@@ -27,30 +27,18 @@ class TaskConstraints:
     its own. The linear components are those along the axes of the reference frame R, the angular ones likewise; with
     free spin they are taken along the axes of the desired tool frame, of which z is left open. Errors are desired minus
     actual.
-
-    Attributes:
-        tasks: The tasks, then the grasps of further holders.
-        operators: Index of each one's robot in the cell, shape (tasks,).
-        carrier: Index of the positioner that carries the part frame; None for a part at a fixed pose.
-        is_on_part: Whether R is the part frame P rather than the world frame W, shape (tasks,).
-        is_spin_free: Whether the rotation about the tool's own axis is left open, shape (tasks,).
-        constrained: Which of the six components are constrained, shape (tasks, 6).
-        operator_signs: ``s_i``, 1 or 0, shape (tasks,).
-        carrier_signs: ``c_i``, -1, 0 or 1, shape (tasks,).
-        may_move: 1 for the joints of robots that may move, 0 for all others, shape (nq,).
-        follows_path: 1 for those of them whose motion is given, 0 for all others, shape (nq,).
     """
 
-    tasks: tuple[Relation, ...]
-    operators: NDArray[np.intp]
-    carrier: int | None
-    is_on_part: NDArray[np.bool_]
-    is_spin_free: NDArray[np.bool_]
-    constrained: NDArray[np.bool_]
-    operator_signs: Array
-    carrier_signs: Array
-    may_move: Array
-    follows_path: Array
+    tasks: tuple[Relation, ...]  # the tasks, then the grasps of further holders
+    operators: NDArray[np.intp]  # index of each one's robot in the cell, shape (tasks,)
+    carrier: int | None  # index of the positioner that carries the part frame; None for a part at a fixed pose
+    is_on_part: NDArray[np.bool_]  # whether R is the part frame P rather than the world frame W, shape (tasks,)
+    is_spin_free: NDArray[np.bool_]  # whether the rotation about the tool's own axis is left open, shape (tasks,)
+    constrained: NDArray[np.bool_]  # which of the six components are constrained, shape (tasks, 6)
+    operator_signs: Array  # ``s_i``, 1 or 0, shape (tasks,)
+    carrier_signs: Array  # ``c_i``, -1, 0 or 1, shape (tasks,)
+    may_move: Array  # 1 for the joints of robots that may move, 0 for all others, shape (nq,)
+    follows_path: Array  # 1 for those of them whose motion is given, 0 for all others, shape (nq,)
 
     @classmethod
     def of(cls, cell: Cell, tasks: Sequence[Relation], moving: Sequence[str]) -> "TaskConstraints":

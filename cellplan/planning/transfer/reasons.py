@@ -18,18 +18,13 @@ SHOWN: Final = 2  # pairs of bodies that are named
 
 @dataclass(slots=True, kw_only=True, eq=False)
 class Tried:
-    """What one way of planning tried in vain.
-
-    Attributes:
-        reached: Configurations reached from start and goal in the last search of each robot that failed.
-        refused: How often each pair of bodies was too near, by their names.
-    """
+    """What one way of planning tried in vain."""
 
     orders: int = 0  # orders of the robots
     searches: int = 0  # searches by trees that failed
     samples: int = 0  # configurations drawn in them
-    reached: dict[str, tuple[int, int]] = field(default_factory=dict)
-    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
+    reached: dict[str, tuple[int, int]] = field(default_factory=dict)  # configurations from start and goal, by robot
+    refused: Counter[tuple[str, str]] = field(default_factory=Counter)  # how often pairs of bodies were too near
     uncertified: int = 0  # moves that were found but are not certified between their rows
 
     def failed(self, robot: str, samples: int, reached: tuple[int, int]) -> None:

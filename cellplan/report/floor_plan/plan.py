@@ -56,12 +56,7 @@ class PlanWall:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlanRobot:
-    """A robot of the plan.
-
-    Attributes:
-        reach: Largest distance of the flange from there; None where the reach is no circle: on a rail, on a wall.
-        reach_outline: Farthest places of the flange all round in that case, shape (K, 2); none where it is a circle.
-    """
+    """A robot of the plan."""
 
     name: str
     model: str
@@ -69,8 +64,8 @@ class PlanRobot:
     base: Array  # coordinates of the base, shape (3,)
     yaw_deg: float  # direction of the x axis of the base, from that of the world
     centre: Array  # where its first axis stands, shape (2,)
-    reach: float | None
-    reach_outline: Array
+    reach: float | None  # largest distance of the flange from there; None where it is no circle: on a rail, a wall
+    reach_outline: Array  # farthest places of the flange then, shape (K, 2); none where it is a circle
     swept: tuple[Array, ...]  # contours of what links and tools cover during the motion; none without a motion
 
 

@@ -28,14 +28,10 @@ class TimeLink:
 
 @dataclass(frozen=True, slots=True)
 class TimeLinks:
-    """Writer of times that may be chosen, ``at(1.626)`` in templates.
-
-    Attributes:
-        begin: Time in [s] at which the clock of the page begins on that of the whole program, which the 3-D page has.
-    """
+    """Writer of times that may be chosen, ``at(1.626)`` in templates."""
 
     view: str  # where the 3-D page lies from the page
-    begin: float = 0.0
+    begin: float = 0.0  # in [s] at which the page's clock begins on that of the program, which the 3-D page has
     begins: Mapping[str, float] = field(default_factory=dict)  # time in [s] of each phase on the page's clock
 
     def __call__(self, at: float | None, shift: float | None = 0.0) -> str | TimeLink:

@@ -15,17 +15,13 @@ WIDTH, ROW = 10.0, 1.75  # [inch] of a figure; from one row of panels to the nex
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlotAxis:
-    """What is measured along one side of a panel.
-
-    Attributes:
-        is_log: Whether its scale is logarithmic; both ends are positive then, and smaller values lie at the lower end.
-    """
+    """What is measured along one side of a panel."""
 
     low: float  # value at its lower or left end
     high: float  # value at its upper or right end
     label: str = ""  # what it measures
     unit: str = ""  # unit of its values
-    is_log: bool = False
+    is_log: bool = False  # logarithmic; both ends are positive then, smaller values lie at the lower end
     is_time: bool = False  # whether it is the time of a motion in [s], which all figures of a page share
 
     def share(self, values: Array | float) -> Array:
@@ -137,11 +133,7 @@ class PlotPanel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Figure:
-    """Panels that share the axis along them.
-
-    Attributes:
-        is_plane: Whether both axes are lengths in one scale, seen from above: a frame with ticks and no grid.
-    """
+    """Panels that share the axis along them."""
 
     title: str  # text above the panels
     x: PlotAxis  # their axis from left to right
@@ -149,7 +141,7 @@ class Figure:
     columns: int = 1  # number of panels in a row
     width: float = WIDTH  # width of the figure in [inch]
     row: float = ROW  # height of a row of panels in [inch]
-    is_plane: bool = False
+    is_plane: bool = False  # both axes are lengths in one scale, seen from above: a frame with ticks, no grid
     legend: Sequence[LegendKey] = ()  # texts to the right of the panels
     is_exact: bool = False  # whether its colours are data, and stay as they are on a dark page
     text: str = ""  # what the figure shows, for those who do not see it

@@ -41,14 +41,13 @@ class Painter:
 
     Attributes:
         classes: Names of the classes of materials and tones, filled while painting.
-        focus: Point of the sheet, shape (2,), near which facets must be in their right order; None for all of it.
     """
 
     camera: Camera
     low: Array  # left upper corner of what is shown of the sheet, shape (2,)
     high: Array  # right lower corner, shape (2,)
     classes: dict[tuple[str, int], str] = field(default_factory=dict)
-    focus: Array | None = None
+    focus: Array | None = None  # point of the sheet, shape (2,), near which facets must be in order; None: everywhere
 
     def paths(self, solids: Sequence[ShownSolid], lines: Sequence[ShownLine]) -> str:
         """SVG of solids and lines."""

@@ -37,24 +37,18 @@ RANK: Final = {verdict: rank for rank, verdict in enumerate(Verdict)}
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PlaceVerdict:
-    """One place.
-
-    Attributes:
-        joint: Robot and joint that is beyond a limit, or that leaves least; None where no joint has limits.
-        margin: Its smallest distance from a limit of a turning joint in [rad], of a sliding one in [m]; likewise.
-        pair: Bodies that are too near each other, and their distance in [m]; None where none are.
-    """
+    """One place."""
 
     verdict: Verdict  # what becomes of it
     start: Array | None = None  # start posture of the robot in [rad] or [m], shape (n,); None where there is none
     lost_at: float | None = None  # time in [s] at which a tool could not follow; None where all did
-    joint: tuple[str, str] | None = None
-    margin: float | None = None
+    joint: tuple[str, str] | None = None  # robot and joint beyond a limit, or that leaves least; None without limits
+    margin: float | None = None  # its smallest distance from a limit in [rad] or [m]; None without limits
     fast: tuple[str, str] | None = None  # robot and joint that is fastest against its limits of speed and acceleration
     speed: float | None = None  # largest speed of any joint as a share of its limit; None where there is no motion
     acceleration: float | None = None  # largest acceleration likewise
     cycle: float | None = None  # shortest time in [s] of the same motion, faster or slower as a whole, that keeps both
-    pair: tuple[str, str] | None = None
+    pair: tuple[str, str] | None = None  # bodies too near each other, and their distance in [m]; None without any
     distance: float | None = None  # that distance
     at: float | None = None  # time in [s] at which they are
     reason: str = ""  # why it is not judged; empty where it is

@@ -77,7 +77,6 @@ class CellDistances:
     Attributes:
         pairs: The pairs: those that the checks watch, those of which they judge the depth, then areas of the floor with
             the bases and columns that keep out of them.
-        most_demanded: The largest distance in [m] that is demanded of one.
     """
 
     def __init__(self, scene: Scene, variables: LayoutVariables) -> None:
@@ -106,7 +105,7 @@ class CellDistances:
             is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
         self._demands, self._within_robot = demands_of(self.pairs), are_within_robot(self.pairs)
-        self.most_demanded = float(self._demands.max(initial=0.0))
+        self.most_demanded = float(self._demands.max(initial=0.0))  # the largest demand in [m]
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array(
             [-1 if carrier.robot is None else index[carrier.robot] for carrier in carriers], dtype=np.intp

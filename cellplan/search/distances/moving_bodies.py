@@ -40,15 +40,11 @@ class LayoutVariables(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NeighbourCells:
-    """Two cells in which one number of a tool or of the part is a step in [m] or [rad] greater, and less.
-
-    Attributes:
-        sides: The cell with the greater number, and that with the smaller one; the rest of them does not count.
-    """
+    """Two cells in which one number of a tool or of the part is a step in [m] or [rad] greater, and less."""
 
     robot: str | None  # the robot of which the solids of the tool differ; None where it is the place of the part
     by: Array  # by how much the number grows with each variable, shape (n,)
-    sides: tuple[Cell, Cell]
+    sides: tuple[Cell, Cell]  # the cell with the greater number, then with the smaller one; their rest does not count
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,16 +17,11 @@ FIGURES: Final = ("distance from its lower limit", "distance from its upper limi
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
-    """Largest values of functions of time that are known at nodes: of the parabola through a node and its neighbours.
-
-    Attributes:
-        shares: Shares of the values at that node's neighbour before, itself and the one after, shape (K, n, 3); with
-            their signs where the largest magnitude was asked for.
-    """
+    """Largest values of functions of time known at nodes: of the parabola through a node and its neighbours."""
 
     value: Array  # the largest values, shape (K, n)
     node: Indices  # the nodes in the middle, shape (K, n), from 1 to N - 2
-    shares: Array
+    shares: Array  # shares of the values before, at and after that node, (K, n, 3); signed for magnitudes
 
     @classmethod
     def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "Peaks":
@@ -59,15 +54,10 @@ class Peaks:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PeakValues:
-    """Values of functions of time at their nodes, or where one is highest among its neighbours that of the parabola.
-
-    Attributes:
-        shares: Shares of the values at the node before, the node and the one after, shape (N, n, 3); with their signs
-            where magnitudes were asked for.
-    """
+    """Values of functions of time at their nodes, or where one is highest among its neighbours that of the parabola."""
 
     value: Array  # the values, shape (N, n)
-    shares: Array
+    shares: Array  # shares of the values before, at and after the node, (N, n, 3); signed for magnitudes
 
     @classmethod
     def of(cls, times: Array, values: Array, *, in_magnitude: bool = False) -> "PeakValues":

@@ -30,10 +30,6 @@ class Job:
     """What the motions of all layouts of a cell share.
 
     Where a desired twist jumps there are two nodes at one time, which see it from either side.
-
-    Attributes:
-        steps: Weights in [s] of the rates at a node and the two before it, which predict the next one by a multistep
-            rule, shape (N - 1, 3).
     """
 
     cell: Cell  # the cell: its robots, part, limits and the weights that layouts have unless they state their own
@@ -47,7 +43,7 @@ class Job:
     X: Array  # desired tool poses in the frames of the relations, shape (4, 4, relations, N)
     V: Array  # their twists, linear part first, along the axes of these frames, in [m/s] and [rad/s], (6, relations, N)
     is_begin: Array  # whether a node begins a stretch on which the desired twists are continuous, shape (N,)
-    steps: Array
+    steps: Array  # weights in [s] of the rates at a node and the two before in the multistep rule, shape (N - 1, 3)
     rates: Array  # derivatives by time in [1/s] at the nodes, of what is given at them, shape (N, N)
     integral: Array  # integrals in [s] from the first node to each, of what is given at the nodes, shape (N, N)
 

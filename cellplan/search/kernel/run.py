@@ -42,16 +42,11 @@ def keep_freed_memory() -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motions:
-    """The motions of K layouts; what comes after a candidate has lost a path is not valid.
-
-    Attributes:
-        lost_at: Time in [s] at which a tool could not follow; -inf where it did not come to the start of its path, inf
-            for candidates that did the whole job, shape (K,).
-    """
+    """The motions of K layouts; what comes after a candidate has lost a path is not valid."""
 
     q: Array  # stacked joint positions at the nodes in [rad] or [m], shape (K, N, nq)
     qd: Array  # their speeds in [rad/s] or [m/s], shape (K, N, nq)
-    lost_at: Array
+    lost_at: Array  # when a tool was lost in [s], shape (K,); -inf before its path, inf where the job is done
 
     @property
     def is_followed(self) -> NDArray[np.bool_]:

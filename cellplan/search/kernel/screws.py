@@ -16,14 +16,9 @@ from cellplan.search.kernel.job import Job, Layouts
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Directions:
-    """Directions in the space of layouts, in which derivatives are taken; p of them.
+    """Directions in the space of layouts, in which derivatives are taken; p of them."""
 
-    Attributes:
-        base: Displacement of each base per unit of the variable: of its origin in W in [m], then its rotation vector
-            about that point along the axes of W in [rad], shape (robots, 6, p).
-    """
-
-    base: Array
+    base: Array  # displacement of each base per unit: of its origin in [m], about it in [rad], in W, (robots, 6, p)
     tool: Array  # likewise of each tool tip, along the axes of the flange, shape (robots, 6, p)
     start: Array  # change of the start posture, shape (nq, p); joints that bring the tools to their paths follow
     weights: Array  # change of the joint weights, shape (nq, p)

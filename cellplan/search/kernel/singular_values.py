@@ -27,16 +27,12 @@ SAMPLES: Final = 256  # [-] configurations of which the usual value is the media
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SingularValues:
-    """Least singular values of A arms at N nodes: of the relations whose own robot moves.
-
-    Attributes:
-        directions: The p directions of the layout, which are the last ones of what derivatives are asked by.
-    """
+    """Least singular values of A arms at N nodes: of the relations whose own robot moves."""
 
     job: Job  # the tasks
     layout: Layouts  # the layout, a batch of one
     q: Array  # joint positions at the nodes in [rad] or [m], shape (N, nq)
-    directions: Callable[[], Directions]
+    directions: Callable[[], Directions]  # the p directions of the layout, the last ones of all derivatives
     values: Array  # the values in mixed units of [m] and [rad], shape (N, A)
 
     @classmethod

@@ -35,13 +35,9 @@ class _Measured:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GuardedProblem(LayoutProblem):
-    """A layout problem whose last pairs are arms and their singular configurations; demanded of them is nothing.
+    """A layout problem whose last pairs are arms and their singular configurations; demanded of them is nothing."""
 
-    Attributes:
-        guards: Places among the arms of those with at least as many joints as their task has components, shape (G,).
-    """
-
-    guards: Indices = field(init=False)
+    guards: Indices = field(init=False)  # arms with no fewer joints than their task has components, shape (G,)
 
     def __post_init__(self) -> None:
         """Note which arms are guarded."""

@@ -42,14 +42,10 @@ ANGLE: Final = 0.1  # [rad] or [m] of a margin that a corner misses that weigh a
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Robust:
-    """A layout and its corners.
-
-    Attributes:
-        corners: All corners that were planned: the worst ones by derivatives, the ends, then the seeded ones.
-    """
+    """A layout and its corners."""
 
     improved: Improved  # the layout, as the last programs left it, with its motion in place
-    corners: tuple[Corner, ...]
+    corners: tuple[Corner, ...]  # all that were planned: the worst by derivatives, the ends, the seeded ones
     worst_ones: int  # number of those by derivatives
     ends: int  # number of displacements at their ends, one at a time
     nominal: float  # shortest cycle in [s] of the layout in place

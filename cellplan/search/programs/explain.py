@@ -18,20 +18,13 @@ COUNTS: Final = 1e-6  # [-] multiplier from which on a row binds
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BindingRow:
-    """A demand that keeps the objective from being better.
-
-    Attributes:
-        share: Of the objective's gradient; that of speeds and accelerations where the cycle is the objective, so that
-            these add up to 1.
-        gain: What the objective gains per unit in SI by which the demand is lower, of singular values per share of it;
-            None where it is the objective.
-    """
+    """A demand that keeps the objective from being better."""
 
     kind: MeasureKind  # what it is about
     names: tuple[str, str]  # robot and joint, the two bodies, or the robot whose singular values they are
     time: float  # when, in [s] on the clock of the nodes
-    share: float
-    gain: float | None
+    share: float  # of the objective's gradient; for the cycle of speeds and accelerations, adding up to 1
+    gain: float | None  # of the objective per SI unit, or share, demanded less; None for the objective itself
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -42,7 +42,6 @@ class Measures:
             it lasted as long as the nodes do.
         accelerations: Accelerations likewise, shape (N, nq): the motion must last as many times as long as the nodes do
             as the root of them says.
-        pace: The motion as fast as the limits allow everywhere; None where it is timed by the laws of the cell.
     """
 
     point: Point
@@ -61,7 +60,7 @@ class Measures:
     cycle: float  # shortest cycle in [s]
     arms: ArmValues | None  # least singular values of the arms; None where none are demanded
     singular: PeakValues  # shares of what is demanded of them that they miss, negative where they keep it, shape (N, A)
-    pace: Pace | None = None
+    pace: Pace | None = None  # the motion as fast as the limits allow everywhere; None with the time laws of the cell
 
     @classmethod
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":

@@ -31,9 +31,6 @@ class Demands:
     Attributes:
         duration: Cycle in [s] that the limits of speed and acceleration must allow; None where any will do. The
             objectives clearance and change need one.
-        singular: Least singular values of the arms in [m] and [rad], shape (A,), see ``Problem``; None for any.
-        beyond: Further distances in [m] that pairs keep, as uncertainties may take as much away, shape (pairs,); None
-            for none.
     """
 
     objective: Objective  # what is improved
@@ -41,8 +38,8 @@ class Demands:
     duration: float | None = None
     timing: CycleTiming = CycleTiming.LAWS  # how the motion is timed
     clearance: float = 0.0  # added to what the cell demands of every pair but those of one robot's own bodies, in [m]
-    singular: Array | None = None
-    beyond: Array | None = None
+    singular: Array | None = None  # least singular values of the arms in [m] and [rad], shape (A,); None for any
+    beyond: Array | None = None  # further distances in [m] for uncertainties, shape (pairs,); None for none
 
     def __post_init__(self) -> None:
         """Check at the door what the objective needs."""

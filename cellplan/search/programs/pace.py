@@ -53,18 +53,14 @@ class PacedStretch:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PacePlaces:
-    """Where loads are limited, E places: at ``directions[at] * by_direction + curvatures[at] * by_curvature``.
-
-    Attributes:
-        changes: Derivatives of both by relative changes of these squares, shape (E, 2, 2): first of ``by_direction``.
-    """
+    """Where loads are limited, E places: at ``directions[at] * by_direction + curvatures[at] * by_curvature``."""
 
     at: Indices  # places along all stretches, shape (E,)
     is_speed: Flags  # whether it is about speeds, not accelerations, shape (E,)
     by_direction: Array  # speed or acceleration of the path, shape (E,)
     by_curvature: Array  # square of its speed, 0 for speeds, shape (E,)
     around: Indices  # places of the squares that these depend on, shape (E, 2)
-    changes: Array
+    changes: Array  # of both by relative changes of these squares, shape (E, 2, 2), ``by_direction`` first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

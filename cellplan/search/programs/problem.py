@@ -10,18 +10,14 @@ from cellplan.search.kernel.varied import Varied
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Point:
-    """Values of the variables and the motion that comes of them.
-
-    Attributes:
-        rates: How the speeds change with the joints at their node, shape (N, nq, nq); None where that is not known.
-    """
+    """Values of the variables and the motion that comes of them."""
 
     x: Array  # the variables, shape (n,)
     start: Array  # start posture of all joints in [rad] or [m], shape (nq,)
     q: Array  # joint positions at the nodes in [rad] or [m], shape (N, nq)
     qd: Array  # their speeds, shape (N, nq)
     qdd: Array  # their accelerations, shape (N, nq)
-    rates: Array | None = None
+    rates: Array | None = None  # how speeds change with joints at their node, (N, nq, nq); None if unknown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

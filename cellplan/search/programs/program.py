@@ -70,13 +70,9 @@ def least(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ProgramStep:
-    """The solution of a program.
+    """The solution of a program."""
 
-    Attributes:
-        z: The step in usual steps of the variables, then relative changes of the squares of a retimed motion, (n + m,).
-    """
-
-    z: Array
+    z: Array  # step in usual steps of the variables, then relative changes of the squares of a retimed motion, (n + m,)
     expected: float  # what it is expected to gain
     left: float  # what is still missed after it, by the rows, in usual units
     before: float  # what is missed before it

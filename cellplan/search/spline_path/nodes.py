@@ -26,12 +26,6 @@ class PathNodes:
 
     Breaks are the times at which desired twists jump and the knots of the spline; where two stretches meet, each has a
     node of its own, which sees the desired motion from inside.
-
-    Attributes:
-        shares: What each coefficient contributes to a joint, its speed in [1/s] and its acceleration in [1/s^2] at the
-            nodes, shape (3, N, count).
-        rates: Derivatives by time in [1/s] at the nodes, of what is given at them: of the polynomial through the nodes
-            of a stretch, shape (N, N).
     """
 
     job: Job  # the job; the joints of the positioner are given, not resolved
@@ -39,8 +33,8 @@ class PathNodes:
     operators: Indices  # columns of the joints of each relation's robot, shape (T, 6)
     count: int  # number of coefficients
     degree: int  # degree of the spline
-    shares: Array
-    rates: Array
+    shares: Array  # share of each coefficient in a joint, its speed [1/s], acceleration [1/s^2], (3, N, count)
+    rates: Array  # time derivatives in [1/s] of the polynomial through the nodes of a stretch, shape (N, N)
 
     @classmethod
     def of(cls, cell: Cell, schedule: Schedule, *, count: int, degree: int, nodes: int) -> "PathNodes":

@@ -22,24 +22,14 @@ class StartVariables(LayoutVariables, KernelVariables, Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Freedom:
-    """The variables of a search, sorted by the robot that they place.
+    """The variables of a search, sorted by the robot that they place."""
 
-    Attributes:
-        by_robot: Columns of the variables that move only this robot's base, tool or start posture; and those that
-            move other operators after it as well.
-        base: Columns of x, y, z and yaw of each robot's base among its own; ``FIXED`` where there is none,
-            shape (robots, 4).
-        shared: Columns of the variables that place the first holder and others: equal or mirrored ones; those of
-            weights are in none of these.
-        leaders: By robot, the one whose own variables move it too: equal or mirrored ones; itself without any.
-    """
-
-    by_robot: tuple[Indices, ...]
-    base: Indices
+    by_robot: tuple[Indices, ...]  # columns of its base, tool and start alone, and those that move later operators too
+    base: Indices  # columns of x, y, z, yaw of each base among its robot's; ``FIXED`` without one, (robots, 4)
     columns: Indices  # column of the start position of each joint; ``FIXED`` where there is none, shape (nq,)
-    shared: Indices
+    shared: Indices  # columns that place the first holder and others: equal or mirrored ones; none of weights
     part: Indices  # columns of the variables that place a part at rest
-    leaders: tuple[int, ...]
+    leaders: tuple[int, ...]  # by robot, whose variables move it too: equal or mirrored ones; itself without any
 
     @classmethod
     def of(cls, cell: Cell, variables: StartVariables, start: Array) -> "Freedom":

@@ -35,14 +35,10 @@ AT_ONCE: Final = 192  # configurations in one call: arrays of all pairs stay sma
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Shortfalls:
-    """By how much S configurations fall short of what is demanded.
-
-    Attributes:
-        pair: Names of the two bodies that fall short most, None where all keep their distance.
-    """
+    """By how much S configurations fall short of what is demanded."""
 
     worst: Array  # largest shortfall of any pair in [m]; 0 or less where all keep their distance, shape (S,)
-    pair: tuple[tuple[str, str] | None, ...]
+    pair: tuple[tuple[str, str] | None, ...]  # the two bodies that fall short most; None where none do
 
 
 class Contacts:
@@ -104,11 +100,7 @@ class Contacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartProblem:
-    """A cell whose layout is searched.
-
-    Attributes:
-        acceleration: Largest acceleration of each joint in [rad/s^2] or [m/s^2] as the checks judge it, shape (nq,).
-    """
+    """A cell whose layout is searched."""
 
     cell: Cell
     variables: StartVariables  # what is varied
@@ -116,7 +108,7 @@ class StartProblem:
     paths: Mapping[str, ClockedPath]  # path of every task on the common clock, by its name
     start: Array  # start postures of the given layout, in mid-range where none is given, in [rad] or [m], shape (nq,)
     margin: Array  # demanded distance of each joint from its limits in [rad] or [m], shape (nq,)
-    acceleration: Array
+    acceleration: Array  # largest ones as the checks judge them, in [rad/s^2] or [m/s^2], shape (nq,)
     job: Job  # the tasks at the nodes of a motion
     at_rest: Job  # the tasks at fewer nodes, for paths with the part at rest
     at_rest_fine: Job  # the same at more of them

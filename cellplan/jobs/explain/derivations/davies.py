@@ -35,17 +35,12 @@ CLOSURE_TOL = 1e-9  # [-] largest gap left in a circuit, as a share of the impos
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Network:
-    """Circuits of a cell at one configuration, and what unit speed of each joint adds to the sum round each of them.
-
-    Attributes:
-        matrix: Network matrix of unit screws, shape (rows per circuit * circuits, joints), expressed in P about the
-            origin of P, linear part first.
-    """
+    """Circuits of a cell at one configuration, and what unit speed of each joint adds to the sum round each of them."""
 
     graph: CouplingGraph  # links and joints
     circuits: tuple[Circuit, ...]  # one for each chord
     joints: tuple[str, ...]  # names of the driven joints of all robots in the stacked order, then of the virtual joints
-    matrix: Array
+    matrix: Array  # unit screws, linear part first, in P about its origin, shape (rows per circuit * circuits, joints)
 
     def columns(self, names: Collection[str]) -> list[int]:
         """Places of joints by name."""

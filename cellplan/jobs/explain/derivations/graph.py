@@ -52,14 +52,10 @@ class CouplingGraph:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Circuit:
-    """A closed way round, in the direction of its chord.
-
-    Attributes:
-        passed: Joints in the order of the way, each with +1 where it is passed from tail to head, else -1.
-    """
+    """A closed way round, in the direction of its chord."""
 
     chord: int  # index of the joint that closes it
-    passed: tuple[tuple[int, int], ...]
+    passed: tuple[tuple[int, int], ...]  # joints in order, each +1 where it is passed from tail to head, else -1
 
 
 def spanning_tree(graph: CouplingGraph, order: Sequence[int] | None = None) -> frozenset[int]:

@@ -22,14 +22,10 @@ from cellplan.search.variables.written import written_start
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathSearch:
-    """Joint paths of one search.
-
-    Attributes:
-        unled: What varies where the motion is that by the pseudo-inverse, the start posture of the positioner with it.
-    """
+    """Joint paths of one search."""
 
     layout_variables: Variables  # what varies beside the path
-    unled: Variables
+    unled: Variables  # what varies without the path, the start posture of the positioner with it
     schedule: Schedule  # the tasks on the common clock
     start: Array  # start posture of the given layout in [rad] or [m], shape (nq,)
 

@@ -49,13 +49,7 @@ SINGULAR_EVERYWHERE: Final = 1e-6  # usual singular value in [m] and [rad] below
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PreparedSearch:
-    """A cell whose layout is searched.
-
-    Attributes:
-        unled: The same search without the joint path that varies: motions by the pseudo-inverse, which paths begin
-            with; None where no path varies.
-        solved_start: The start posture of the given layout where a solve finds it first, shape (nq,); None otherwise.
-    """
+    """A cell whose layout is searched."""
 
     request: LayoutRequest  # what is searched for
     cell: Cell  # the cell, with what the request sets in it
@@ -64,8 +58,8 @@ class PreparedSearch:
     bodies: CellDistances  # their distances, wherever the layout puts them
     schedule: Schedule  # the tasks on the common clock
     moving: tuple[str, ...]  # names of the robots that move
-    unled: "PreparedSearch | None" = None
-    solved_start: Array | None = None
+    unled: "PreparedSearch | None" = None  # the same without the joint path; None where no path varies
+    solved_start: Array | None = None  # start of the given layout that a solve finds, shape (nq,); or None
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":

@@ -30,16 +30,11 @@ BESTS: Final[Mapping[Objective, Best]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposals:
-    """What each round tries; the same for the same finished rounds.
-
-    Attributes:
-        choices: Combinations of discrete choices, values by address, the present one first; tried in turn.
-        branches: Other start postures of the given layout, each with its variables: the keys ``x`` and ``start``.
-    """
+    """What each round tries; the same for the same finished rounds."""
 
     request: LayoutRequest  # what is searched for
-    choices: Sequence[Mapping[str, object]] = ({},)
-    branches: Sequence[Mapping[str, Any]] = ()
+    choices: Sequence[Mapping[str, object]] = ({},)  # combinations of discrete choices, tried in turn
+    branches: Sequence[Mapping[str, Any]] = ()  # other starts of the given layout: ``x`` and ``start``
     rejected: frozenset[int] = frozenset()  # trials that are no candidates any more
 
     def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:

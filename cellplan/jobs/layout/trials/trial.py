@@ -35,15 +35,11 @@ Begin = tuple[Array, Array]  # variables, shape (n,), and start posture, shape (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Begin:
-    """Where a trial begins.
-
-    Attributes:
-        unled: The same of the motion by the pseudo-inverse that a joint path comes from; None for all others.
-    """
+    """Where a trial begins."""
 
     x: Array  # variables, shape (n,)
     start: Array  # start posture in [rad] or [m], shape (nq,)
-    unled: Begin | None = None
+    unled: Begin | None = None  # that of the pseudo-inverse motion which a joint path comes from; else None
 
 
 def evaluate(request: LayoutRequest, variant: Variant) -> TrialOutcome:

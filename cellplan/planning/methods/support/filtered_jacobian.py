@@ -67,9 +67,6 @@ class FilteredMotion:
     joint weights. In each sub-step it settles first and the joints move then: with an endless filter gain this is the
     pseudo-inverse. Secondary goals are projected with the exact inverse, as ``I - Theta J`` would let them leak into
     the tasks while the filter lags.
-
-    Attributes:
-        theta: The filtered inverse of ``J W^-1/2``, shape (nq, m); None before the first step.
     """
 
     def __init__(self, problem: TrackingProblem, law: Law) -> None:
@@ -77,7 +74,7 @@ class FilteredMotion:
         self._problem, self._law = problem, law
         self._settings = problem.cell.solver.filtered_inverse
         self._reach = np.any(problem.signs != 0.0, axis=0)
-        self.theta: Array | None = None
+        self.theta: Array | None = None  # filtered inverse of ``J W^-1/2``, shape (nq, m); None before the first step
 
     def advance(self, k: int, q: Array) -> StepResult:
         """One step, in as many sub-steps as it needs; between two times the desired twist is held."""

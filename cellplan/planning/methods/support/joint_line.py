@@ -26,22 +26,14 @@ class JointLines:
               k_1 = -2 \, a e, \quad k_2 = 2 (n e - a a), \quad k_0 = h_0 - k_2
 
     ([Nicolato2007]_ Eq. 3.13; the paper's Eq. 3.14 lacks the factor 2). Otherwise terms in ``sin^2``, ``sin cos`` stay.
-
-    Attributes:
-        ae: ``sum a . e`` over all points and directions, shape (nq,); so with the others.
-        ne: ``sum n . e``.
-        aa: ``sum a . a``.
-        nn: ``sum n . n``.
-        an: ``sum a . n``.
-        turns: Whether the joint moves the tools on circles, shape (nq,).
     """
 
-    ae: Array
-    ne: Array
-    aa: Array
-    nn: Array
-    an: Array
-    turns: NDArray[np.bool_]
+    ae: Array  # ``sum a . e`` over all points and directions, shape (nq,); so with the others
+    ne: Array  # ``sum n . e``
+    aa: Array  # ``sum a . a``
+    nn: Array  # ``sum n . n``
+    an: Array  # ``sum a . n``
+    turns: NDArray[np.bool_]  # whether the joint moves the tools on circles, shape (nq,)
 
     def gain(self, theta: Array) -> Array:
         """By how much the cost falls when each joint alone moves by theta, shape (..., nq)."""
