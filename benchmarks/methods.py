@@ -22,9 +22,10 @@ import matplotlib as mpl
 import numpy as np
 
 from cellplan import CellplanError, load_cell
-from cellplan.checks.joints.limits import check_joints, joint_uses
-from cellplan.checks.tools.tracking import part_poses, task_accuracy
+from cellplan.checks.joints.limits import check_joints
 from cellplan.geometry.transforms import Array
+from cellplan.measures.joint_use import joint_uses
+from cellplan.measures.tool_errors import part_poses, task_accuracy
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.solver import NULL_SPACE_METHODS, MethodName

@@ -12,8 +12,8 @@ import numpy as np
 from job import Arm, Array, Job
 
 from cellplan import Cell, load_cell
-from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.transforms import inverse
+from cellplan.measures.tool_errors import errors_on_part, part_poses
 from cellplan.model.motion.motion import Schedule
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath

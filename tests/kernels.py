@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = ("certify", "checks", "geometry", "planning", "scene", "search")
+FOLDERS = ("certify", "checks", "geometry", "measures", "planning", "scene", "search")
 QUICK = ("-q", "-m", "not slow", "--assert=plain", "-p", "no:cacheprovider")
 LIMIT_S = 7200.0  # [s] for all tests under one kernel
 

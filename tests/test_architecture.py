@@ -145,6 +145,17 @@ def module_imports(path: Path) -> set[str]:
     return {node.module for node in result} | {f"{node.module}.{alias.name}" for node in result for alias in node.names}
 
 
+def test_measures_give_no_verdicts() -> None:
+    judged = {place(path) for path in SOURCES if PACKAGE / "measures" in path.parents and "Check" in names(path)}
+
+    assert judged == set()
+
+
+def names(path: Path) -> set[str]:
+    """All names that a file uses."""
+    return {node.id for node in nodes(path) if isinstance(node, ast.Name)}
+
+
 def test_every_engine_has_one_door() -> None:
     """Also an engine that no contract names yet; a change of engine is then a change of one file."""
     doors = doors_of_the_contracts()

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.checks.tools.tracking import part_poses, pose_accuracy
 from cellplan.geometry.transforms import Array, inverse, rotation_exp
+from cellplan.measures.tool_errors import part_poses, pose_accuracy
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.rehearsal import PathFigures, PoseFigures, RunRehearsal

@@ -9,13 +9,13 @@ from cellplan.checks.clearance.check import UNKNOWN, check_clearance
 from cellplan.checks.clearance.idle import check_idle
 from cellplan.checks.clearance.mounting import check_mounting
 from cellplan.checks.clearance.skew import allowed_skew, has_clocks
-from cellplan.checks.clearance.standoff import check_standoffs, standoffs
+from cellplan.checks.clearance.standoff import check_standoffs
 from cellplan.checks.clearance.stops import check_stops, stop_report
-from cellplan.checks.clearance.tool_depth import check_depths, tool_depths
+from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.checks.joints.acceleration_limits import check_accelerations, motion_accelerations
 from cellplan.checks.joints.demanded_feeds import check_feeds
 from cellplan.checks.joints.drift import check_joint_drift, repeatability
-from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.tools.between_checks import (
@@ -26,9 +26,13 @@ from cellplan.checks.tools.between_checks import (
 )
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
-from cellplan.checks.tools.tracking import check_accuracy, check_closure, closure_accuracy, part_poses, task_accuracy
+from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.measures.joint_use import joint_uses
+from cellplan.measures.standoff import standoffs
+from cellplan.measures.tool_depth import tool_depths
+from cellplan.measures.tool_errors import closure_accuracy, part_poses, task_accuracy
 from cellplan.model.cell.cell import Cell, stacked_positions
 from cellplan.model.cell.idle import idle_robots
 from cellplan.model.motion.motion import JointTable, Schedule

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from cellplan.checks.tools.tracking import part_poses
+from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import JointTable, Motion, Schedule
 from cellplan.model.report.report import Report

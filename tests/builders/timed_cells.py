@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from builders.batch_cells import everyone, relations, seen_poses
-from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import errors_on_part
 from cellplan.model.cell.cell import Cell, Grasp
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.task.clocked_path import distinct

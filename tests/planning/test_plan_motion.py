@@ -10,10 +10,10 @@ from builders.planar_arms import planar_cell, tip_jacobians
 from builders.random_cells import make_task
 from builders.timed_cells import Case, case_of, shipped, slowly_clocked, triangles
 
-from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.errors import DivergedError, InputError, NoSolutionError
 from cellplan.geometry.curves.curve import Curve, Interval
 from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import part_poses, task_accuracy
 from cellplan.model.motion.motion import Motion
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.solver import Integrator

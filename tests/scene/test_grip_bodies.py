@@ -19,11 +19,11 @@ from builders.scene_builders import (
 
 from cellplan.checks.clearance.check import check_clearance
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.clearance.tool_depth import tool_depths
 from cellplan.errors import InputError
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import pose
+from cellplan.measures.tool_depth import tool_depths
 from cellplan.model.cell.cell import Cell, Grasp
 from cellplan.model.report.left_out import LeftOutKind
 from cellplan.model.report.report import ClearanceClass

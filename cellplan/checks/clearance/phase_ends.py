@@ -19,10 +19,10 @@ from cellplan.certify.free_clocks.free_clocks import ClockRegion, certify_region
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.skew import stands_still
-from cellplan.checks.clearance.tool_depth import tool_reach
-from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import inverse
+from cellplan.measures.tool_depth import tool_reach
+from cellplan.measures.tool_errors import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Cell, Relation, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Report
@@ -243,10 +243,10 @@ class _ReachingTool:
         X_WP = part_poses(cell, self.phase.scene.chains, q)
         if isinstance(self.relation, Task):
             schedule = next(task for task in self.phase.schedule.tasks if task.task.name == self.relation.name)
-            X_PT, desired = relative_to_task_frame(self.relation, X_WT, X_WP), schedule.X_PT[[row]]
+            desired = schedule.X_PT[[row]]
         else:
-            X_PT, desired = inverse(X_WP) @ X_WT, self.relation.X_PT[None]
-        error = errors_on_part(X_PT, desired, self.relation)[0]
+            desired = self.relation.X_PT[None]
+        error = errors_on_part(relative_to_task_frame(self.relation, X_WT, X_WP), desired, self.relation)[0]
         return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
     def _travels(self, skew: float) -> tuple[Array, Array]:

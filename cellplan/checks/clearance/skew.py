@@ -16,9 +16,9 @@ import numpy as np
 from cellplan.certify.free_clocks.free_motion import FreeMotion
 from cellplan.certify.free_clocks.free_shift import ShiftBound, free_shift
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.clearance.tool_depth import tool_reach
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool, ToolTravel
 from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_depth import tool_reach
 from cellplan.model.cell.cell import Cell, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent

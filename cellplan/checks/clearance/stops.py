@@ -17,10 +17,10 @@ import numpy as np
 from cellplan.certify.free_clocks.free_clocks import ClockRegion, RegionBound, band, certify_regions
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.checks.clearance.skew import stands_still
-from cellplan.checks.clearance.tool_depth import tool_axis_depths, tool_depth_at
-from cellplan.checks.tools.tracking import errors_on_part, part_poses
 from cellplan.geometry.shapes import Mesh
 from cellplan.geometry.transforms import Array, inverse
+from cellplan.measures.tool_depth import tool_axis_depths, tool_depth_at
+from cellplan.measures.tool_errors import errors_on_part, part_poses
 from cellplan.model.cell.cell import Cell, Grasp
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
@@ -316,7 +316,7 @@ class _Stops:
 
         def distance(t_part: Array, t_tool: Array) -> Array:
             X_PT = self._on_part(grasp.robot, t_part, t_tool)
-            error = errors_on_part(X_PT, np.broadcast_to(grasp.X_PT, X_PT.shape), grasp)
+            error = errors_on_part(X_PT, grasp.X_PT[None], grasp)
             return np.linalg.norm(error[:, :3], axis=1)
 
         value, times = self._largest(distance, band)

@@ -1,27 +1,30 @@
 """Accelerations and jerk of joints, tools and part, and the limits of the joints, stated or assumed."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from itertools import product
 from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
-from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import process_speeds
 from cellplan.geometry.arrays import Array, Flags, first_peak
-from cellplan.geometry.shapes import bounding_box
+from cellplan.measures.accelerations import (
+    jerks,
+    joint_accelerations,
+    part_acceleration,
+    point_accelerations,
+    point_peaks,
+)
+from cellplan.measures.velocity_jumps import NO_TIMES, desired_jumps
 from cellplan.model.cell.acceleration import (
     JointAcceleration,
     LimitSource,
     MotionAccelerations,
     NotJudged,
-    PartAcceleration,
     PointAcceleration,
     full_speed_in,
 )
 from cellplan.model.cell.cell import Cell, Robot
+from cellplan.model.cell.joint_limits import acceleration_limit
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -47,7 +50,7 @@ def motion_accelerations(
     joints = (_joints(robot, times, q[robot.name], judged=judged, jumps_at=jumps_at) for robot in cell.robots)
     return MotionAccelerations(
         joints=tuple(use for uses in joints for use in uses),
-        tools={name: _point(times, poses[:, None, :3, 3], window=cycles[name])[0] for name, poses in X_WT.items()},
+        tools={name: point_peaks(times, poses[:, None, :3, 3], window=cycles[name])[0] for name, poses in X_WT.items()},
         part=part_acceleration(cell, times, X_WP, window=cycles[cell.positioners[0]]) if cell.positioners else None,
         process=process_speeds(schedule, X_WT, X_WP),
         not_judged=tuple(_not_judged(cell)),
@@ -65,27 +68,6 @@ def joint_peaks(
         jumps_at: Where the desired speed of a tool jumps, in [s], shape (J,).
     """
     return _joints(robot, times, q, judged=_judged(cell, times), jumps_at=jumps_at)
-
-
-def acceleration_limit(robot: Robot, index: int) -> tuple[float | None, LimitSource]:
-    """Largest allowed acceleration of one joint in [rad/s^2] or [m/s^2], and where it comes from."""
-    joint, rule = robot.model.joints[index], robot.acceleration
-    if rule.is_unlimited:
-        return None, LimitSource.UNLIMITED
-    if joint.acceleration is not None:
-        return joint.acceleration, LimitSource.STATED
-    seconds = full_speed_in(rule, index)
-    if seconds is None:
-        return None, LimitSource.NOT_STATED
-    return joint.top_speed / seconds, LimitSource.ASSUMED
-
-
-def retimed_jerk_limit(cell: Cell, robot: Robot, index: int) -> float | None:
-    """Largest jerk of one joint in [rad/s^3] or [m/s^3] that a retimed program has: stated, or assumed."""
-    joint, limit = robot.model.joints[index], acceleration_limit(robot, index)[0]
-    if joint.jerk is not None and not robot.acceleration.is_unlimited:
-        return joint.jerk
-    return None if limit is None or not cell.motion.build_up else limit / cell.motion.build_up
 
 
 def check_accelerations(cell: Cell, accelerations: MotionAccelerations) -> list[Check]:
@@ -134,44 +116,6 @@ def _judged(cell: Cell, times: Array) -> Flags:
             late = (times - lock.since) / step
             judged &= (late < -FAILURE_ROWS[0]) | (late > FAILURE_ROWS[1])
     return judged
-
-
-def part_acceleration(cell: Cell, times: Array, X_WP: Array, *, window: float) -> PartAcceleration:
-    """The centre of the part's bounding box, and the corner of it that is accelerated most.
-
-    Args:
-        times: Times of the rows in [s], shape (N,).
-        X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
-        window: Time in [s] over which jerk is taken.
-    """
-    middle, half = bounding_box(cell.part.shape)
-    points_S = middle + half * np.array([(0, 0, 0), *product((-1, 1), repeat=3)])
-    points_P = points_S @ cell.part.X_PS[:3, :3].T + cell.part.X_PS[:3, 3]
-    points = [_point(times, (X_WP[:, :3, :3] @ p + X_WP[:, :3, 3])[:, None], window=window)[0] for p in points_P]
-    centre, *corners = points
-    most = max(corners, key=lambda corner: corner.peak)
-    jerk = max(corners, key=lambda corner: corner.peak_jerk)
-    most = replace(most, peak_jerk=jerk.peak_jerk, peak_jerk_at_s=jerk.peak_jerk_at_s)
-    return PartAcceleration(centre=centre, corner=most)
-
-
-def _point(times: Array, points: Array, *, window: float) -> tuple[PointAcceleration, ...]:
-    """Points in the world, shape (N, n, 3)."""
-    accelerations = point_accelerations(times, points)
-    sizes, jerk = np.linalg.norm(accelerations, axis=-1), jerks(times, accelerations, window=window)
-    of_points = []
-    for index in range(points.shape[1]):
-        k, m = first_peak(sizes[:, index]), first_peak(jerk[:, index])
-        of_points.append(
-            PointAcceleration(
-                peak=float(sizes[:, index].max()),
-                peak_at_s=float(times[k]),
-                peak_jerk=float(jerk[:, index].max()),
-                peak_jerk_at_s=float(times[m]),
-                window=window,
-            )
-        )
-    return tuple(of_points)
 
 
 def _not_judged(cell: Cell) -> Iterator[NotJudged]:

@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit, retimed_jerk_limit
-from cellplan.checks.joints.accelerations import jerks, point_accelerations
-from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
+from cellplan.measures.accelerations import jerks, point_accelerations
+from cellplan.measures.tool_errors import relative_to_task_frame
 from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.joint_limits import acceleration_limit, retimed_jerk_limit
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
 from cellplan.model.settings.task import ProcessEntry

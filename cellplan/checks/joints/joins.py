@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limit
 from cellplan.model.report.report import Check, Report
 
 

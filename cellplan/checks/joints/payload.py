@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.accelerations import point_accelerations
 from cellplan.geometry.inertia import centre_and_inertia
 from cellplan.geometry.transforms import Array, inverse, transform_points
+from cellplan.measures.accelerations import point_accelerations
 from cellplan.model.cell.cell import Cell, Grasp, Robot
 from cellplan.model.report.report import Check
 from cellplan.model.robot.payload import AxisUse, LoadUse

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Indices
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.between_rows import BetweenError, BetweenRows
@@ -178,15 +178,9 @@ class ErrorsBetweenRows:
         errors = np.empty((len(k), len(tools), 2))
         for place, tool in enumerate(tools):
             relation, X_WT = tool.relation, chains[tool.relation.robot].tool_poses(q[tool.relation.robot])
-            if isinstance(relation, Task):
-                X_PT, desired = relative_to_task_frame(relation, X_WT, X_WP), poses_desired[tool.place or 0]
-            else:
-                X_PT = inverse(X_WP) @ X_WT
-                desired = np.broadcast_to(relation.X_PT, X_PT.shape)
-            error = errors_on_part(X_PT, desired, relation)
-            errors[:, place, 0] = np.linalg.norm(error[:, :3], axis=1)
-            errors[:, place, 1] = np.linalg.norm(error[:, 3:], axis=1)
-            errors[:, place] += tool.more(k, s)
+            desired = poses_desired[tool.place or 0] if isinstance(relation, Task) else relation.X_PT[None]
+            X_PT = relative_to_task_frame(relation, X_WT, X_WP)
+            errors[:, place] = error_lengths(X_PT, desired, relation) + tool.more(k, s)
         return errors
 
     def _bounds(self, tool: _MeasuredTool, middle: Array, sag: Array) -> Array:

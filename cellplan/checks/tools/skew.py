@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import Array, inverse
+from cellplan.measures.tool_errors import errors_on_part
 from cellplan.model.cell.cell import Relation
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 from cellplan.scene.scene import Scene

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cellplan.checks.tools.tracking import relative_to_task_frame
 from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import relative_to_task_frame
 from cellplan.model.cell.acceleration import STEADY_FRACTION, ProcessSpeed
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Schedule, TaskSchedule

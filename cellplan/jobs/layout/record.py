@@ -17,11 +17,11 @@ from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared, value
 from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, choice_of, choice_text, is_candidate, origin_text
 from cellplan.jobs.layout.trials.trial import change_of
 from cellplan.jobs.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
+from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.units import DEG, MM
 from cellplan.report.record.common import Number, number
 from cellplan.report.record.schema import record_schema
 from cellplan.runs.write_run import versions
-from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.variables.choices import Choices
 from cellplan.study.study import Finished
 from cellplan.study.trial import StudyTrial
@@ -146,7 +146,7 @@ def layout_record(
     standing = best.standing if best else None if ready.unled else standing_of_given(ready)
     of_best = ready if best is None else _prepared_of(ready, finished.trials[best.trial])
     is_free = request.objective == "cycle"
-    has_accelerations = bool(np.isfinite(acceleration_limits(ready.scene)).any())
+    has_accelerations = bool(np.isfinite(acceleration_limits(ready.scene.cell)).any())
     return {
         "schema": SCHEMA,
         "kind": "layout",

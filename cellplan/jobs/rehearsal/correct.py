@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.real_cell import RealCell, largest, measured_poses, worst_share
-from cellplan.checks.tools.tracking import pose_accuracy
 from cellplan.errors import NoSolutionError
 from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import pose_accuracy
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.rehearsal import Correction, Outcome, Round

@@ -10,7 +10,7 @@ from cellplan.certify.certify import certify
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.checks.clearance.mounting import check_mounting
-from cellplan.checks.clearance.tool_depth import check_depths, tool_depths, tool_reach
+from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.tools.between_checks import (
     check_between_rows,
@@ -18,8 +18,10 @@ from cellplan.checks.tools.between_checks import (
     check_task_between,
     with_between,
 )
-from cellplan.checks.tools.tracking import check_accuracy, check_closure, closure_accuracy, part_poses, task_accuracy
+from cellplan.checks.tools.tracking import check_accuracy, check_closure
 from cellplan.geometry.arrays import Array, Flags
+from cellplan.measures.tool_depth import tool_depths, tool_reach
+from cellplan.measures.tool_errors import closure_accuracy, part_poses, task_accuracy
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.motion.motion import Clock, Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ClosureAccuracy, TaskAccuracy, ToolDepth

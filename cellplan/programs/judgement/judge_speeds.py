@@ -5,14 +5,16 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import check_accelerations, joint_peaks, part_acceleration
+from cellplan.checks.joints.acceleration_limits import check_accelerations, joint_peaks
 from cellplan.checks.joints.demanded_feeds import check_feeds
-from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown
 from cellplan.checks.joints.payload import check_payload, load_uses
-from cellplan.checks.joints.speed_jumps import NO_TIMES, desired_jumps
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
-from cellplan.checks.tools.tracking import part_poses
 from cellplan.geometry.arrays import Array
+from cellplan.measures.accelerations import part_acceleration
+from cellplan.measures.joint_use import joint_uses
+from cellplan.measures.tool_errors import part_poses
+from cellplan.measures.velocity_jumps import NO_TIMES, desired_jumps
 from cellplan.model.cell.acceleration import MotionAccelerations
 from cellplan.model.cell.cell import Robot
 from cellplan.model.report.exported import Interpolation

@@ -14,10 +14,9 @@ import numpy as np
 
 from cellplan.cache import without_cache
 from cellplan.certify.lever_arms import LeverArms
-from cellplan.checks.clearance.tool_depth import tool_depths
-from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
 from cellplan.geometry.arrays import Array, Flags
-from cellplan.geometry.transforms import inverse
+from cellplan.measures.tool_depth import tool_depths
+from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
 from cellplan.model.cell.cell import Relation, stacked_positions
 from cellplan.model.report.exported import ExportJob, ProgramRows, Promise, RobotRows
 from cellplan.model.task.task import Task
@@ -266,10 +265,8 @@ def _errors(rows: PathRows) -> Iterator[tuple[Relation, Array, tuple[float, floa
     pairs += [(grasp, grasp.X_PT[None], limits, 0) for grasp in cell.closures]
     for relation, desired, allowed, first in pairs:
         X_WT = scene.chains[relation.robot].tool_poses(rows.q[relation.robot])
-        X_PT = relative_to_task_frame(relation, X_WT, X_WP) if isinstance(relation, Task) else inverse(X_WP) @ X_WT
-        error = errors_on_part(X_PT, np.broadcast_to(desired, X_PT.shape), relation)
-        lengths = np.stack([np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)], axis=1)
-        lengths += rows.tool_off(relation)
+        X_PT = relative_to_task_frame(relation, X_WT, X_WP)
+        lengths = error_lengths(X_PT, desired, relation) + rows.tool_off(relation)
         lengths[:first] = 0.0
         yield relation, lengths, allowed
 

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.errors import InputError, NotVerifiedError
 from cellplan.geometry.transforms import Array, inverse, rotation_exp, rotation_vector
+from cellplan.measures.tool_errors import error_lengths
 from cellplan.model.cell.cell import Cell, Relation
 from cellplan.model.report.exported import ExportFrame, ProgramRows, RobotRows
 from cellplan.model.task.task import Frame, Task
@@ -89,12 +89,10 @@ class ToolsOnPart:
 
     def errors(self, desired: Sequence[Array], poses: Sequence[Array]) -> list[Array]:
         """Position errors in [m] and orientation errors in [rad] of each, shape (N, 2); open components are zero."""
-        errors = []
-        for relation, one, other in zip(self.relations, desired, poses, strict=True):
-            error = errors_on_part(other, one, relation)
-            lengths = [np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)]
-            errors.append(np.stack(lengths, axis=1))
-        return errors
+        return [
+            error_lengths(other, one, relation)
+            for relation, one, other in zip(self.relations, desired, poses, strict=True)
+        ]
 
     def shares(self, desired: Sequence[Array], poses: Sequence[Array], *, most: float) -> list[Array]:
         """Errors as shares of what is allowed, the larger one of each row, shape (N,).

@@ -6,13 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit, part_acceleration, retimed_jerk_limit
-from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
-from cellplan.checks.joints.limits import joint_uses
-from cellplan.checks.tools.tracking import part_poses
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
+from cellplan.measures.accelerations import jerks, joint_accelerations, part_acceleration, point_accelerations
+from cellplan.measures.joint_use import joint_uses
+from cellplan.measures.tool_errors import part_poses
 from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.joint_limits import acceleration_limits, retimed_jerk_limit
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.progress import Progress, silent
@@ -125,14 +125,11 @@ def joint_path(motion: Motion) -> JointPath:
 
 def joint_bounds(cell: Cell) -> JointLimitsInTime:
     """Limits of all joints of a cell: stated ones, else those that the cell assumes."""
-    velocity, acceleration, jerk = [], [], []
-    for robot in cell.robots:
-        for index, joint in enumerate(robot.model.joints):
-            limit = acceleration_limit(robot, index)[0]
-            velocity.append(joint.velocity)
-            acceleration.append(np.inf if limit is None else limit)
-            jerk.append(retimed_jerk_limit(cell, robot, index) or np.inf)
-    return JointLimitsInTime(velocity=np.array(velocity), acceleration=np.array(acceleration), jerk=np.array(jerk))
+    numbers = [(robot, index) for robot in cell.robots for index in range(len(robot.model.joints))]
+    jerk = [retimed_jerk_limit(cell, robot, index) or np.inf for robot, index in numbers]
+    return JointLimitsInTime(
+        velocity=cell.joint_limits.velocity, acceleration=acceleration_limits(cell), jerk=np.array(jerk)
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

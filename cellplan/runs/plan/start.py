@@ -7,9 +7,11 @@ from typing import Final
 import numpy as np
 
 from cellplan.checks.clearance.mounting import CURES, check_mounting
-from cellplan.checks.clearance.standoff import check_standoffs, standoff_on
-from cellplan.checks.clearance.tool_depth import AXIS_COMPONENTS, check_depths, path_depth
+from cellplan.checks.clearance.standoff import check_standoffs
+from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.errors import StartNotFoundError
+from cellplan.measures.standoff import standoff_on
+from cellplan.measures.tool_depth import AXIS_COMPONENTS, path_depth
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Check

@@ -5,8 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.tools.tracking import errors_on_part, part_poses, relative_to_task_frame
-from cellplan.geometry.transforms import Array, inverse
+from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_errors import error_lengths, part_poses, relative_to_task_frame
+from cellplan.model.cell.cell import Relation
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.scene.scene import Scene
@@ -76,20 +77,14 @@ class StepErrors:
         cell, chains = self._scene.cell, self._scene.chains
         by_robot = {robot.name: q[:, cell.columns(robot.name)] for robot in cell.robots}
         X_WP = part_poses(cell, chains, by_robot)
+        closure = cell.checks.closure_mm.si, cell.checks.closure_deg.si
+        relations: list[tuple[Relation, Array, tuple[float, float]]] = [
+            *((path.task, path.poses(sigma), path.task.tolerance.between) for path in self._paths),
+            *((grasp, grasp.X_PT[None], closure) for grasp in cell.closures),
+        ]
         worst = np.zeros(len(sigma))
-        for path in self._paths:
-            task = path.task
-            X_PT = relative_to_task_frame(task, chains[task.robot].tool_poses(by_robot[task.robot]), X_WP)
-            worst = np.maximum(worst, _share(errors_on_part(X_PT, path.poses(sigma), task), task.tolerance.between))
-        for grasp in cell.closures:
-            X_PT = inverse(X_WP) @ chains[grasp.robot].tool_poses(by_robot[grasp.robot])
-            desired = np.broadcast_to(grasp.X_PT, X_PT.shape)
-            allowed = cell.checks.closure_mm.si, cell.checks.closure_deg.si
-            worst = np.maximum(worst, _share(errors_on_part(X_PT, desired, grasp), allowed))
+        for relation, desired, allowed in relations:
+            X_WT = chains[relation.robot].tool_poses(by_robot[relation.robot])
+            shares = error_lengths(relative_to_task_frame(relation, X_WT, X_WP), desired, relation) / allowed
+            worst = np.maximum(worst, shares.max(axis=1))
         return worst
-
-
-def _share(error: Array, allowed: tuple[float, float]) -> Array:
-    """The larger one of position and orientation error, shape (N, 6), as a share of what is allowed, shape (N,)."""
-    position, orientation = np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1)
-    return np.maximum(position / allowed[0], orientation / allowed[1])

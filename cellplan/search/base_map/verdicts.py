@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.cell.cell import joint_at
+from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
 from cellplan.search.base_map.places import Places
@@ -146,7 +146,7 @@ def _judged(map_job: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
     motions = run(job, layouts)
     with np.errstate(all="ignore"):  # what lost its path is no number
         figures = MotionFigures.of(job, motions)
-        allowed = acceleration_limits(map_job.scene)
+        allowed = acceleration_limits(map_job.scene.cell)
         rates = Peaks.of(job.times, job.rates @ (motions.qd / allowed), in_magnitude=True).value
     known = {
         k: _known(map_job, q[k], figures.margins[k], figures.speeds.value[k], rates[k])
@@ -156,12 +156,6 @@ def _judged(map_job: MapJob, q: Array, at: Indices) -> Iterator[PlaceVerdict]:
     for k in range(len(q)):
         lost_at = float(max(motions.lost_at[k], 0.0))
         yield known.get(k, PlaceVerdict(verdict=Verdict.OUT_OF_REACH, start=q[k], lost_at=lost_at))
-
-
-def acceleration_limits(scene: Scene) -> Array:
-    """Largest accelerations that the joints of a cell are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,)."""
-    limits = [acceleration_limit(robot, i)[0] for robot in scene.cell.robots for i in range(len(robot.model.joints))]
-    return np.array([np.inf if limit is None else limit for limit in limits])
 
 
 def _known(job: MapJob, start: Array, margins: Array, speeds: Array, rates: Array) -> PlaceVerdict:

@@ -9,6 +9,7 @@ import numpy as np
 from cellplan.errors import StartNotFoundError
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.model.task.task import Frame
 from cellplan.planning.modes import plan_phases
@@ -20,7 +21,6 @@ from cellplan.scene.bodies import Kind, is_ground
 from cellplan.scene.mounting import MountedPair
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
-from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.distances.layout_pairs import among, demands_of, layout_pairs
 from cellplan.search.kernel.job import Job, Layouts, enough_nodes
@@ -148,7 +148,7 @@ class StartProblem:
             paths=paths,
             start=start,
             margin=np.broadcast_to(np.asarray(margin, dtype=float), (cell.joint_count,)),
-            acceleration=acceleration_limits(scene),
+            acceleration=acceleration_limits(scene.cell),
             job=Job.of(cell, schedule, moving=moving, nodes=enough_nodes(schedule, NODES)),
             at_rest=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST),
             at_rest_fine=Job.of(cell, schedule, moving=moving, nodes=NODES_AT_REST_FINE),

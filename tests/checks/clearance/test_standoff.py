@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.scene_builders import body, fixed_part, make_cell, placed, slide_model, work
+from builders.scene_builders import work
+from builders.tool_over_part import DOWN, PEN, tool_over_part
 
-from cellplan.checks.clearance.standoff import check_standoffs, standoff_on, standoffs
-from cellplan.geometry.mesh.tessellation import tessellate
-from cellplan.geometry.shapes import Box, Cylinder, Mesh, Solid, Sphere
+from cellplan.checks.clearance.standoff import check_standoffs
+from cellplan.geometry.shapes import Box, Solid
 from cellplan.geometry.transforms import pose
-from cellplan.model.cell.cell import Cell, Tool
+from cellplan.measures.standoff import standoff_on, standoffs
+from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check, Standoff
 from cellplan.model.settings.task import ProcessEntry, ToleranceEntry
@@ -20,20 +21,12 @@ from cellplan.report.record.sections.rests_on import unstated_standoffs
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 PLATE = Box((0.2, 0.2, 0.02))
-DOWN = (np.pi, 0.0, 0.0)  # z of the tool points against z of the part
 WELD = ProcessEntry(feed_mm_s=10.0)
-TOOL = Tool(
-    X_FT=pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0)), bodies=(body("tool", 0, shape=Cylinder(0.003, 0.1), at=(0, 0, 0.05)),)
-)
 
 
 def cell_with(part: Solid, **task: object) -> Cell:
-    """A tool that looks down and slides up and down over a part whose frame is the world's."""
-    model = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
-    robot = placed("gun", model, base=pose((0.0, 0.0, 0.1), DOWN), tool=TOOL)
     tolerance = ToleranceEntry(position_mm=0.1, orientation_deg=np.degrees(1e-3))
-    gun: Task = replace(work("gun"), tolerance=tolerance, **task)
-    return make_cell(robot, part=fixed_part(part, np.eye(4)), tasks=(gun,))
+    return tool_over_part(PEN, part, replace(work("gun"), tolerance=tolerance, **task))
 
 
 def judged(
@@ -44,37 +37,6 @@ def judged(
     X_PT = np.array([pose((x, y, z), rpy) for x, y, z in points])
     standoff = standoff_on(cell, cell.tasks[0], X_PT, times=np.arange(len(points), dtype=float))
     return standoff, check_standoffs(cell, [standoff])
-
-
-@pytest.mark.parametrize("part", [PLATE, tessellate(PLATE)])
-@pytest.mark.parametrize(
-    ("point", "rpy", "nearest", "along"),
-    [
-        ((0.0, 0.0, 0.01), DOWN, 0.0, 0.0),
-        ((0.0, 0.0, 0.07), DOWN, 0.06, 0.06),
-        ((0.0, 0.0, 0.005), DOWN, 0.0, 0.0),  # inside: its depth is another check
-        ((0.16, 0.0, 0.0), DOWN, 0.06, np.inf),  # beside the edge, looking past it
-        ((0.11, 0.0, 0.01), (0.0, -3 * np.pi / 4, 0.0), 0.01, 0.01 * np.sqrt(2.0)),  # 10 mm beside it, at 45 deg to it
-        ((0.0, 0.0, 0.05), (np.pi + np.pi / 3, 0.0, 0.0), 0.04, 0.08),  # leaning by 60 deg
-        ((0.0, 0.0, 0.07), (0.0, 0.0, 0.0), 0.06, np.inf),  # looking away
-    ],
-)
-def test_both_distances_are_those_of_the_closed_form(
-    part: Solid, point: tuple[float, ...], rpy: tuple[float, float, float], nearest: float, along: float
-) -> None:
-    judgement, _ = judged([point], part, rpy=rpy)
-
-    assert judgement.worst_nearest == pytest.approx(nearest, abs=6e-5)
-    assert judgement.worst_along == pytest.approx(along, abs=1e-9)
-
-
-@pytest.mark.parametrize("part", [Sphere(0.05), Cylinder(0.05, 0.02), tessellate(Cylinder(0.05, 0.02), 96)])
-def test_round_parts_are_as_far_as_their_surface(part: Solid) -> None:
-    judgement, _ = judged([(0.08, 0.0, 0.0)], part, rpy=(0.0, -np.pi / 2, 0.0))
-
-    sagitta = 0.05 * (1.0 / np.cos(np.pi / 96) - 1.0) if isinstance(part, Mesh) else 0.0
-    assert judgement.worst_nearest == pytest.approx(0.03, abs=6e-5 + sagitta)
-    assert judgement.worst_along == pytest.approx(0.03, abs=1e-9 + sagitta)
 
 
 def test_a_seam_in_the_air_fails_with_its_distances_and_the_keys() -> None:

@@ -5,36 +5,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.scene_builders import body, fixed_part, make_cell, placed, slide_model, work
+from builders.scene_builders import work
+from builders.tool_over_part import BARE, PEN, tool_over_part
 
-from cellplan.checks.clearance.tool_depth import check_depths, path_depth, tool_depths
+from cellplan.checks.clearance.tool_depth import check_depths
 from cellplan.geometry.mesh.tessellation import tessellate
-from cellplan.geometry.shapes import Box, Cylinder, Solid, Sphere
-from cellplan.geometry.transforms import Array, pose
+from cellplan.geometry.shapes import Box, Solid
+from cellplan.geometry.transforms import Array
+from cellplan.measures.tool_depth import tool_depths
 from cellplan.model.cell.cell import Cell, Tool
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check, ToolDepth
-from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.task.task import Frame, SampledPath, Task
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SHEET = Box((0.4, 0.4, 0.002))
-PEN = Tool(
-    X_FT=pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0)), bodies=(body("tool", 0, shape=Cylinder(0.003, 0.1), at=(0, 0, 0.05)),)
-)
-BARE = Tool(X_FT=PEN.X_FT, bodies=())
 
 
 def cell_with(tool: Tool, part: Solid, task: Task | None = None) -> Cell:
-    """A tool that looks down and slides up and down over a part whose frame is the world's."""
-    model = replace(slide_model(Sphere(0.01), axis=(0.0, 0.0, -1.0)), bodies=())
-    robot = placed("drill", model, base=pose((0.0, 0.0, 0.1), (np.pi, 0.0, 0.0)), tool=tool)
-    return make_cell(
-        robot,
-        part=fixed_part(part, np.eye(4)),
-        tasks=(task or work("drill"),),
-        checks=ChecksEntry(),
-    )
+    return tool_over_part(tool, part, task or work("drill"))
 
 
 def depth_of(cell: Cell, heights: Sequence[float] | Array) -> tuple[ToolDepth, Check]:
@@ -131,14 +120,3 @@ def test_the_cure_fits_the_task() -> None:
         _, check = depth_of(cell_with(BARE, Box((0.4, 0.4, 0.1)), task), [0.0, 0.0])
         assert f"; {cure}" in check.message
         assert check.message.endswith("allow it with tool_depth_mm if the process removes material")
-
-
-def test_the_desired_path_is_measured_where_the_task_keeps_the_axis() -> None:
-    cell = cell_with(BARE, Box((0.4, 0.4, 0.1)))
-    X_PT = pose((0.0, 0.0, 0.035), (np.pi, 0.0, 0.0))[None]
-
-    desired = path_depth(cell, cell.tasks[0], X_PT)
-
-    assert desired is not None
-    assert desired.depth == pytest.approx(0.015, abs=1e-12)
-    assert path_depth(cell, replace(cell.tasks[0], axes=(0, 1, 2)), X_PT) is None

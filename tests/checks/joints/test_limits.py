@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from builders.scene_builders import arm_model, placed
 
-from cellplan.checks.joints.limits import check_joints, check_shown, joint_uses
+from cellplan.checks.joints.limits import check_joints, check_shown
+from cellplan.measures.joint_use import joint_uses
 from cellplan.model.cell.cell import Robot, Tool
 from cellplan.model.robot.controller import ControllerZero
 from cellplan.model.robot.robot import BASE, Joint, JointKind, RobotModel

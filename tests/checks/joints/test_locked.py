@@ -7,7 +7,8 @@ import pytest
 from builders.planar_arm import START, circle_schedule, planar_arm_cell
 
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
-from cellplan.checks.tools.tracking import check_accuracy, part_poses, task_accuracy
+from cellplan.checks.tools.tracking import check_accuracy
+from cellplan.measures.tool_errors import part_poses, task_accuracy
 from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.robot.robot import JointKind
 from cellplan.planning.euler.integrate import integrate_schedule

@@ -9,9 +9,9 @@ from builders.scene_builders import fixed_part, joint, make_cell, placed, schedu
 
 from cellplan import load_cell, solve
 from cellplan.checks.tools.between_checks import check_between_rows, check_task_between
-from cellplan.checks.tools.tracking import part_poses, task_accuracy
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
+from cellplan.measures.tool_errors import part_poses, task_accuracy
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.between_rows import BetweenRows
 from cellplan.model.report.report import Check

@@ -6,7 +6,7 @@ from builders.jacobian_cells import planners_jacobian
 from builders.random_cells import carried, make_task, random_cell, sharing
 
 from cellplan.checks.tools.conditioning import conditioning
-from cellplan.checks.tools.tracking import part_poses
+from cellplan.measures.tool_errors import part_poses
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.planning.tracking.cooperation_jacobian import cooperation_jacobian
 from cellplan.planning.tracking.task_constraints import TaskConstraints, constraint_rows

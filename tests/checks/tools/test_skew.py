@@ -10,8 +10,8 @@ from builders.scene_builders import work
 from cellplan.certify.free_clocks.free_motion import FreeMotion
 from cellplan.certify.lever_arms import LeverArms
 from cellplan.checks.tools.skew import ErrorGrowth, Mover, ShiftedTool
-from cellplan.checks.tools.tracking import errors_on_part
 from cellplan.geometry.transforms import inverse
+from cellplan.measures.tool_errors import errors_on_part
 from cellplan.scene.scene import Scene
 
 SPEED = 0.5  # [m/s]

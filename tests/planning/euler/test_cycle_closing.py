@@ -81,7 +81,7 @@ def test_a_path_that_does_not_come_back_is_refused_by_name() -> None:
 
 def tool_error(cell: Cell, schedule: Schedule, motion: Motion) -> float:
     """Largest position error in [m], by the kinematics of the checks."""
-    from cellplan.checks.tools.tracking import part_poses, task_accuracy
+    from cellplan.measures.tool_errors import part_poses, task_accuracy
     from cellplan.scene.kinematics.screw_chain import ScrewChain
 
     chains = {robot.name: ScrewChain(robot) for robot in cell.robots}

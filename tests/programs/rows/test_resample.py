@@ -8,8 +8,8 @@ import pytest
 from builders.moved_rows import smooth_rows
 
 from cellplan import load_cell
-from cellplan.checks.joints.accelerations import point_accelerations
 from cellplan.errors import InputError
+from cellplan.measures.accelerations import point_accelerations
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.programs.rows.interpolant import resting, row_velocities

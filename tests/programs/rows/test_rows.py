@@ -9,8 +9,8 @@ from builders.home_to_home import PICK_AND_PLACE
 from builders.plain_dialect import dialect, job_of, read_back
 
 from cellplan import load_cell, open_gate, solve, write_run
-from cellplan.checks.tools.tracking import part_poses
 from cellplan.geometry.transforms import inverse
+from cellplan.measures.tool_errors import part_poses
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.exported import Promise
 from cellplan.model.report.verified_run import VerifiedRun

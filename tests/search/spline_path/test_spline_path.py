@@ -9,13 +9,13 @@ import pytest
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.motion.motion import Schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.plan_motion import plan_motion
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.scene import Scene
-from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.objective import Demands, Effort, Objective
@@ -54,7 +54,7 @@ def problem(cell: Cell) -> PathProblem:
         path=PathVariables.of(base, "reis", path[0]),
         layout=variables,
         bodies=CellDistances.of(scene, variables),
-        acceleration=acceleration_limits(scene),
+        acceleration=acceleration_limits(scene.cell),
     )
 
 

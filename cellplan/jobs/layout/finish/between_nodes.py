@@ -5,9 +5,9 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.accelerations import joint_accelerations
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.fastest.timed_program import TimedProgram
+from cellplan.measures.accelerations import joint_accelerations
 from cellplan.model.report.report import ClearanceClass
 from cellplan.runs.plan.retiming import row_limits
 from cellplan.runs.solution import Run

@@ -13,6 +13,7 @@ from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.joint_path import PathSearch, resolving, without_path
 from cellplan.jobs.layout.trials.searched import searched_cell
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
@@ -23,7 +24,6 @@ from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.runs.plan.start import chosen_start
 from cellplan.scene.scene import Scene
-from cellplan.search.base_map.verdicts import acceleration_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.kernel.singular_values import usual_values
@@ -86,7 +86,7 @@ class PreparedSearch:
 
     def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
-        variables, acceleration = self.variables, acceleration_limits(self.scene)
+        variables, acceleration = self.variables, acceleration_limits(self.scene.cell)
         if self.unled is None:
             enough = enough_nodes(self.schedule, nodes)
             job = Job.of(variables.base, self.schedule, moving=self.moving, nodes=enough)

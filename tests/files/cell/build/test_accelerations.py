@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cellplan.checks.joints.acceleration_limits import acceleration_limit
 from cellplan.files.cell.write import render_cell
 from cellplan.model.cell.acceleration import LimitSource
 from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limit
 
 Load = Callable[..., Cell]
 Refuse = Callable[..., list[str]]

@@ -1,12 +1,17 @@
 """Accelerations and jerk of rows against motions that are known in closed form."""
 
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 import pytest
+from builders.scene_builders import fixed_part, make_cell
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.checks.joints.accelerations import jerks, joint_accelerations, point_accelerations
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.shapes import Box
+from cellplan.geometry.transforms import Array, pose, pose_from, rotation_exp
+from cellplan.measures.accelerations import jerks, joint_accelerations, part_acceleration, point_accelerations
 
 CYCLE = 0.004  # [s]
 
@@ -140,3 +145,29 @@ def test_jerk_is_the_largest_change_over_any_window_of_that_length(window: float
     jerk = jerks(times, accelerations[:, None, None], window=window)
 
     assert jerk.max() * window == pytest.approx(np.abs(changes).max(), rel=1e-6)
+
+
+def test_a_corner_of_the_part_is_accelerated_as_the_rotation_of_a_rigid_body_says() -> None:
+    """``a + alpha x r + w x (w x r)`` of every corner, from the derivatives of a motion in closed form."""
+    size, axis = np.array([0.4, 0.1, 0.2]), np.array([2.0, -1.0, 2.0]) / 3.0
+    X_PS = pose((0.1, -0.2, 0.3), (0.3, -0.5, 0.8))
+    part = replace(fixed_part(Box(tuple(size)), np.eye(4)), X_PS=X_PS)
+    times = clock(0.0005)
+    tau = times / times[-1]
+    shift, turn = np.array([0.7, -0.4, 0.2]), 1.5
+    rate, change = 30.0 * (tau * (1.0 - tau)) ** 2, 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau)
+    R = rotation_exp(turn * quintic(times)[:, None] * axis)
+    X_WP = pose_from(R, quintic(times)[:, None] * shift)
+    corners = np.array([size * signs / 2.0 for signs in product((-1, 1), repeat=3)]) @ X_PS[:3, :3].T + X_PS[:3, 3]
+    r = np.einsum("nij,kj->nki", R, corners)
+    w, alpha = (turn * derivative[:, None, None] * axis for derivative in (rate, change))
+    exact = change[:, None, None] * shift + np.cross(alpha, r) + np.cross(w, np.cross(w, r))
+
+    measured = part_acceleration(make_cell(part=part), times, X_WP, window=CYCLE)
+
+    sizes_of_corners = np.linalg.norm(exact, axis=-1)
+    assert measured.corner.peak == pytest.approx(sizes_of_corners.max(), rel=1e-4)
+    k = int(np.argmax(sizes_of_corners.max(axis=1)))
+    assert measured.corner.peak_at_s == pytest.approx(times[k], abs=0.01)
+    jerk = np.linalg.norm(np.gradient(exact, times, axis=0), axis=-1).max()
+    assert measured.corner.peak_jerk == pytest.approx(jerk, rel=0.03)  # over a cycle, less than at one instant

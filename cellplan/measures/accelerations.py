@@ -1,12 +1,16 @@
-"""Accelerations and jerk of rows that were read back: difference quotients, with rest before and after the rows."""
+"""Accelerations and jerk of joints, points and part in rows: difference quotients, rest before and after the rows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Final
 
 import numpy as np
 
-from cellplan.checks.joints.speed_jumps import NO_TIMES, joint_jumps
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Flags, first_peak
+from cellplan.geometry.shapes import bounding_box
+from cellplan.measures.velocity_jumps import NO_TIMES, joint_jumps
+from cellplan.model.cell.acceleration import PartAcceleration, PointAcceleration
+from cellplan.model.cell.cell import Cell
 
 STEP_TOL: Final = 1e-9  # [-] of a step: 4 ms are four steps of 1 ms, whatever the last digit says
 STANDSTILL_TOL: Final = 1e-9  # [rad] or [m] in a step: a joint that moves less stands still
@@ -17,7 +21,7 @@ class RowAccelerations:
     """Accelerations at the rows."""
 
     values: Array  # size of the acceleration of each column, shape (N, n)
-    is_jump: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]  # where it is a jump of speed, shape (N, n)
+    is_jump: Flags  # where it is a jump of speed, shape (N, n)
 
 
 def point_accelerations(times: Array, points: Array) -> Array:
@@ -108,3 +112,41 @@ def _changes(accelerations: Array, whole: int, rest: float) -> Array:
     count = min(n, max(len(reached) - 1, 0))
     later[:count] = (1.0 - rest) * reached[:count] + rest * reached[1 : count + 1]
     return later - accelerations
+
+
+def part_acceleration(cell: Cell, times: Array, X_WP: Array, *, window: float) -> PartAcceleration:
+    """The centre of the part's bounding box, and the corner of it that is accelerated most.
+
+    Args:
+        times: Times of the rows in [s], shape (N,).
+        X_WP: The part in the world, shape (N, 4, 4), or (1, 4, 4) for a part at a fixed place.
+        window: Time in [s] over which jerk is taken.
+    """
+    middle, half = bounding_box(cell.part.shape)
+    points_S = middle + half * np.array([(0, 0, 0), *product((-1, 1), repeat=3)])
+    points_P = points_S @ cell.part.X_PS[:3, :3].T + cell.part.X_PS[:3, 3]
+    points = [point_peaks(times, (X_WP[:, :3, :3] @ p + X_WP[:, :3, 3])[:, None], window=window)[0] for p in points_P]
+    centre, *corners = points
+    most = max(corners, key=lambda corner: corner.peak)
+    jerk = max(corners, key=lambda corner: corner.peak_jerk)
+    most = replace(most, peak_jerk=jerk.peak_jerk, peak_jerk_at_s=jerk.peak_jerk_at_s)
+    return PartAcceleration(centre=centre, corner=most)
+
+
+def point_peaks(times: Array, points: Array, *, window: float) -> tuple[PointAcceleration, ...]:
+    """Largest acceleration and jerk of points in the world, shape (N, n, 3); jerk over ``window`` in [s]."""
+    accelerations = point_accelerations(times, points)
+    sizes, jerk = np.linalg.norm(accelerations, axis=-1), jerks(times, accelerations, window=window)
+    of_points = []
+    for index in range(points.shape[1]):
+        k, m = first_peak(sizes[:, index]), first_peak(jerk[:, index])
+        of_points.append(
+            PointAcceleration(
+                peak=float(sizes[:, index].max()),
+                peak_at_s=float(times[k]),
+                peak_jerk=float(jerk[:, index].max()),
+                peak_jerk_at_s=float(times[m]),
+                window=window,
+            )
+        )
+    return tuple(of_points)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from cellplan.checks.joints.accelerations import joint_accelerations
-from cellplan.checks.joints.speed_jumps import desired_jumps, joint_jumps
 from cellplan.geometry.transforms import Array
+from cellplan.measures.accelerations import joint_accelerations
+from cellplan.measures.velocity_jumps import desired_jumps, joint_jumps
 
 SPEED = 0.3  # [rad/s] or [m/s]
 CYCLE = 0.004  # [s]

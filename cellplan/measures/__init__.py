@@ -1,0 +1,1 @@
+"""Measures: what planning and checks both compute of joints, tools and part, without limits and verdicts."""
