@@ -43,10 +43,9 @@ if TYPE_CHECKING:
     from cellplan.errors import CellplanError
     from cellplan.files.cell.load import load_cell
     from cellplan.files.cell_errors import load_errors
+    from cellplan.jobs.base_map.base_map import base_map, map_study, write_base_map
     from cellplan.jobs.base_map.grid import BaseGrid
-    from cellplan.jobs.base_map.judged import base_map, write_base_map
     from cellplan.jobs.base_map.prepared import MapRequest
-    from cellplan.jobs.base_map.study import map_study
     from cellplan.jobs.compare.compare import CompareJob, compare
     from cellplan.jobs.fastest.result import write_fastest
     from cellplan.jobs.fastest.shortest import ShortestCycles, fastest
@@ -112,14 +111,14 @@ _HOME: Final = {
     "Toolpath": "model.task.toolpath",
     "VerifiedRun": "model.report.verified_run",
     "ViewRequest": "jobs.view.write",
-    "base_map": "jobs.base_map.judged",
+    "base_map": "jobs.base_map.base_map",
     "compare": "jobs.compare.compare",
     "export_program": "programs.export.program",
     "export_programs": "programs.export.several",
     "fastest": "jobs.fastest.shortest",
     "load_cell": "files.cell.load",
     "load_errors": "files.cell_errors",
-    "map_study": "jobs.base_map.study",
+    "map_study": "jobs.base_map.base_map",
     "open_gate": "runs.gate.open_gate",
     "recover": "jobs.recover.recover",
     "rehearse": "jobs.rehearsal.rehearse",
@@ -134,7 +133,7 @@ _HOME: Final = {
     "to_html": "jobs.present.notebook",
     "verify": "runs.verify",
     "view": "jobs.view.write",
-    "write_base_map": "jobs.base_map.judged",
+    "write_base_map": "jobs.base_map.base_map",
     "write_fastest": "jobs.fastest.result",
     "write_floor_plan": "jobs.floor_plan_file",
     "write_repair": "jobs.repair.result",

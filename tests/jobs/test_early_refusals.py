@@ -9,9 +9,9 @@ import pytest
 from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_cell
+from cellplan.jobs.base_map.base_map import map_study
 from cellplan.jobs.base_map.grid import BaseGrid
 from cellplan.jobs.base_map.prepared import MapRequest
-from cellplan.jobs.base_map.study import map_study
 from cellplan.jobs.floor_plan_file import FloorPlanRequest, PlanFormat, requested_floor_plan
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.search import search_layout

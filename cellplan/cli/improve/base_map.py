@@ -52,10 +52,10 @@ def base_map(options: MapOptions) -> Result | None:
     present base, 130 interrupted (--resume goes on).
     """
     from cellplan.guard import processors
+    from cellplan.jobs.base_map.base_map import NOUN, map_study
     from cellplan.jobs.base_map.grid import BaseGrid, read_span, read_yaw
     from cellplan.jobs.base_map.prepared import MapRequest, requested_cell
     from cellplan.jobs.base_map.result import map_lines
-    from cellplan.jobs.base_map.study import NOUN, map_study
     from cellplan.study.status import read_status
 
     grid = BaseGrid(

@@ -29,7 +29,7 @@ from cellplan.report.plots.palette import INK, LIMIT, PAPER, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Record, as_json, number
-from cellplan.report.record.rows import Tables, listed_table
+from cellplan.report.record.rows import listed_table
 from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, Verdict, counts
 
 SCHEMA: Final = "cellplan.map/1"
@@ -316,7 +316,7 @@ def map_page(record: Record, plot: bytes) -> str:
     )
 
 
-# Files and tables
+# Files
 
 
 def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]:
@@ -329,16 +329,11 @@ def map_files(record: Record, formats: Collection[str] = ()) -> dict[str, bytes]
     }
 
 
-def map_tables(record: Record) -> Tables:
-    """The tables of frames and notebooks: a row for each place, and for each of the best."""
-    return {"places": listed_table(record, "places"), "best": listed_table(record, "best")}
-
-
 MAP: Final = ResultKind(
     name="map",
     title="Map of a base",
     file="map.json",
-    tables=map_tables,
+    tables=lambda record: {name: listed_table(record, name) for name in ("places", "best")},
     shown={"places": ("x_mm", "y_mm", "yaw_deg", "verdict", "cycle_s", "reason")},
     pictures=lambda record: {"map": map_figure(record)},
 )

@@ -28,7 +28,7 @@ from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Record, as_json
 from cellplan.report.record.figures import KEY, csv_text
 from cellplan.report.record.numbers import fixed, floored, seconds, small
-from cellplan.report.record.rows import Tables, listed_table
+from cellplan.report.record.rows import listed_table
 from cellplan.study.trial import STATUS_TEXTS, TrialStatus
 
 WORK: Final = tuple(f"work_{kind}_{part}" for kind in ("velocity", "acceleration") for part in ("ratio", "joint"))
@@ -348,7 +348,7 @@ def comparison_page(record: Record, plots: Mapping[str, str]) -> str:
     )
 
 
-# Files and tables
+# Files
 
 
 def comparison_files(
@@ -369,17 +369,12 @@ def comparison_files(
     }
 
 
-def comparison_tables(record: Record) -> Tables:
-    """The tables of frames and notebooks: a row for each mode, cell or run, and for each input that differs."""
-    return {
-        "variants": listed_table(record, "variants", names=("name", "trial", "status", *KEY)),
-        "differences": listed_table(record, "differences", names=("key", "values")),
-    }
-
-
 COMPARISON: Final = ResultKind(
     name="comparison",
     title="Comparison",
-    tables=comparison_tables,
+    tables=lambda record: {
+        "variants": listed_table(record, "variants", names=("name", "trial", "status", *KEY)),
+        "differences": listed_table(record, "differences", names=("key", "values")),
+    },
     shown={"variants": ("name", "status", "cycle_time_s", "min_margin_deg", "min_clearance_mm", "load_s")},
 )

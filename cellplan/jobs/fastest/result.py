@@ -23,7 +23,7 @@ from cellplan.report.plots.palette import INK, ROBOTS
 from cellplan.report.plots.svg import inline_svg, svg_text
 from cellplan.report.record.common import Number, Record, as_json, number
 from cellplan.report.record.figures import LOAD, SHOWN, Figures, csv_text, page_cells, page_headings, terminal_table
-from cellplan.report.record.rows import Tables, by_name, columns_of, flat
+from cellplan.report.record.rows import by_name, columns_of, flat
 from cellplan.runs.write_run import versions, write_run
 
 SCHEMA: Final = "cellplan.fastest/1"
@@ -338,15 +338,7 @@ def _cycle_figure(title: str, program: Record) -> dict[str, Any]:
     return figure(title, f"{program['cycle_s']:g}", "s", note=note, is_bad=program["status"] != "passed")
 
 
-# Tables and files
-
-
-def fastest_tables(record: Record) -> Tables:
-    """The tables of frames and notebooks: the production curve, and the programs that were solved."""
-    return {
-        "curve": lambda: columns_of(map(flat, record["curve"]), ["law"]),
-        "cycles": lambda: columns_of(by_name(record["cycles"], "name")),
-    }
+# Files
 
 
 def curve_table(record: Record) -> str:
@@ -393,7 +385,10 @@ FASTEST: Final = ResultKind(
     file="fastest.json",
     made_of=ShortestCycles,
     record=fastest_record,
-    tables=fastest_tables,
+    tables=lambda record: {
+        "curve": lambda: columns_of(map(flat, record["curve"]), ["law"]),
+        "cycles": lambda: columns_of(by_name(record["cycles"], "name")),
+    },
     shown={"cycles": ("name", "status", "cycle_s", "share_of_written", "smallest_clearance_mm")},
     pictures=lambda record: {key: it for key, it in curve_figures(record).items() if key == "max_velocity_ratio"},
 )

@@ -85,7 +85,8 @@ class _Search:
             if self.given is None and isinstance(self.workers, Workers):
                 self.given = self.workers.begin(given_layout, self.request.anywhere)
             best = self._best(finished)
-            if best is not None or self.request.objective is not Objective.CONFORMING or not self._goes_on(finished):
+            goes_on = finished.stopped_by == "enough" and bool(self.candidates(finished))
+            if best is not None or self.request.objective is not Objective.CONFORMING or not goes_on:
                 return finished, best
 
     def _study(self) -> Study:
@@ -111,10 +112,6 @@ class _Search:
         sign = -1.0 if best.is_largest else 1.0
         listed = [trial for trial in finished.trials if is_candidate(trial)]
         return sorted(listed, key=lambda trial: (sign * _value(trial, best.figure, sign), trial.number))
-
-    def _goes_on(self, finished: Finished) -> bool:
-        """Whether there is anything more to try."""
-        return bool(self.candidates(finished)) and finished.stopped_by == "enough"
 
 
 def search_layout(

@@ -33,7 +33,7 @@ from cellplan.report.plots.palette import CLASSES, INK, LIMIT, ROBOTS
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.record.common import CheckRecord, Provenance, Record, as_json
 from cellplan.report.record.numbers import seconds, small
-from cellplan.report.record.rows import Tables, by_name, columns_of, listed_table
+from cellplan.report.record.rows import by_name, columns_of, listed_table
 from cellplan.runs.write_run import versions
 
 TITLES: Final = {"before": "as solved", "after": "corrected from pass to pass", "in_pass": "corrected within the pass"}
@@ -204,15 +204,7 @@ def rehearsal_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes]) ->
     return cell_page("jobs/rehearsal/rehearsal.html", record, cell, parts)
 
 
-# Tables and files
-
-
-def rehearsal_tables(record: Record) -> Tables:
-    """The tables of frames and notebooks: true errors of each task, and the checks of them."""
-    return {
-        "tasks": lambda: columns_of(by_name(record["tasks"], "task")),
-        "checks": listed_table(record, "checks", CheckRecord),
-    }
+# Files
 
 
 def write_rehearsal(
@@ -270,6 +262,9 @@ REHEARSAL: Final = ResultKind(
     file="rehearsal.json",
     made_of=Rehearsal,
     record=lambda rehearsal: rehearsal_record(rehearsal, provenance=Provenance(versions={}, digests={})),
-    tables=rehearsal_tables,
+    tables=lambda record: {
+        "tasks": lambda: columns_of(by_name(record["tasks"], "task")),
+        "checks": listed_table(record, "checks", CheckRecord),
+    },
     shown={"tasks": ("task", "robot", "before.max_position_error_mm", "after.max_position_error_mm")},
 )

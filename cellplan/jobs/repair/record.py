@@ -50,7 +50,8 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
             effects.append(_effect(check, old, new, unit, text))
             continue
         now = after.get((check["name"], subject))
-        name, unit, old = _short_name(check["name"]), check["unit"], check["value"]
+        name = check["name"].removeprefix("joint_").removesuffix("_assumed").replace("_", " ")
+        unit, old = check["unit"], check["value"]
         if name == "collision":
             effects.append(_effect(check, old, 0.0, unit, f"{subject}: no contact"))
         elif now is not None and check["name"] in PASSED_BY_TIME:
@@ -331,11 +332,6 @@ def _arrows(parts: Mapping[str, tuple[Any, Any]]) -> str:
         unit = next((unit for unit in ("mm", "deg") if component.endswith(f"_{unit}")), "")
         texts.append(f"{component.removesuffix(f'_{unit}')} {float(old or 0.0):.4g} -> {float(new):.4g} {unit}")
     return ", ".join(texts)
-
-
-def _short_name(check: str) -> str:
-    """The name of a check in words."""
-    return check.removeprefix("joint_").removesuffix("_assumed").replace("_", " ")
 
 
 def _effect(check: Mapping[str, Any], old: float, new: float, unit: str, text: str) -> EffectRecord:

@@ -8,15 +8,7 @@ import numpy as np
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.check import check
-from cellplan.jobs.view.describe import (
-    base_records,
-    body_records,
-    excluded_records,
-    place_record,
-    robot_records,
-    task_records,
-    visual_records,
-)
+from cellplan.jobs.view.describe import base_records, cell_record, excluded_records
 from cellplan.jobs.view.geometries import Geometries
 from cellplan.jobs.view.nearest import ViewedStretch, nearest_record, sampled_rows, touching_pairs
 from cellplan.jobs.view.run_scene import motion_record
@@ -101,25 +93,11 @@ def standing_scene(scene: Scene, geometries: Geometries) -> Record:
 
 def _scene(scene: Scene, times: Array, q: Array, geometries: Geometries) -> Record:
     """Robots, bodies and paths of a cell at times of shape (K,), in configurations of shape (K, nq)."""
-    cell = scene.cell
-    tasks, faults = task_records(cell)
     return {
-        "name": cell.name,
-        "facts": [],
-        "remarks": faults,
-        "passed": None,
-        "robots": robot_records(cell),
-        "bodies": body_records(cell, scene.bodies, geometries),
-        "visuals": visual_records(cell, geometries),
-        "part": [place_record(cell, 0.0)],
-        "tasks": tasks,
+        **cell_record(scene.cell, scene.bodies, geometries),
         "motion": motion_record(times, q, []),
         "nearest": nearest_record([ViewedStretch(scene, 0, 1)], times[:1], q[:1], np.zeros(1, dtype=np.intp)),
-        "certified": {"times": [], "distances": []},
-        "contacts": [],
-        "failures": [],
         "excluded": excluded_records(scene),
-        "bases": [],
     }
 
 

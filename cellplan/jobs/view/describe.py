@@ -24,6 +24,29 @@ PATH_POINTS: Final = 240  # [-] drawn along a path
 FILE_DECIMALS: Final = 6  # of [mm] and [deg] in a cell file
 
 
+def cell_record(cell: Cell, bodies: Sequence[SceneBody], geometries: Geometries) -> Record:
+    """The scene of a cell as far as it is the same whatever moves: what is drawn, and nothing that was found."""
+    tasks, faults = task_records(cell)
+    return {
+        "name": cell.name,
+        "facts": [],
+        "remarks": faults,
+        "passed": None,
+        "robots": robot_records(cell),
+        "bodies": body_records(cell, bodies, geometries),
+        "visuals": visual_records(cell, geometries),
+        "part": [place_record(cell, 0.0)],
+        "tasks": tasks,
+        "motion": {},
+        "nearest": {},
+        "certified": {"times": [], "distances": []},
+        "contacts": [],
+        "failures": [],
+        "excluded": [],
+        "bases": [],
+    }
+
+
 def robot_records(cell: Cell) -> list[Record]:
     """All robots in the order of the cell."""
     colours = robot_colours(cell)

@@ -11,14 +11,7 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.files.run.stored import SERIES, StoredRun
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.view.describe import (
-    body_records,
-    excluded_records,
-    place_record,
-    robot_records,
-    task_records,
-    visual_records,
-)
+from cellplan.jobs.view.describe import cell_record, excluded_records, place_record
 from cellplan.jobs.view.geometries import Geometries
 from cellplan.jobs.view.nearest import ViewedStretch, nearest_record, sampled_rows
 from cellplan.jobs.view.result import packed
@@ -64,24 +57,19 @@ def run_scene(stored: StoredRun, cell: Cell, geometries: Geometries) -> Record:
     further += [at for one in played for at in _worst_times(stored.records[one.place], one.begin)]
     ends = [*firsts[1:], len(times)]
     stretches = [ViewedStretch(scenes[one.number], *rows) for one, *rows in zip(played, firsts, ends, strict=True)]
-    tasks, faults = task_records(cell)
+    record = cell_record(cell, bodies, geometries)
     return {
-        "name": cell.name,
+        **record,
         "facts": _facts(stored.record),
-        "remarks": [*faults, *stored.record.get("not_in_program", [])],
+        "remarks": [*record["remarks"], *stored.record.get("not_in_program", [])],
         "passed": stored.record["status"] == "passed",
-        "robots": robot_records(cell),
-        "bodies": body_records(cell, bodies, geometries),
-        "visuals": visual_records(cell, geometries),
         "part": _part_places(played, program.cells),
-        "tasks": tasks,
         "motion": motion_record(times, q, _phases(stored.record)),
         "nearest": nearest_record(stretches, times, q, sampled_rows(times, further)),
         "certified": _certified(played),
         "contacts": contacts,
         "failures": failures,
         "excluded": excluded_records(min(scenes, key=lambda scene: len(scene.excluded))),  # of most of the program
-        "bases": [],
     }
 
 

@@ -30,11 +30,6 @@ class StartContact:
     of: int  # how many there were
     is_everywhere: bool = False  # whether they also touch wherever else the robot may be
 
-    @property
-    def is_in_all(self) -> bool:
-        """Whether no configuration that was tried avoids it."""
-        return self.count == self.of
-
 
 def contacts_of(
     trials: StartTrials, cell: Cell, robot: Robot, tried: Sequence[tuple[Array, Array | None]]

@@ -54,8 +54,14 @@ def examine_given_starts(cell: Cell, toolpaths: Mapping[str, Toolpath]) -> None:
     """
     findings: list[InputError] = [finding for robot in cell.robots for finding in _outside(cell, robot)]
     if not findings:
-        findings += [finding for grasp in cell.closures for finding in _off_grasp(cell, grasp)]
-        findings += [finding for task in cell.tasks for finding in _off_task(cell, task, toolpaths[task.name])]
+        relations: list[Relation] = [*cell.closures, *cell.tasks]
+        for relation in relations:
+            X_PT = relation.X_PT if isinstance(relation, Grasp) else toolpaths[relation.name].X_PT_start
+            off = _distance(cell, relation, X_PT)
+            may_settle = isinstance(relation, Task) and relation.settle > 0.0  # such a tool may start beside its path
+            if off is not None and not may_settle and is_off(cell, relation, off):
+                error = StartOffGraspError if isinstance(relation, Grasp) else StartOffTaskError
+                findings.append(error(off_words(cell, relation, off)))
     if len(findings) == 1:
         raise findings[0]
     if findings:
@@ -71,10 +77,8 @@ def part_pose(cell: Cell, holder_start: Array | None) -> Array | None:
     return ScrewChain(cell.robots[cell.carrier]).tool_poses(holder_start[None])[0] @ cell.part.X_CP
 
 
-def tool_distance(
-    chain: ScrewChain, relation: Relation, q: Array, X_PT_desired: Array, *, X_WR: Array
-) -> tuple[float, float]:
-    """How far a configuration, shape (n,), puts a tool from where it is desired, in [m] and [rad].
+def tool_error(chain: ScrewChain, relation: Relation, q: Array, X_PT_desired: Array, *, X_WR: Array) -> Array:
+    """By how much a configuration, shape (n,), puts a tool off where it is desired, in [m] and [rad], shape (6,).
 
     Args:
         X_PT_desired: Reference tool tip, shape (4, 4), in the frame that the relation refers to.
@@ -82,7 +86,12 @@ def tool_distance(
     """
     X_PT, desired = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT_desired[None]
     rows = constraint_rows(relation, desired)[0]
-    error = rows.T @ (rows @ pose_errors(desired, X_PT, [relation.is_spin_free])[0])
+    return np.asarray(rows.T @ (rows @ pose_errors(desired, X_PT, [relation.is_spin_free])[0]))
+
+
+def tool_distance(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR: Array) -> tuple[float, float]:
+    """The distance in [m] and the angle in [rad] of ``tool_error``."""
+    error = tool_error(chain, relation, q, X_PT, X_WR=X_WR)
     return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
 
 
@@ -133,25 +142,6 @@ def _outside_limits(robot: Robot, q: Array | None) -> Iterator[tuple[Joint, str]
             limits = f"{_shown(joint, joint.lower)} .. {_shown(joint, joint.upper)}"
             doubt = doubt_about_limits(robot)
             yield joint, f"{_shown(joint, position)}, outside its limits {limits}{f'; {doubt}' if doubt else ''}"
-
-
-def _off_task(cell: Cell, task: Task, toolpath: Toolpath) -> list[InputError]:
-    """A finding when a given start does not put the tool on the start of its task, within the task's tolerance.
-
-    A task that gives its tool time to settle may start beside its path.
-    """
-    off = _distance(cell, task, toolpath.X_PT_start)
-    if off is None or task.settle > 0.0 or not is_off(cell, task, off):
-        return []
-    return [StartOffTaskError(off_words(cell, task, off))]
-
-
-def _off_grasp(cell: Cell, grasp: Grasp) -> list[InputError]:
-    """A finding when a given start does not put a further holder's tool on its grasp, within the allowed closure."""
-    off = _distance(cell, grasp, grasp.X_PT)
-    if off is None or not is_off(cell, grasp, off):
-        return []
-    return [StartOffGraspError(off_words(cell, grasp, off))]
 
 
 def _distance(cell: Cell, task: Relation, X_PT_desired: Array) -> tuple[float, float] | None:

@@ -55,7 +55,8 @@ def _unavoidable(search: StartSearch) -> list[StartContact]:
         tried = search.failures.arrived.get(robot.name, [])
         if robot.start is not None or not tried:
             continue
-        in_all = [contact for contact in contacts_of(search.trials, search.cell, robot, tried) if contact.is_in_all]
+        contacts_seen = contacts_of(search.trials, search.cell, robot, tried)
+        in_all = [contact for contact in contacts_seen if contact.count == contact.of]
         ranked = sorted(
             (replace(contact, is_everywhere=_is_everywhere(search, contact)) for contact in in_all), key=_urgency
         )

@@ -11,15 +11,13 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import NoSolutionError
-from cellplan.geometry.transforms import Array, inverse, rotation_exp
+from cellplan.geometry.transforms import Array, rotation_exp
 from cellplan.model.cell.cell import Cell, Grasp, Relation, Robot
 from cellplan.model.motion.branches import MovedStart
 from cellplan.model.task.task import Frame, Task
 from cellplan.model.task.toolpath import Toolpath
-from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance
+from cellplan.planning.start.given import is_off, part_pose, start_place, tool_distance, tool_error
 from cellplan.planning.start.inverse_kinematics import reaching_configurations
-from cellplan.planning.tracking.cooperation_jacobian import pose_errors
-from cellplan.planning.tracking.task_constraints import constraint_rows
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SEED_TURN: Final = np.radians(10.0)  # [rad] that a joint of a given start is moved at most: farther, it is a mistake
@@ -37,9 +35,7 @@ def led_to(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR
         X_PT: Desired tool tip, shape (4, 4), in the frame that the relation refers to.
         X_WR: That frame in the world, shape (4, 4).
     """
-    actual, desired = inverse(X_WR) @ chain.tool_poses(q[None]), X_PT[None]
-    rows = constraint_rows(relation, desired)[0]
-    error = rows.T @ (rows @ pose_errors(desired, actual, [relation.is_spin_free])[0])
+    error = tool_error(chain, relation, q, X_PT, X_WR=X_WR)
     lengths = np.linalg.norm(error[:3]) / STEP_LENGTH, np.linalg.norm(error[3:]) / STEP_ANGLE
     count = max(1, int(np.ceil(max(lengths))))
     for left in np.arange(count - 1, -1, -1) / count:
@@ -55,12 +51,9 @@ def led_to(chain: ScrewChain, relation: Relation, q: Array, X_PT: Array, *, X_WR
 
 def seeded(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
     """The start that a given one of a robot is the seed of, shape (n,); None where it is too far off for that."""
-    start = robot.start
-    q = None if start is None else led_to(chain, relation, start, X_PT, X_WR=X_WR)
-    if q is None or not _is_inside(robot, q):
-        return None
+    q = None if robot.start is None else _same_branch(chain, relation, robot, X_PT, X_WR=X_WR)
     most = np.where([joint.is_revolute for joint in robot.model.joints], SEED_TURN, SEED_SLIDE)
-    return q if np.all(np.abs(q - np.asarray(start)) <= most) else None
+    return q if q is not None and np.all(np.abs(q - np.asarray(robot.start)) <= most) else None
 
 
 def with_seeds(
@@ -119,12 +112,7 @@ def _nearer_goal(
 def _same_branch(chain: ScrewChain, relation: Relation, robot: Robot, X_PT: Array, *, X_WR: Array) -> Array | None:
     """The start on the branch of an earlier one, shape (n,), however far; None where that leads beyond a limit."""
     q = led_to(chain, relation, np.asarray(robot.start), X_PT, X_WR=X_WR)
-    return q if q is not None and _is_inside(robot, q) else None
-
-
-def _is_inside(robot: Robot, q: Array) -> bool:
-    """Whether a configuration, shape (n,), keeps the joint limits."""
-    return bool(np.all((q >= robot.model.lower) & (q <= robot.model.upper)))
+    return q if q is not None and np.all((q >= robot.model.lower) & (q <= robot.model.upper)) else None
 
 
 def _moved(relation: Relation, robot: Robot, q: Array, off: tuple[float, float], *, run: str) -> MovedStart:

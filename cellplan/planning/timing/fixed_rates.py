@@ -72,11 +72,6 @@ class AtFixedRate:
     step: float  # time between two rows in [s]
 
     @property
-    def fixed_seconds(self) -> float:
-        """Time in [s] that all spans take together."""
-        return float(np.diff(self.spans, axis=1).sum()) / self.rate
-
-    @property
     def is_fixed(self) -> bool:
         """See ``TimedRows``: whether all of the stretch is demanded."""
         return bool((self._freedom(self._grid()) == 0.0).all())
@@ -125,7 +120,7 @@ class AtFixedRate:
 
 def least_steps(motion: AtFixedRate, is_allowed: Callable[[Array], bool]) -> int | None:
     """Fewest steps in which all limits hold, by nominal times in [s]; None when slower rates beside it do not help."""
-    low = whole_steps(motion.fixed_seconds, motion.step)
+    low = whole_steps(float(np.diff(motion.spans, axis=1).sum()) / motion.rate, motion.step)
     if motion.is_fixed:
         return low if is_allowed(motion.rows(low)) else None
     nominal = float(motion.piece.sigma[-1] - motion.piece.sigma[0]) / motion.rate

@@ -67,7 +67,9 @@ def variant_figures(record: Record, phases: Mapping[str, Record], *, proof: str)
             name: {key: whole.of(f"max_{key}")[name] for key in ("position_error_mm", "orientation_error_deg")}
             for name in record["tasks"]
         },
-        "failed": [_with_phase(check) for check in failed[:MAX_FAILED]],
+        "failed": [
+            ": ".join(check[key] for key in ("phase", "message") if key in check) for check in failed[:MAX_FAILED]
+        ],
         "not_in_program": list(record["not_in_program"]),
         "required_clearance_mm": record["required_clearance_mm"],
         "proof": proof,
@@ -159,8 +161,3 @@ def _joint(joint: Record) -> dict[str, Any]:
         "travel": joint["travel"],
         "unit": joint["unit"],
     }
-
-
-def _with_phase(check: Record) -> str:
-    """A failed check with the phase it is of, where there are several."""
-    return f"{check['phase']}: {check['message']}" if "phase" in check else str(check["message"])

@@ -47,10 +47,6 @@ def _column(area: KeepOut) -> SceneBody:
     X_WS = np.eye(4)
     X_WS[:2, 3] = area.X_WS[:2, 3]
     X_WS[:3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), np.arctan2(area.X_WS[1, 0], area.X_WS[0, 0]))
-    shape: Solid = Cylinder(area.shape.radius, TALL) if isinstance(area.shape, Cylinder) else _tall(area.shape)
+    base = area.shape
+    shape: Solid = Cylinder(base.radius, TALL) if isinstance(base, Cylinder) else Box((*base.size[:2], TALL))
     return SceneBody(name=f"keep_out.{area.name}", kind=Kind.OBSTACLE, shape=shape, robot=None, link=BASE, X_BS=X_WS)
-
-
-def _tall(box: Box) -> Box:
-    """A box as wide and as deep as another one."""
-    return Box((box.size[0], box.size[1], TALL))

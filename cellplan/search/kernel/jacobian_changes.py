@@ -8,13 +8,7 @@ from cellplan.search.kernel.screws import TaskScrews, bracket, bracket_matrix, c
 
 
 class JacobianChanges:
-    """The Jacobian ``J`` of all relations at N nodes, and how ``J qd`` and ``J^T lambda`` change.
-
-    Attributes:
-        jacobian: Twists per unit speed of the stacked joints, the constrained components of each relation in its frame
-            R, taken at the tip where a relation leaves components open, else at the origin of R; (N, 6 T, nq).
-        idle: 1 for components that a relation leaves open, whose rows are 0, shape (6 T,).
-    """
+    """The Jacobian ``J`` of all relations at N nodes, and how ``J qd`` and ``J^T lambda`` change."""
 
     def __init__(self, job: Job, screws: TaskScrews, local: Array, shared: Array, *, at_tips: bool = False) -> None:
         """Note the screws and how fast their axes move.
@@ -30,7 +24,7 @@ class JacobianChanges:
         self._is_carried = constraints.carrier_signs < 0.0
         self._axes, self._holder = flange_axes(job)
         self._is_whole = constraints.is_whole and not at_tips
-        self.idle = (1.0 - constraints.constrained).ravel()
+        self.idle = (1.0 - constraints.constrained).ravel()  # 1 for open components, whose rows are 0, shape (6 T,)
         if not self._is_whole:
             self._rows = constrained_rows(job, screws.tip)
         self._turning = screws.operators * local[..., None]
@@ -47,7 +41,10 @@ class JacobianChanges:
 
     @property
     def jacobian(self) -> Array:
-        """See the class."""
+        """Twists per unit speed of the stacked joints, the constrained components of each relation, (N, 6 T, nq).
+
+        Each in its frame R, taken at the tip where a relation leaves components open, else at the origin of R.
+        """
         return self._columns(self._screws.operators, self._minus, self._screws.based[:, :, :0])
 
     def twists(self) -> Array:

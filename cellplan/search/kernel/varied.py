@@ -8,40 +8,31 @@ from cellplan.search.kernel.screws import Directions
 
 
 class Varied(Protocol):
-    """Variables, n of them, in [m] or [rad] unless their names say otherwise.
-
-    Attributes:
-        names: Their addresses in the cell file.
-        lower: Their lower bounds, shape (n,).
-        upper: Their upper bounds, shape (n,).
-        scale: A usual step of each, shape (n,).
-        cost: Cost of a change by one unit of each, shape (n,).
-        given: Values from which a change is counted, shape (n,).
-    """
+    """Variables, n of them, in [m] or [rad] unless their names say otherwise."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """See the class."""
+        """Their addresses in the cell file."""
 
     @property
     def lower(self) -> Array:
-        """See the class."""
+        """Their lower bounds, shape (n,)."""
 
     @property
     def upper(self) -> Array:
-        """See the class."""
+        """Their upper bounds, shape (n,)."""
 
     @property
     def scale(self) -> Array:
-        """See the class."""
+        """A usual step of each, shape (n,)."""
 
     @property
     def cost(self) -> Array:
-        """See the class."""
+        """Cost of a change by one unit of each, shape (n,)."""
 
     @property
     def given(self) -> Array:
-        """See the class."""
+        """Values from which a change is counted, shape (n,)."""
 
 
 class KernelVariables(Varied, Protocol):

@@ -43,49 +43,42 @@ class Distances:
 
 
 class ArmValues(Protocol):
-    """Least singular values of A arms along a motion.
-
-    Attributes:
-        values: The values at the nodes in mixed units of [m] and [rad], shape (N, A).
-    """
+    """Least singular values of A arms along a motion."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """See the class."""
+        """Names of the robots."""
 
     @property
     def values(self) -> Array:
-        """See the class."""
+        """The values at the nodes in mixed units of [m] and [rad], shape (N, A)."""
 
     def derivatives(self, nodes: Indices, subjects: Indices, by: Array) -> Array:
         """Derivatives of some of them by the variables, from those of the joints, shape (N, nq, n), to (M, n)."""
 
 
 class Problem(Varied, Protocol):
-    """What sequential programs improve.
-
-    Attributes:
-        times: Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump.
-        acceleration: Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,).
-        is_dense: Whether the nodes alone count. Elsewhere an extreme between two of them is that of the parabola
-            through three: good with few nodes, but it jumps where the highest of them becomes another one.
-    """
+    """What sequential programs improve."""
 
     @property
     def times(self) -> Array:
-        """See the class."""
+        """Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump."""
 
     @property
     def limits(self) -> JointLimits:
-        """See the class."""
+        """Limits of the joints."""
 
     @property
     def acceleration(self) -> Array:
-        """See the class."""
+        """Largest accelerations that the joints are judged by in [rad/s^2] or [m/s^2], inf for none, (nq,)."""
 
     @property
     def is_dense(self) -> bool:
-        """See the class."""
+        """Whether the nodes alone count.
+
+        Elsewhere an extreme between two of them is that of the parabola through three: good with few nodes, but it
+        jumps where the highest of them becomes another one.
+        """
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """The motion at some values; None where a tool does not come to the start of its path, or loses it.

@@ -18,7 +18,6 @@ from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.start.search import choose_start
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.scene.bodies import Kind, is_ground
-from cellplan.scene.mounting import MountedPair
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances
@@ -54,7 +53,8 @@ class Contacts:
         known, anyone = {*members, *against, None}, {body.name: body.robot for body in scene.bodies}
         self._pairs, watched = layout_pairs(scene)
         is_design = [pair.rule is Rule.CONTACT for pair in scene.pairs] + [
-            _is_column(scene, pair) for pair in scene.mounted
+            scene.bodies[pair.first].kind is Kind.PEDESTAL and is_ground(scene.bodies[pair.second])
+            for pair in scene.mounted  # the height of a column follows from the ground that it stands on
         ]
         owners = [{anyone[name] for name in pair.names} for pair in self._pairs]
         is_watched = [
@@ -238,8 +238,3 @@ def _contacts(cell: Cell, scene: Scene) -> dict[str, Any]:
         "all_contacts": Contacts(scene, [robot.name for robot in cell.robots]),
         "contacts": tuple(Contacts(scene, [robot.name], holder) for robot in cell.robots),
     }
-
-
-def _is_column(scene: Scene, pair: MountedPair) -> bool:
-    """Whether a pair is a column and the ground that it stands on: its height follows from that."""
-    return scene.bodies[pair.first].kind is Kind.PEDESTAL and is_ground(scene.bodies[pair.second])

@@ -162,7 +162,8 @@ def coupling_graph(cell: Cell, plane: PlaneName | None = None, *, measure_grasps
             desired = tuple(component for component in desired if component not in relation.axes)
         if desired:
             tool = tool_link(cell, cell.robot(relation.robot), plane, measure_grasps=measure_grasps)
-            joints += _virtual_chain(relation, desired, tail=_reference_link(cell, relation), head=tool)
+            tail = part_link(cell) if relation.relative_to is Frame.PART else WORLD
+            joints += _virtual_chain(relation, desired, tail=tail, head=tool)
     links = dict.fromkeys([WORLD, part_link(cell)] + [end for joint in joints for end in (joint.tail, joint.head)])
     return CouplingGraph(links=tuple(links), joints=tuple(joints))
 
@@ -182,11 +183,6 @@ def tool_link(cell: Cell, robot: Robot, plane: PlaneName | None = None, *, measu
         return PART
     rigid = [grasp.robot for grasp in cell.closures if set(components(plane)) <= set(grasp.axes)]
     return part_link(cell) if robot.name in rigid and not measure_grasps else f"{robot.name}/tool"
-
-
-def _reference_link(cell: Cell, relation: Relation) -> str:
-    """The link that a tool's motion is relative to."""
-    return part_link(cell) if relation.relative_to is Frame.PART else WORLD
 
 
 def _robot_joints(robot: Robot, tool: str) -> list[Coupling]:
