@@ -104,8 +104,10 @@ rules: $(STAMP)
 test: style
 	@$(MAKE) --no-print-directory -j2 rules quick-tests
 
-# Without their rewriting, assertions are loaded in half the time; what fails is shown with it.
+# Without their rewriting, assertions are loaded in half the time; what fails is shown with it. All processes that tests
+# start load the package as it is compiled here, also where PYTHONDONTWRITEBYTECODE keeps them from doing so themselves.
 quick-tests: $(STAMP)
+	@$(BIN)/python -m compileall -q cellplan tests benchmarks
 	$(BIN)/python -m pytest -q -n $(WORKERS) --dist loadscope -m "not slow" --assert=plain || { \
 	    echo "once more, with the values in the assertions that failed"; \
 	    $(BIN)/python -m pytest -q -m "not slow" --last-failed --last-failed-no-failures none; exit 1; }

@@ -10,6 +10,7 @@ from typing import Annotated, Final, NoReturn
 
 import typer
 from typer.completion import get_completion_inspect_parameters
+from typer.main import get_command
 
 import cellplan
 from cellplan.cli.begin.check import check
@@ -104,13 +105,14 @@ def program(
 for group, commands in COMMANDS.items():
     for name, command in commands.items():
         app.command(name, cls=Command, rich_help_panel=group, epilog=examples(name))(as_command(command))
+COMMAND_LINE: Final = get_command(app)
 get_completion_inspect_parameters()  # prepares the shells
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and give its exit status; no exception leaves, no traceback is shown."""
     try:
-        outcome = app(args=arguments, prog_name="cellplan", standalone_mode=False)
+        outcome = COMMAND_LINE(args=arguments, prog_name="cellplan", standalone_mode=False)
     except SystemExit as end:
         if end.code in (0, None):  # completion was shown or installed
             return ExitStatus.PASSED
