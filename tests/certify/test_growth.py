@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
-from builders.scene_builders import fixed_part, make_cell, placed, slide_model
+from builders.scene_builders import body, displaced, fixed_part, floor, joint, make_cell, placed, slide_model
 from builders.transfer_cells import gantry, scene_of
 
 from cellplan.certify.growth import certify_growth, rows_too_near, sampled_growth, scene_at_stop, signed_distances
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Box, Sphere
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.transforms import Array, pose
+from cellplan.model.robot.robot import RobotModel
+from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.scene import Scene
 
 RADII = 0.2  # [m] of both discs together
@@ -82,6 +84,33 @@ def test_the_pairs_that_are_too_near_are_those_below_the_demand(scene: Scene) ->
         False,
         False,
     ]
+
+
+@pytest.mark.parametrize("place", [np.eye(4), pose((0.7, -1.2, 0.4), (0.3, -0.8, 2.0))])
+@pytest.mark.parametrize("begin", [-0.02, 0.002])
+def test_a_ball_that_leaves_the_floor_along_its_normal_rises_as_its_joint_does(place: Array, begin: float) -> None:
+    """Up is proved, down is a fault, and along the floor is none, wherever the cell stands."""
+    joints = (joint("up", -1, slides=True), joint("along", 0, axis=(1.0, 0.0, 0.0), slides=True))
+    ball = body("ball", 1, shape=Sphere(RADII), at=(0.0, 0.0, RADII))
+    lift = RobotModel(name="lift", source="test", joints=joints, flange_link=1, X_BF=np.eye(4), bodies=(ball,))
+    cell = make_cell(placed("lift", lift), things=(floor(),), checks=ChecksEntry(clearance_mm=1e3 * DEMAND))
+    scene = scene_at_stop(Scene.from_cell(displaced(cell, place)))
+    rise = begin + 0.03 * np.linspace(0.0, 1.0, 12) ** 2
+    up, along = (np.stack([rise, 0.0 * rise], axis=1), np.stack([0.0 * rise + begin, rise], axis=1))
+
+    growth = certify_growth(scene, up)
+
+    (pair,) = growth.apart
+    np.testing.assert_allclose(
+        signed_distances(scene, scene.pairs[rows_too_near(scene, up[0])[0]], up), rise, atol=1e-9
+    )
+    assert growth.is_clear
+    assert (pair.begin, pair.end) == pytest.approx((rise[0], rise[-1]), abs=1e-9)
+    assert pair.row is not None
+    assert rise[pair.row] >= pair.demand > rise[pair.row - 2]
+    assert certify_growth(scene, along).is_proved
+    assert not certify_growth(scene, along).is_clear
+    assert not certify_growth(scene, up[:4][::-1]).is_proved
 
 
 def test_a_ball_inside_a_closed_mesh_is_as_deep_as_its_way_out() -> None:
