@@ -5,9 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from builders.scene_builders import make_cell
+from builders.transfer_cells import gantry
 
 from cellplan import Solution, load_cell, solve
-from cellplan.runs.plan.retiming import RowLimits, joint_bounds, joint_path, row_limits
+from cellplan.model.motion.joint_path import JointPath
+from cellplan.model.settings.checks import ChecksEntry
+from cellplan.runs.plan.retiming import RowLimits, joint_bounds, joint_path, row_limits, transfer_retimer
 from cellplan.scene.scene import Scene
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
@@ -18,6 +22,8 @@ FASTEST = {
     "tasks.circle.tolerance.between_rows_mm": 10,  # so that joints bind, not the errors between rows
     "tasks.circle.tolerance.between_rows_deg": 10,
 }
+SPANS = np.array([0.6, -0.3])  # [m] of both slides
+SLOW = 0.01  # [s] between rows
 
 
 @pytest.fixture(scope="module")
@@ -73,3 +79,66 @@ def test_a_joint_without_a_stated_acceleration_is_bound_by_what_the_cell_assumes
     np.testing.assert_array_equal(bounds.velocity, [j.velocity for robot in cell.robots for j in robot.model.joints])
     np.testing.assert_allclose(bounds.acceleration, bounds.velocity / np.tile([0.25, 0.2, 0.15], 2), rtol=1e-12)
     assert np.all(np.isinf(unlimited.acceleration))
+
+
+def slides(velocity: float, acceleration: float, **checks: float) -> Scene:
+    """Two slides with stated limits, and no limit of jerk."""
+    robot = gantry("a")
+    joints = tuple(replace(joint, velocity=velocity, acceleration=acceleration) for joint in robot.model.joints)
+    robot = replace(robot, model=replace(robot.model, joints=joints))
+    cell = make_cell(robot, checks=ChecksEntry(**checks))  # type: ignore[arg-type]
+    return Scene.from_cell(replace(cell, motion=replace(cell.motion, step=SLOW, build_up=None)))
+
+
+def bowed() -> JointPath:
+    """A path of both slides that is bent, from rest to rest over 2 s of nominal time."""
+    times = np.linspace(0.0, 2.0, 81)
+    u = 0.5 * (1.0 - np.cos(0.5 * np.pi * times))
+    return JointPath.through(times, np.stack([SPANS[0] * u, SPANS[1] * np.sin(0.5 * np.pi * u) ** 2], axis=1))
+
+
+def seconds(scene: Scene) -> float:
+    return SLOW * transfer_retimer(scene).fastest(bowed()).steps
+
+
+@pytest.mark.parametrize("factor", [0.5, 3.0])
+def test_the_duration_falls_with_the_velocities_and_with_the_root_of_the_accelerations(factor: float) -> None:
+    by_velocity = [seconds(slides(0.4 * k, 1e3)) for k in (1.0, factor)]
+    by_acceleration = [seconds(slides(1e3, 0.4 * k)) for k in (1.0, factor)]
+
+    for (plain, other), power in ((by_velocity, 1.0), (by_acceleration, 0.5)):
+        assert other == pytest.approx(plain / factor**power, abs=2.0 * SLOW, rel=2e-3)
+
+
+@pytest.mark.parametrize(("velocity", "acceleration"), [(0.3, 1.0), (1.0, 0.4)])
+def test_retimed_rows_lie_on_the_path_keep_all_limits_and_use_one_up_nearly_always(
+    velocity: float, acceleration: float
+) -> None:
+    scene, path = slides(velocity, acceleration), bowed()
+    sigma = transfer_retimer(scene).fastest(path).sigma
+
+    q = path.at(sigma)
+
+    u = q[:, 0] / SPANS[0]
+    np.testing.assert_allclose(q[:, 1], SPANS[1] * np.sin(0.5 * np.pi * u) ** 2, atol=2e-5)  # of the spline through it
+    assert np.all(np.diff(sigma) > 0.0)
+    speeds = np.abs(np.diff(q, axis=0)) / SLOW / velocity
+    rates = np.abs(np.diff(q, 2, axis=0)) / SLOW**2 / acceleration
+    assert max(speeds.max(), rates.max()) <= 1.0 + 1e-6
+    used = np.maximum(np.maximum(speeds[1:], speeds[:-1]), rates).max(axis=1)
+    assert np.quantile(used, 0.1) > 0.9
+    assert transfer_retimer(scene).slower(sigma, q) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("checks", "limit"), [({"tool_speed_mm_s": 100.0}, 0.1), ({}, np.inf)])
+def test_a_limit_of_tools_in_the_world_binds_their_rows(checks: dict[str, float], limit: float) -> None:
+    scene, path = slides(0.5, 2.0, **checks), bowed()
+    motion = transfer_retimer(scene).fastest(path)
+
+    tips = np.linalg.norm(np.diff(path.at(motion.sigma), axis=0), axis=1) / SLOW
+
+    assert tips.max() <= min(limit, 0.5 * np.sqrt(2.0)) + 1e-9
+    assert tips.max() == pytest.approx(min(limit, tips.max()), rel=0.02)
+    row = RowLimits(scene, (), joint_bounds(scene.cell), SLOW)
+    needed = [row.slower(sigma, path.at(sigma)) for sigma in (motion.sigma, motion.sigma[::2])]
+    assert needed[0] <= 1.0 < needed[1]
