@@ -21,6 +21,7 @@ def listed() -> dict[str, Any]:
     return json.loads(out.getvalue())
 
 
+@pytest.mark.slow  # the whole text is among those of all commands
 def test_every_bundled_robot_is_listed_with_reach_limits_and_source(capsys: pytest.CaptureFixture[str]) -> None:
     status = run(["robots"])
 

@@ -17,6 +17,8 @@ from cellplan.programs.dialects import DIALECTS
 from cellplan.programs.export.choice import Choice
 from cellplan.programs.promises.promises import choose_promise
 
+pytestmark = pytest.mark.usefixtures("stored_solutions")
+
 URSCRIPT, VAL3 = DIALECTS["urscript"], DIALECTS["val3"]
 
 

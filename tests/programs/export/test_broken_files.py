@@ -21,6 +21,8 @@ from cellplan.programs.export.program import EXPORTERS
 from cellplan.programs.export.stored import read_stored_export
 from cellplan.programs.export.verify_export import verify_export
 
+pytestmark = pytest.mark.usefixtures("stored_solutions")
+
 FORMATS = ("csv", "json", "ros2", "stream", "wide")  # those that the small cell can be exported in
 MAKERS = {"krl": ("kuka", "abb"), "rapid": ("kuka", "abb"), "val3": ("staubli", "ur"), "urscript": ("staubli", "ur")}
 QUICK = ("val3", "urscript")  # of one cell
