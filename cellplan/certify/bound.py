@@ -23,7 +23,6 @@ class PairBound:
     Attributes:
         low: No distance is below this in a block of the motion, in [m], shape (K,); zero where the bodies touch; inf
             where all of a tool lies inside its contact zone. Negative where nothing is proved.
-        at_surface: First and last sample at which a tool at work is at the surface of the part; None if it never is.
     """
 
     row: int  # index of the pair in ``Scene.pairs``
@@ -37,7 +36,7 @@ class PairBound:
     demand: float  # distance in [m] that is demanded; where only contact is forbidden, more than rounding
     needed: float  # distance in [m] that had to be proved: less than the demand once a smaller distance was measured
     cuts: int  # number of steps that were searched in finer steps
-    at_surface: tuple[int, int] | None = None
+    at_surface: tuple[int, int] | None = None  # first and last sample of a tool at work at the part; None if never
 
     @classmethod
     def of(

@@ -47,31 +47,23 @@ BLOCKS: Final = 6  # of the motion in which a pair comes apart, each certified w
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComingApart:
-    """A pair that begins nearer than is demanded.
-
-    Attributes:
-        slack: How far in [m] the distance may fall below the largest one before it: what the measurement leaves open.
-    """
+    """A pair that begins nearer than is demanded."""
 
     names: tuple[str, str]  # its bodies
     begin: float  # signed distance at the beginning in [m]: negative by the depth where the bodies overlap
     end: float  # likewise at the end
     demand: float  # distance in [m] that is demanded of it
     row: int | None  # the first row from which on the demand is kept; None where it never is
-    slack: float
+    slack: float  # by how much in [m] the distance may fall, as the measurement leaves it open
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Growth:
-    """What is proved of a motion away from a stopped state.
-
-    Attributes:
-        faults: What is not as it must be, in one line each: names of the bodies, and what is wrong.
-    """
+    """What is proved of a motion away from a stopped state."""
 
     bound: Bound  # what is proved of the pairs that begin with the distance demanded of them
     apart: tuple[ComingApart, ...]  # the pairs that do not
-    faults: tuple[tuple[tuple[str, str], str], ...]
+    faults: tuple[tuple[tuple[str, str], str], ...]  # names of the bodies, and what is wrong, in one line
 
     @classmethod
     def of(cls, bound: Bound, separations: "Sequence[_Separation]") -> "Growth":

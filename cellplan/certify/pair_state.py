@@ -16,24 +16,17 @@ MAX_READINGS: Final = 5000  # of one pair, whole or in pieces, for its smallest 
 
 @dataclass(slots=True, kw_only=True)
 class PairState:
-    """State of one search; times are counted in samples, with fractions between them.
+    """State of one search; times are counted in samples, with fractions between them."""
 
-    Attributes:
-        distance: Smallest distance measured in [m], never above the truth and within 0.05 mm of it; inf where none was.
-        unproved: Times at which steps begin of which the necessary distance could not be proved.
-        is_verdict_only: Whether nothing is asked but whether the demand is kept: the first reading below it is enough.
-        is_verdict_open: Whether the search is still after the necessary distance, not yet after the smallest one.
-    """
-
-    distance: float = np.inf
+    distance: float = np.inf  # smallest measured in [m], never above the truth and within 0.05 mm of it; inf for none
     at: float = 0.0  # its time
     touches: list[float] = field(default_factory=list)  # times at which the bodies touch
-    unproved: list[float] = field(default_factory=list)
+    unproved: list[float] = field(default_factory=list)  # times of steps with too little proof
     demand: float = APART_TOL  # distance in [m] that is to be proved before the smallest one is searched for
     cuts: int = 0  # number of steps that have been cut
     max_cuts: int = MAX_CUTS  # number that may be cut for the necessary distance
-    is_verdict_only: bool = False
-    is_verdict_open: bool = True
+    is_verdict_only: bool = False  # whether only the demand counts: the first reading below it is enough
+    is_verdict_open: bool = True  # whether the demand is searched, not yet the smallest distance
     spare_cuts: int = 0  # number of the cuts that were made for the smallest distance
     spare_readings: int = 0  # number of readings likewise
 

@@ -5,17 +5,15 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.files.schema.mounting import AttachmentEntry
 from cellplan.files.schema.robot_table import LinkBodyEntry, SegmentEntry
 from cellplan.files.schema.shapes import (
     BoxEntry,
-    CapsuleEntry,
     CylinderEntry,
     ObstacleEntry,
     PartShapeEntry,
+    RoundEnds,
+    SolidEntry,
     SphereEntry,
-    ToolBodyEntry,
-    ToolCapsuleEntry,
     ToolRoundEntry,
     ToolShapeEntry,
 )
@@ -43,9 +41,7 @@ def direction(written: str | tuple[float, float, float]) -> Array:
     return unit
 
 
-def centred_solid(
-    entry: PartShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry, read_mesh: MeshReader
-) -> tuple[Solid, Array]:
+def centred_solid(entry: PartShapeEntry | SolidEntry, read_mesh: MeshReader) -> tuple[Solid, Array]:
     """Solid of a shape that is centred on its frame, and the pose of the solid's own frame in it."""
     if entry.mesh is not None:
         return read_mesh(entry.mesh, entry.unit), np.eye(4)
@@ -87,12 +83,12 @@ def link_solid(entry: LinkBodyEntry, read_mesh: MeshReader) -> tuple[Solid, Arra
     return _along_segment(segment, is_capsule=entry.capsule is not None)
 
 
-def _primitive(entry: BoxEntry | CylinderEntry | CapsuleEntry | ToolRoundEntry | SphereEntry | None) -> Solid:
+def _primitive(entry: BoxEntry | CylinderEntry | ToolRoundEntry | RoundEnds | SphereEntry | None) -> Solid:
     """Solid in its own frame; capsules are measured from end to end in files and between centres here."""
     match entry:
         case BoxEntry():
             return _box(entry.size_mm)
-        case CapsuleEntry() | ToolCapsuleEntry():
+        case RoundEnds():
             length = Mm(entry.length_mm - 2.0 * entry.radius_mm).si
             return Capsule(entry.radius_mm.si, length) if length > 0.0 else Sphere(entry.radius_mm.si)
         case CylinderEntry() | ToolRoundEntry():

@@ -32,14 +32,10 @@ LINES_AT_ONCE: Final = 200_000  # lines followed at once: memory
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Columns:
-    """Columns of a tool along its z axis, in the tool frame.
-
-    Attributes:
-        guards: For each line those beside it that must be about as deep for its depth to count, shape (L, G).
-    """
+    """Columns of a tool along its z axis, in the tool frame."""
 
     points: Array  # places of the lines across the axis in [m], shape (L, 2)
-    guards: NDArray[np.intp]
+    guards: NDArray[np.intp]  # lines beside each that must be about as deep for its depth to count, shape (L, G)
     line: NDArray[np.intp]  # the line of each column, shape (C,)
     back: Array  # where the column begins along z in [m], shape (C,)
     front: Array  # where it ends, shape (C,)

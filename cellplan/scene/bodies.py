@@ -1,7 +1,7 @@
 """Everything solid in a cell: links, tools, the part and the surroundings, each with what moves it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -11,7 +11,8 @@ from cellplan.geometry.shapes import HalfSpace, Shape
 from cellplan.geometry.transforms import Array, inverse
 from cellplan.model.cell.cell import Cell, Grasp, Part, Robot
 from cellplan.model.cell.name_order import NameOrder
-from cellplan.model.robot.robot import BASE
+from cellplan.model.cell.rod import tool_body_name
+from cellplan.model.robot.robot import BASE, Body
 from cellplan.scene.collision.bodies import BodyPoses, require_rigid
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -34,7 +35,6 @@ class SceneBody:
     Attributes:
         name: ``<robot>/<body>``, ``<robot>/tool``, ``<robot>/pedestal``, ``<robot>/mount`` or ``<robot>/<attachment>``,
             ``part`` or the name of a thing in the surroundings.
-        X_BS: Its pose at the reference configuration in the robot's base frame; in the world when no robot moves it.
         accuracy: How far the real thing may stick out of it in [m]; None when it is not stated. What the user draws
             (tools, part, attachments, pedestals, surroundings) is taken as exact.
     """
@@ -44,7 +44,7 @@ class SceneBody:
     shape: Shape  # the solid, in its own frame S
     robot: str | None  # the robot that moves it; None when it is fixed in the world
     link: int  # the link of that robot it is fixed to
-    X_BS: Array
+    X_BS: Array  # its pose at the reference configuration in the robot's base frame, or in the world
     accuracy: float | None = 0.0
 
     @property
@@ -122,53 +122,31 @@ def is_ground(body: SceneBody) -> bool:
 
 
 def _robot_bodies(robot: Robot) -> list[SceneBody]:
-    """Links and tools of one robot."""
-    model = robot.model
-    bodies = [
-        SceneBody(
-            name=f"{robot.name}/{body.name}",
-            kind=Kind.LINK,
-            shape=body.shape,
-            robot=robot.name,
-            link=body.link,
-            X_BS=body.X_BS,
-            accuracy=model.accuracy_of(body),
-        )
-        for body in model.bodies
-    ]
+    """Links and tools of one robot, what is mounted on its links, and what it stands on."""
+    model, flange = robot.model, robot.model.flange_link
+    bodies = [_carried(robot, Kind.LINK, body, accuracy=model.accuracy_of(body)) for body in model.bodies]
     for number, body in enumerate(robot.tool.bodies, start=1):
-        bodies.append(
-            SceneBody(
-                name=f"{robot.name}/tool" if number == 1 else f"{robot.name}/tool_{number}",
-                kind=Kind.TOOL,
-                shape=body.shape,
-                robot=robot.name,
-                link=model.flange_link,
-                X_BS=model.X_BF @ body.X_BS,
-            )
-        )
-    return bodies + _mounted_bodies(robot)
-
-
-def _mounted_bodies(robot: Robot) -> list[SceneBody]:
-    """What is mounted on the links of a robot, and what it stands on."""
-    bodies = [
-        SceneBody(
-            name=f"{robot.name}/{body.name}",
-            kind=Kind.ATTACHMENT,
-            shape=body.shape,
-            robot=robot.name,
-            link=body.link,
-            X_BS=body.X_BS,
-        )
-        for body in robot.attachments
-    ]
+        mounted = replace(body, name=tool_body_name(number), link=flange, X_BS=model.X_BF @ body.X_BS)
+        bodies.append(_carried(robot, Kind.TOOL, mounted))
+    bodies += [_carried(robot, Kind.ATTACHMENT, body) for body in robot.attachments]
     below = None if robot.pedestal is None else robot.pedestal.solid(robot.X_WB)
     if robot.pedestal is not None and below is not None:
-        shape, X_BS = below
-        name = f"{robot.name}/{robot.pedestal.name}"
-        bodies.append(SceneBody(name=name, kind=Kind.PEDESTAL, shape=shape, robot=robot.name, link=BASE, X_BS=X_BS))
+        foot = Body(name=robot.pedestal.name, link=BASE, shape=below[0], X_BS=below[1])
+        bodies.append(_carried(robot, Kind.PEDESTAL, foot))
     return bodies
+
+
+def _carried(robot: Robot, kind: Kind, body: Body, *, accuracy: float | None = 0.0) -> SceneBody:
+    """A body on a link of a robot."""
+    return SceneBody(
+        name=f"{robot.name}/{body.name}",
+        kind=kind,
+        shape=body.shape,
+        robot=robot.name,
+        link=body.link,
+        X_BS=body.X_BS,
+        accuracy=accuracy,
+    )
 
 
 def part_body(cell: Cell, part: Part, grasp: Grasp | None = None) -> SceneBody:

@@ -24,16 +24,12 @@ from cellplan.scene.permanent_contacts import apply_design
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CollisionPairs:
-    """The pairs of a cell.
-
-    Attributes:
-        outside: Surfaces of tools and holders outside their contact zones; the engine has them after its solids.
-    """
+    """The pairs of a cell."""
 
     watched: tuple[ScenePair, ...]  # pairs that are watched
     excluded: tuple[Excluded, ...]  # pairs that are not, in the order of their bodies
     mounted: tuple[MountedPair, ...]  # pairs that may touch and of which the depth is judged
-    outside: tuple[CollisionBody, ...]
+    outside: tuple[CollisionBody, ...]  # surfaces of tools and holders outside their zones, after the solids
     cut_from: tuple[int, ...]  # the body that each of these is cut from, by its index
 
     @classmethod
@@ -59,17 +55,12 @@ class CollisionPairs:
 
 
 class _ContactZones:
-    """Pairs of a tool at work, or of a further holder, and the part: contact is allowed inside a zone only.
-
-    Attributes:
-        outside: What lies outside the zones.
-        cut_from: The body that each of these is cut from.
-    """
+    """Pairs of a tool at work, or of a further holder, and the part: contact is allowed inside a zone only."""
 
     def __init__(self, cell: Cell, bodies: Sequence[SceneBody], *, first_index: int) -> None:
         """Start without any cut; the first cut body will have ``first_index`` in the engine."""
-        self.outside: list[CollisionBody] = []
-        self.cut_from: list[int] = []
+        self.outside: list[CollisionBody] = []  # what lies outside the zones
+        self.cut_from: list[int] = []  # the body that each of these is cut from
         self._cell, self._bodies, self._first_index = cell, bodies, first_index
         self._at_work = {task.robot for task in cell.tasks if task.relative_to is Frame.PART}
 

@@ -53,16 +53,11 @@ class ScenePair:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StraightMotion:
-    """A straight move of a tool to a place or away from it, in which some pairs are watched on a part of the way only.
-
-    Attributes:
-        p_WT: The place of the tool tip in the world in [m], shape (3,).
-        pairs: Each pair with the two distances of the tool from the place, in [m], between which it is watched.
-    """
+    """A straight move of a tool to a place or away from it, in which some pairs are watched for a part of the way."""
 
     robot: str  # whose tool it is
-    p_WT: Array
-    pairs: tuple[tuple[ScenePair, float, float], ...]
+    p_WT: Array  # the place of the tool tip in the world in [m], shape (3,)
+    pairs: tuple[tuple[ScenePair, float, float], ...]  # each with the two distances of the tool in [m] in between
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,11 +38,7 @@ FIXED_REASON: Final = "all of them are fixed: not checked against each other"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A cell made computable; safe to send to another process.
-
-    Attributes:
-        engine: The solid bodies in the order of ``bodies``, then the surfaces of tools outside their contact zones.
-    """
+    """A cell made computable; safe to send to another process."""
 
     cell: Cell
     chains: Mapping[str, ScrewChain]  # kinematic chain of each robot, by name
@@ -50,7 +46,7 @@ class Scene:
     pairs: tuple[ScenePair, ...]  # pairs that are watched
     excluded: tuple[Excluded, ...]  # pairs that are not watched
     mounted: tuple[MountedPair, ...]  # pairs that may touch and of which the depth is judged
-    engine: Engine
+    engine: Engine  # the solids in the order of ``bodies``, then the surfaces of tools outside their zones
     cut_from: tuple[int, ...]  # the tool body that each of these last ones is cut from
     straight: StraightMotion | None = None  # pairs that are watched on a part of a straight move only, not in ``pairs``
     solid_rows: Indices = field(init=False)  # indices of the pairs that the engine watches, shape (S,), ascending

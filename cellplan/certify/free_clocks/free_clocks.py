@@ -55,16 +55,14 @@ class RegionBound:
             nearest; None when none is known.
         distance: Smallest distance measured in [m], that of these two, never above the truth; zero where they touch;
             inf where none was measured.
-        proved: Distance in [m] that all pairs with the rule ``clearance`` are proved to keep; inf without such pairs.
-        at: Row of the first robot and of the second where the two were found; None where nothing was.
     """
 
     first: str  # the one robot
     second: str  # the other one
     bodies: tuple[str, str] | None
     distance: float
-    proved: float
-    at: tuple[float, float] | None
+    proved: float  # distance in [m] that all pairs with the rule ``clearance`` keep for certain; inf without such pairs
+    at: tuple[float, float] | None  # row of the first robot and of the second where they are; None for none
     is_met: bool  # whether every pair is proved to keep its demand, and not to touch where no more is demanded
     demand: float = 0.0  # distance in [m] that is demanded of the two bodies
 

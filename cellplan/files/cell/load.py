@@ -37,9 +37,8 @@ from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
 from cellplan.files.robots.rules import robot_findings, with_statements
 from cellplan.files.schema import CellDocument
-from cellplan.files.schema.mounting import AttachmentEntry
 from cellplan.files.schema.partial import ValidEntries, read_valid_entries
-from cellplan.files.schema.shapes import ObstacleEntry, ToolBodyEntry, ToolShapeEntry
+from cellplan.files.schema.shapes import SolidEntry, ToolShapeEntry
 from cellplan.files.yaml.reader import YamlDocument, read_yaml
 from cellplan.geometry.mesh.load import require_enclosing, require_solid
 from cellplan.geometry.shapes import Mesh
@@ -65,19 +64,14 @@ PARTS: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CellFile:
-    """The document of a cell, and the folders of the files that it names.
-
-    Attributes:
-        changes: These values by address, in the order in which they were set.
-        parts: What the cell was built from the document with, by attribute.
-    """
+    """The document of a cell, and the folders of the files that it names."""
 
     document: YamlDocument  # the file, with the values that were changed since
-    changes: Mapping[str, object] = field(default_factory=dict)
+    changes: Mapping[str, object] = field(default_factory=dict)  # by address, in the order in which they were set
     name: str  # name of the file, without folders
     folder: Path  # folder that the names of files start from
     allow_dirs: tuple[Path, ...]  # further folders that these files may lie in
-    parts: Mapping[str, object] = field(default_factory=dict)
+    parts: Mapping[str, object] = field(default_factory=dict)  # of the cell as built from it, by attribute
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -216,12 +210,10 @@ def _part_extent(valid: ValidEntries, document: YamlDocument) -> Iterator[Findin
         yield document.finding(("part", "geometry"), text)
 
 
-Meshed = ToolShapeEntry | ToolBodyEntry | ObstacleEntry | AttachmentEntry
-
-
 def _read_meshes(valid: ValidEntries, sources: Sources) -> None:
     """Read every mesh once, so that all findings come together."""
-    shapes: list[tuple[KeyPath, Meshed]] = [(("environment", name), it) for name, it in valid.environment.items()]
+    shapes: list[tuple[KeyPath, SolidEntry | ToolShapeEntry]] = []
+    shapes += [(("environment", name), it) for name, it in valid.environment.items()]
     for name, robot in valid.robots.items():
         place: KeyPath = ("robots", name, "tool")
         shapes += [((*place, "bodies", index), body) for index, body in enumerate(robot.tool.bodies)]

@@ -38,14 +38,7 @@ TABLE_SUFFIXES = frozenset({".yaml", ".yml"})
 
 
 class Sources:
-    """Reads what a cell names and gathers what is wrong with it.
-
-    Attributes:
-        inputs: SHA-256 of every file that was read, by the path as written.
-        findings: About the names in the cell file.
-        errors: About the files themselves.
-        remarks: Key of the cell file, and what was not read of the file that it names.
-    """
+    """Reads what a cell names and gathers what is wrong with it."""
 
     def __init__(self, document: YamlDocument, folders: AllowedFolders) -> None:
         """Keep the folders and the document that findings refer to."""
@@ -53,10 +46,10 @@ class Sources:
         self._folders = folders
         self._meshes: dict[tuple[str, str | None], Mesh | None] = {}
         self._urdfs: dict[Hashable, UrdfRobot] = {}
-        self.inputs: dict[str, str] = {}
-        self.findings: list[Finding] = []
-        self.errors: list[InputError] = []
-        self.remarks: list[tuple[str, str]] = []
+        self.inputs: dict[str, str] = {}  # SHA-256 of every file that was read, by the path as written
+        self.findings: list[Finding] = []  # about the names in the cell file
+        self.errors: list[InputError] = []  # about the files themselves
+        self.remarks: list[tuple[str, str]] = []  # key of the cell file, and what was not read of its file
 
     def mesh(
         self, written: str, unit: str | None, path: KeyPath, *, requirement: Callable[[Mesh], None] | None = None

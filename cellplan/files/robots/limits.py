@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from cellplan.files.input.findings import shown
 from cellplan.model.robot.robot import Joint
@@ -27,18 +27,21 @@ class StatedLimits:
 
 def limits_of(joint: Joint) -> StatedLimits:
     """The limits of a joint of a model."""
-    return StatedLimits(**{name: getattr(joint, name) for name in RATES})
+    return StatedLimits(**rates_of(joint))
+
+
+def rates_of(limited: object) -> dict[str, Any]:
+    """Limits of something that has them, by name, as they stand in a joint."""
+    return {name: getattr(limited, name) for name in RATES}
 
 
 def tightest(limits: StatedLimits, cell: StatedLimits) -> StatedLimits:
     """The tighter of both limits of each kind, or the only one that is stated."""
-    return StatedLimits(
-        lower=max(_stated(limits.lower, cell.lower), default=None),
-        upper=min(_stated(limits.upper, cell.upper), default=None),
-        velocity=min(_stated(limits.velocity, cell.velocity), default=None),
-        acceleration=min(_stated(limits.acceleration, cell.acceleration), default=None),
-        jerk=min(_stated(limits.jerk, cell.jerk), default=None),
-    )
+    tighter: dict[str, Any] = {}
+    for name in RATES:
+        stated = [value for value in (getattr(limits, name), getattr(cell, name)) if value is not None]
+        tighter[name] = (max if name == "lower" else min)(stated, default=None)
+    return StatedLimits(**tighter)
 
 
 def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: bool) -> Iterator[tuple[str, str]]:
@@ -62,8 +65,3 @@ def limit_findings(limits: StatedLimits, cell: StatedLimits, *, is_revolute: boo
     if lower is not None and upper is not None and not lower < upper:
         key = "lower" if cell.upper is None else "upper"
         yield f"{key}_{unit.name}", f"expected a lower limit below the upper one, got {text(lower)} and {text(upper)}"
-
-
-def _stated(*values: float | None) -> list[float]:
-    """The values that are stated."""
-    return [value for value in values if value is not None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, listed, unknown_name
 from cellplan.files.robots.build_payload import payload_findings
-from cellplan.files.robots.limits import RATES, StatedLimits, limit_findings, limits_of, tightest
+from cellplan.files.robots.limits import RATES, StatedLimits, limit_findings, limits_of, rates_of, tightest
 from cellplan.files.schema.robot import SLIDING_LIMITS, TURNING_LIMITS, LimitsEntry, RobotEntry
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.geometry.transforms import Array
@@ -123,11 +123,7 @@ def tightened(
 
 def _within(joint: Joint, limits: StatedLimits, *, is_slowed: bool) -> Joint:
     """The joint with tighter limits; one whose velocity the cell limits keeps its rated velocity."""
-    return replace(
-        joint,
-        rated_velocity=joint.top_speed if is_slowed else None,
-        **{name: getattr(limits, name) for name in RATES},
-    )
+    return replace(joint, rated_velocity=joint.top_speed if is_slowed else None, **rates_of(limits))
 
 
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:

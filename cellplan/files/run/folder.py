@@ -52,16 +52,12 @@ class RunFolder:
 
     On a normal end the folder takes the place of an older run at the same path. On an exception or an interruption
     everything is removed and an older run stays as it was.
-
-    Attributes:
-        path: Where the run will stand.
-        written: Size in bytes and SHA-256 of every file written so far, by its name in the folder.
     """
 
     def __init__(self, path: Path) -> None:
         """Name the folder; nothing is touched before the ``with`` statement begins."""
-        self.path = path
-        self.written: dict[str, tuple[int, str]] = {}
+        self.path = path  # where the run will stand
+        self.written: dict[str, tuple[int, str]] = {}  # size in bytes and SHA-256 of every file so far, by name
         self._draft, self._aside = hidden_folders(path)  # sideways is where the older run waits for its end
         self._made_parents: list[Path] = []
 

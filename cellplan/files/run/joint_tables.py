@@ -41,18 +41,14 @@ _SHA256 = "sha256 "
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TableHeader:
-    """The entries of the header of a table besides its title and the caution.
-
-    Attributes:
-        accelerations: The largest acceleration and jerk of the robot's joints; empty for rows that are not checked.
-    """
+    """The entries of the header of a table besides its title and the caution."""
 
     cell: str  # name of the cell
     mode: str  # who moves
     verdict: str = NOT_CHECKED  # ``passed``, ``REJECTED: <first violation>`` or ``not checked``
     digests: Mapping[str, str]  # SHA-256 in hexadecimal by what it is the digest of (``cell``, ``program``)
     remark: str = ""  # what else has to be known of the rows; empty for the program of the cell as it is written
-    accelerations: str = ""
+    accelerations: str = ""  # largest acceleration and jerk of the robot's joints; empty for rows that are not checked
     zero: str = ""  # from which zero the joint positions count; empty for rows that are not checked
 
 

@@ -30,17 +30,13 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StoredRun:
-    """The content of a run folder whose files are all as they were written.
-
-    Attributes:
-        records: The ``report.json`` of each phase, by its place in the folder: empty for a single one, else the task.
-    """
+    """The content of a run folder whose files are all as they were written."""
 
     folder: Path  # the run folder
     digest: str  # SHA-256 of the manifest, which stands for the whole run
     manifest: Manifest  # what the run holds and rests on
     record: Record  # its ``report.json``
-    records: Mapping[str, Record]
+    records: Mapping[str, Record]  # ``report.json`` of each phase, by its place in the folder, empty for a single one
     tables: Mapping[str, str]  # text of the joint tables, by robot
     clock: str  # text of the clock of the program; empty for a failed run
 

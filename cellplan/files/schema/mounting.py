@@ -1,25 +1,11 @@
 """What robots stand on or hang from, and attachments of their links, as written in a cell file."""
 
-from typing import ClassVar, Self
+from typing import ClassVar
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field
 
-from cellplan.files.schema.shapes import (
-    MESH_FILE,
-    MESH_UNIT,
-    OPEN_MESH,
-    SOLID_SHAPES,
-    BoxEntry,
-    CapsuleEntry,
-    CylinderEntry,
-    MeshUnit,
-    OneShape,
-    SphereEntry,
-    ToolBodyEntry,
-)
-from cellplan.model.settings.entry import Coordinate, Entry, Name, PoseEntry, Size, Text, one_of_keys, require_one
-
-PEDESTAL_SHAPES = ("cylinder", "box")
+from cellplan.files.schema.shapes import SolidEntry
+from cellplan.model.settings.entry import Coordinate, Entry, Name, OneOf, PoseEntry, Size, Text
 
 
 class PedestalColumnEntry(Entry):
@@ -34,19 +20,13 @@ class PedestalBoxEntry(Entry):
     size_mm: tuple[Size, Size] = Field(description="Edge lengths along the x and y of the base.")
 
 
-class ColumnEntry(Entry):
+class ColumnEntry(OneOf):
     """A column between a robot's base and what carries it: exactly one of cylinder and box."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PEDESTAL_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = ("cylinder", "box")
 
     cylinder: PedestalColumnEntry | None = Field(default=None, description="Round column through the base's origin.")
     box: PedestalBoxEntry | None = Field(default=None, description="Box round the base's origin, turned as it is.")
-
-    @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape."""
-        require_one(self, PEDESTAL_SHAPES)
-        return self
 
 
 class PedestalEntry(ColumnEntry):
@@ -71,7 +51,7 @@ class WallEntry(ColumnEntry):
     length_mm: Size = Field(description="Length from the base to the wall.")
 
 
-class RailBodyEntry(ToolBodyEntry):
+class RailBodyEntry(SolidEntry):
     """A solid of a rail: exactly one shape."""
 
     at: PoseEntry = Field(
@@ -79,23 +59,18 @@ class RailBodyEntry(ToolBodyEntry):
     )
 
 
-class AttachmentEntry(OneShape):
-    """A solid mounted on a link of a robot, such as a hose, a feeder or a valve block: exactly one shape."""
-
-    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+class _OnLink(Entry):
+    """The first keys of an attachment."""
 
     link: Text = Field(description="Link that carries it: the word base or a joint of a robot table, a link of a URDF.")
     name: Name | None = Field(
         default=None, description="Name in reports, as ROBOT/NAME; attachment, attachment_2, … when absent."
     )
-    box: BoxEntry | None = Field(default=None, description="Cuboid.")
-    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
-    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
-    sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
-    open: bool | None = Field(default=None, description=OPEN_MESH)
+
+
+class AttachmentEntry(SolidEntry, _OnLink):
+    """A solid mounted on a link of a robot, such as a hose, a feeder or a valve block: exactly one shape."""
+
     at: PoseEntry = Field(
         default=PoseEntry(),
         description="Pose of the solid while all joints read zero: in the base frame for a robot table, as the bodies "

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from cellplan.files.input.findings import Finding
 from cellplan.files.schema.cell import OBSTACLE_LIMIT, ROBOT_LIMIT, TASK_LIMIT, CellDocument, MotionEntry, PartEntry
@@ -14,9 +14,25 @@ from cellplan.files.yaml.reader import YamlDocument
 from cellplan.model.settings.acceleration import AccelerationChoice
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
+from cellplan.model.settings.entry import Entry
 from cellplan.model.settings.layout import LayoutEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
+
+NAMED: Final[Mapping[str, type[Entry]]] = {
+    "robots": RobotEntry,
+    "tasks": TaskEntry,
+    "environment": ObstacleEntry,
+    "controllers": ControllerEntry,
+}  # sections with entries by name
+SINGLE: Final[Mapping[str, type[Entry]]] = {
+    "part": PartEntry,
+    "motion": MotionEntry,
+    "solver": SolverEntry,
+    "checks": ChecksEntry,
+    "layout": LayoutEntry,
+    "program": ProgramEntry,
+}  # sections that are one entry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,44 +62,14 @@ class ValidEntries:
 def read_valid_entries(document: YamlDocument) -> tuple[ValidEntries, list[Finding]]:
     """Validate a cell file, and entry by entry where anything of it is invalid; the findings name what is."""
     whole, findings = validate(CellDocument, document)
-    names = {key: tuple(_section(document, key)) for key in ("robots", "tasks", "environment", "controllers")}
+    names = {key: tuple(_section(document, key)) for key in NAMED}
     if whole is None:
-        return _by_entry(document, names), findings
-    valid = ValidEntries(
-        whole=whole,
-        robots=whole.robots,
-        tasks=whole.tasks,
-        environment=whole.environment,
-        controllers=whole.controllers or {},
-        part=whole.part,
-        motion=whole.motion,
-        solver=whole.solver,
-        checks=whole.checks,
-        layout=whole.layout,
-        program=whole.program,
-        acceleration=whole.acceleration,
-        names=names,
-    )
-    return valid, findings
-
-
-def _by_entry(document: YamlDocument, names: Mapping[str, tuple[str, ...]]) -> ValidEntries:
-    """What is valid of an invalid cell file."""
-    return ValidEntries(
-        whole=None,
-        robots=_named(RobotEntry, document, "robots"),
-        tasks=_named(TaskEntry, document, "tasks"),
-        environment=_named(ObstacleEntry, document, "environment"),
-        controllers=_named(ControllerEntry, document, "controllers"),
-        part=_single(PartEntry, document, "part"),
-        motion=_single(MotionEntry, document, "motion"),
-        solver=_single(SolverEntry, document, "solver"),
-        checks=_single(ChecksEntry, document, "checks"),
-        layout=_single(LayoutEntry, document, "layout"),
-        program=_single(ProgramEntry, document, "program"),
-        acceleration=None,
-        names=names,
-    )
+        entries: dict[str, Any] = {key: _named(model, document, key) for key, model in NAMED.items()}
+        entries |= {key: _single(model, document, key) for key, model in SINGLE.items()}
+        entries["acceleration"] = None
+    else:
+        entries = {key: getattr(whole, key) for key in (*NAMED, *SINGLE, "acceleration")}
+    return ValidEntries(whole=whole, names=names, **entries | {"controllers": entries["controllers"] or {}}), findings
 
 
 def _section(document: YamlDocument, key: str) -> Mapping[str, Any]:

@@ -2,22 +2,20 @@
 
 from typing import Annotated, ClassVar, Final, Self
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.closed_shapes import CircleEntry, PlaneWord, RectangleEntry, RhombusEntry
 from cellplan.model.settings.entry import (
     Coordinate,
     Direction,
     Entry,
+    OneOf,
     Text,
     by_kind,
-    one_of_keys,
-    require_one,
     rule,
 )
 from cellplan.model.settings.units import Mm, Within
 
-PATHS: Final = ("circle", "rectangle", "rhombus", "polyline", "csv")
 SHORTEST_SIDE_MM: Final = 1e-3  # sides shorter than a micrometre have no direction
 CSV_WORDS: Final = "a file name or {file: path.csv, smooth: true, closed: false}"
 MOST_JOINED_MM: Final = 1.0  # points farther apart than this are two points of a path
@@ -90,10 +88,10 @@ CsvChoice = Annotated[
 ]
 
 
-class PathEntry(Entry):
+class PathEntry(OneOf):
     """Exactly one path, and its projection onto the part."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PATHS))
+    alternatives: ClassVar[tuple[str, ...]] = ("circle", "rectangle", "rhombus", "polyline", "csv")
 
     circle: CircleEntry | None = Field(default=None, description="Circle.")
     rectangle: RectangleEntry | None = Field(default=None, description="Rectangle.")
@@ -111,9 +109,8 @@ class PathEntry(Entry):
     )
 
     @model_validator(mode="after")
-    def _is_one_path(self) -> Self:
-        """Exactly one path; an offset goes with a planar path that is not projected."""
-        require_one(self, PATHS)
+    def _has_place(self) -> Self:
+        """An offset goes with a planar path that is not projected."""
         if self.offset_mm is not None and not self.is_planar:
             raise rule("unexpected key, only a path in a plane has an offset", "offset_mm")
         if self.offset_mm is not None and self.project is not None:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.gripper import GripperEntry
 from cellplan.files.schema.joint_path import JointPathEntry
@@ -16,12 +16,11 @@ from cellplan.model.settings.entry import (
     Direction,
     Entry,
     Name,
+    OneOf,
     PoseEntry,
     SlidingSpeed,
     Text,
     by_kind,
-    one_of_keys,
-    require_one,
     rule,
 )
 from cellplan.model.settings.robot import FARTHEST, BodyAccuracyEntry, JointPosition, PayloadEntry
@@ -44,7 +43,6 @@ WEIGHT_RANGE: Final = (1e-6, 1e6)  # beyond it the weighted pseudo-inverse loses
 AXIS_LIMIT: Final = 64  # joints of one robot
 ORDER_LIMIT: Final = 400  # tasks and marks of one robot
 SOLID_LIMIT: Final = 50  # solids of a track or a carriage
-MOUNTS: Final = ("pedestal", "tilted", "hanging", "wall", "rail")
 
 JointAngle = Annotated[Deg, Within(ge=-LARGEST_JOINT_DEG, le=LARGEST_JOINT_DEG)]
 TurningSpeed = Annotated[DegPerS, Within(gt=0.0, le=FASTEST_DEG_S)]
@@ -153,10 +151,10 @@ class RailEntry(Entry):
         return self
 
 
-class MountEntry(Entry):
+class MountEntry(OneOf):
     """How a robot is mounted: exactly one of the keys."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*MOUNTS))
+    alternatives: ClassVar[tuple[str, ...]] = ("pedestal", "tilted", "hanging", "wall", "rail")
 
     pedestal: PedestalEntry | None = Field(default=None, description="Upright on a pedestal, as with the key pedestal.")
     tilted: PedestalEntry | None = Field(
@@ -165,12 +163,6 @@ class MountEntry(Entry):
     hanging: HangingEntry | None = Field(default=None, description="Upside down below a ceiling.")
     wall: WallEntry | None = Field(default=None, description="On a bracket behind its base, at a wall or elsewhere.")
     rail: RailEntry | None = Field(default=None, description="On a carriage that moves along a rail.")
-
-    @model_validator(mode="after")
-    def _is_one(self) -> Self:
-        """Exactly one way."""
-        require_one(self, MOUNTS)
-        return self
 
 
 class RobotEntry(Entry):

@@ -2,7 +2,7 @@
 
 from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
 from cellplan.files.schema.robot import (
     AXIS_LIMIT,
@@ -25,14 +25,13 @@ from cellplan.model.settings.entry import (
     Coordinates,
     Entry,
     Name,
+    OneOf,
     PoseEntry,
     Size,
     SlidingSpeed,
     Text,
     Vector,
     by_kind,
-    one_of_keys,
-    require_one,
     rule,
 )
 from cellplan.model.settings.robot import Accuracy, PayloadEntry, ReachEntry
@@ -121,10 +120,10 @@ class PlacedMeshEntry(Entry):
         return self
 
 
-class LinkBodyEntry(Entry):
+class LinkBodyEntry(OneOf):
     """A solid fixed to one link."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
     link: Text = Field(description="The word base, or the joint that carries the solid.")
     name: Name | None = Field(default=None, description="Name in reports; the link's name, numbered, when absent.")
@@ -139,9 +138,8 @@ class LinkBodyEntry(Entry):
     )
 
     @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape, and a cylinder with two ends."""
-        require_one(self, SOLID_SHAPES)
+    def _has_two_ends(self) -> Self:
+        """A cylinder has two ends."""
         if self.cylinder is not None and self.cylinder.from_mm == self.cylinder.to_mm:
             raise rule("expected another point than from_mm, got the same", "cylinder.to_mm")
         return self

@@ -2,23 +2,11 @@
 
 from typing import ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import (
-    AxisName,
-    Coordinate,
-    Entry,
-    PoseEntry,
-    Size,
-    Text,
-    one_of_keys,
-    require_one,
-    rule,
-)
+from cellplan.model.settings.entry import AxisName, Coordinate, Entry, OneOf, PoseEntry, Size, Text, rule
 
-PART_SHAPES = ("box", "cylinder", "sphere", "mesh")
-SOLID_SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
-OBSTACLE_SHAPES = ("plane", *SOLID_SHAPES)
+SOLID_SHAPES: Final = ("box", "cylinder", "capsule", "sphere", "mesh")
 
 
 class BoxEntry(Entry):
@@ -35,12 +23,11 @@ class CylinderEntry(Entry):
     axis: AxisName = Field(default="z", description="Direction of its axis.")
 
 
-class CapsuleEntry(Entry):
-    """A cylinder with round ends, centred on its frame."""
+class RoundEnds(Entry):
+    """Base of round shapes that end in half balls."""
 
     radius_mm: Size = Field(description="Radius.")
     length_mm: Size = Field(description="Length from end to end, round ends included.")
-    axis: AxisName = Field(default="z", description="Direction of its axis.")
 
     @model_validator(mode="after")
     def _has_round_ends(self) -> Self:
@@ -48,6 +35,12 @@ class CapsuleEntry(Entry):
         if self.length_mm < 2.0 * self.radius_mm:
             raise rule(f"expected a length of at least {2.0 * self.radius_mm:g} (two radii)", "length_mm")
         return self
+
+
+class CapsuleEntry(RoundEnds):
+    """A cylinder with round ends, centred on its frame."""
+
+    axis: AxisName = Field(default="z", description="Direction of its axis.")
 
 
 class SphereEntry(Entry):
@@ -63,15 +56,10 @@ class ToolRoundEntry(Entry):
     length_mm: Size = Field(description="Length from end to end.")
 
 
-class ToolCapsuleEntry(ToolRoundEntry):
+class ToolCapsuleEntry(RoundEnds):
     """A round tool with round ends along its z axis, from -length to 0, so that it ends at the tip."""
 
-    @model_validator(mode="after")
-    def _has_round_ends(self) -> Self:
-        """The round ends need room."""
-        if self.length_mm < 2.0 * self.radius_mm:
-            raise rule(f"expected a length of at least {2.0 * self.radius_mm:g} (two radii)", "length_mm")
-        return self
+    length_mm: Size = Field(description="Length from end to end.")
 
 
 class PlaneEntry(Entry):
@@ -100,15 +88,12 @@ def require_unit_of(file: str | None, unit: str | None) -> None:
         raise rule("unexpected key, a unit requires a mesh", "unit")
 
 
-class OneShape(Entry):
+class OneShape(OneOf):
     """Base of entries that hold exactly one of several shapes, and the unit of a mesh."""
 
-    shapes: ClassVar[tuple[str, ...]]
-
     @model_validator(mode="after")
-    def _is_one_shape(self) -> Self:
-        """Exactly one shape, with a unit if it is a mesh."""
-        require_one(self, self.shapes)
+    def _has_unit(self) -> Self:
+        """A unit and the permission to be open go with a mesh."""
         file = getattr(self, "mesh", None)
         require_unit_of(file, getattr(self, "unit", None))
         if getattr(self, "open", None) is not None and file is None:
@@ -119,8 +104,7 @@ class OneShape(Entry):
 class PartShapeEntry(OneShape):
     """Exactly one of box, cylinder, sphere and mesh."""
 
-    shapes: ClassVar[tuple[str, ...]] = PART_SHAPES
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*PART_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = ("box", "cylinder", "sphere", "mesh")
 
     box: BoxEntry | None = Field(default=None, description="Cuboid centred on the part frame.")
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder centred on the part frame.")
@@ -132,8 +116,7 @@ class PartShapeEntry(OneShape):
 class ToolShapeEntry(OneShape):
     """Exactly one of box, cylinder, capsule, sphere and mesh; it ends at the tool tip."""
 
-    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
     box: BoxEntry | None = Field(
         default=None, description="Cuboid; along the tool's z axis it reaches from -size to 0."
@@ -150,11 +133,10 @@ class ToolShapeEntry(OneShape):
     open: bool | None = Field(default=None, description=OPEN_MESH)
 
 
-class ToolBodyEntry(OneShape):
-    """A further solid of a tool, given in the flange frame."""
+class SolidEntry(OneShape):
+    """A solid and its pose."""
 
-    shapes: ClassVar[tuple[str, ...]] = SOLID_SHAPES
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SOLID_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = SOLID_SHAPES
 
     box: BoxEntry | None = Field(default=None, description="Cuboid.")
     cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
@@ -163,23 +145,26 @@ class ToolBodyEntry(OneShape):
     mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
     unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
     open: bool | None = Field(default=None, description=OPEN_MESH)
+    at: PoseEntry | None = None
+
+
+class ToolBodyEntry(SolidEntry):
+    """A further solid of a tool, given in the flange frame."""
+
     at: PoseEntry = Field(default=PoseEntry(), description="Pose of the solid in the flange frame.")
 
 
-class ObstacleEntry(OneShape):
-    """A fixed thing in the cell: exactly one shape and its pose."""
-
-    shapes: ClassVar[tuple[str, ...]] = OBSTACLE_SHAPES
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*OBSTACLE_SHAPES))
+class _Floor(Entry):
+    """The first key of an obstacle."""
 
     plane: PlaneEntry | None = Field(default=None, description="Floor of the cell.")
-    box: BoxEntry | None = Field(default=None, description="Cuboid.")
-    cylinder: CylinderEntry | None = Field(default=None, description="Circular cylinder.")
-    capsule: CapsuleEntry | None = Field(default=None, description="Cylinder with round ends.")
-    sphere: SphereEntry | None = Field(default=None, description="Ball.")
-    mesh: Text | None = Field(default=None, description=f"{MESH_FILE}.")
-    unit: MeshUnit | None = Field(default=None, description=MESH_UNIT)
-    open: bool | None = Field(default=None, description=OPEN_MESH)
+
+
+class ObstacleEntry(SolidEntry, _Floor):
+    """A fixed thing in the cell: exactly one shape and its pose."""
+
+    alternatives: ClassVar[tuple[str, ...]] = ("plane", *SOLID_SHAPES)
+
     at: PoseEntry | None = Field(
         default=None, description="Pose of the shape in the world; the world frame when absent. Not with a plane."
     )

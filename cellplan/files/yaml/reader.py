@@ -51,11 +51,7 @@ class SourceMark(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class YamlDocument:
-    """A file as plain values, and where they stand.
-
-    Attributes:
-        changes: Key paths at which other values were set after reading, each with its text in messages.
-    """
+    """A file as plain values, and where they stand."""
 
     file: str  # name in messages
     digest: str  # SHA-256 of the bytes that were read
@@ -64,7 +60,7 @@ class YamlDocument:
     keys: Mapping[KeyPath, SourceMark]  # place of each key
     findings: tuple[Finding, ...]  # what the reader refused; the caller adds its own and raises all at once
     unreadable: frozenset[KeyPath]  # key paths whose value was refused
-    changes: Mapping[KeyPath, str] = field(default_factory=dict)
+    changes: Mapping[KeyPath, str] = field(default_factory=dict)  # keys set after reading, with their texts in messages
 
     def line(self, path: KeyPath) -> int:
         """Line of a value; of the nearest enclosing one when the value is absent."""

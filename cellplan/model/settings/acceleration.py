@@ -1,10 +1,10 @@
 """Accelerations in a cell file: stated limits only, an assumption for the other joints, or none with a reason."""
 
-from typing import Annotated, ClassVar, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import Entry, Reason, by_kind, one_of_keys, require_one
+from cellplan.model.settings.entry import OneOf, Reason, by_kind
 from cellplan.model.settings.units import Ms, Within
 
 AXES: Final = 64  # joints of one robot
@@ -20,10 +20,10 @@ SpeedUpTimes = Annotated[
 ]
 
 
-class AccelerationRuleEntry(Entry):
+class AccelerationRuleEntry(OneOf):
     """What is taken for the accelerations that joints reach."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys("full_speed_in_s", "unlimited"))
+    alternatives: ClassVar[tuple[str, ...]] = ("full_speed_in_s", "unlimited")
 
     full_speed_in_s: SpeedUpTimes | None = Field(
         default=None,
@@ -33,12 +33,6 @@ class AccelerationRuleEntry(Entry):
     unlimited: Reason | None = Field(
         default=None, description="Accelerations and jerk are reported and not judged; the reason why."
     )
-
-    @model_validator(mode="after")
-    def _is_one(self) -> Self:
-        """Exactly one of the two."""
-        require_one(self, ("full_speed_in_s", "unlimited"))
-        return self
 
 
 AccelerationChoice = Annotated[

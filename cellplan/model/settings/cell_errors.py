@@ -1,10 +1,10 @@
 """Errors of the real cell: joint zeros, link lengths, bases, tools, grasps, and the noise of the measuring system."""
 
-from typing import Annotated, ClassVar, Final, Literal, Self
+from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import ConfigDict, Field, Tag, model_validator
+from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, by_kind, one_of_keys, require_one
+from cellplan.model.settings.entry import NOT_TURNED, ORIGIN, Entry, Name, OneOf, by_kind
 from cellplan.model.settings.solver import LARGEST_SEED
 from cellplan.model.settings.units import Deg, Mm, Quantity, Within
 
@@ -12,7 +12,6 @@ LARGEST_SHIFT_MM: Final = 1_000.0  # an error of a metre is a wrong unit
 LARGEST_TURN_ERROR_DEG: Final = 45.0  # likewise an eighth of a turn
 TRIAL_LIMIT: Final = 10_000
 AMOUNT_WORDS: Final = "a number, {normal: NUMBER} or {uniform: NUMBER}"
-SPREADS: Final = ("normal", "uniform")
 
 Shift = Annotated[Mm, Within(ge=-LARGEST_SHIFT_MM, le=LARGEST_SHIFT_MM)]
 Turn = Annotated[Deg, Within(ge=-LARGEST_TURN_ERROR_DEG, le=LARGEST_TURN_ERROR_DEG)]
@@ -20,19 +19,13 @@ ShiftWidth = Annotated[Mm, Within(ge=0.0, le=LARGEST_SHIFT_MM)]
 TurnWidth = Annotated[Deg, Within(ge=0.0, le=LARGEST_TURN_ERROR_DEG)]
 
 
-class Spread(Entry):
+class Spread(OneOf):
     """An amount that varies from trial to trial, with mean zero."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*SPREADS))
+    alternatives: ClassVar[tuple[str, ...]] = ("normal", "uniform")
 
     normal: Quantity | None
     uniform: Quantity | None
-
-    @model_validator(mode="after")
-    def _is_one_spread(self) -> Self:
-        """Exactly one distribution."""
-        require_one(self, SPREADS)
-        return self
 
 
 class ShiftSpreadEntry(Spread):

@@ -1,9 +1,17 @@
 """Building blocks of all files: strict entries, numbers with bounds, poses, directions and choices."""
 
-from collections.abc import Iterable
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from cellplan.geometry.transforms import Array, pose
@@ -71,19 +79,6 @@ AxisName = Literal["x", "y", "z"]
 SignedAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 
 
-def one_of_keys(*names: str) -> dict[str, Any]:
-    """JSON Schema of "exactly one of these keys"."""
-    return {"oneOf": [{"required": [name]} for name in names]}
-
-
-def require_one(entry: BaseModel, names: Iterable[str]) -> None:
-    """Refuse an entry that does not give exactly one of the keys."""
-    names = tuple(names)
-    given = [name for name in names if getattr(entry, name) is not None]
-    if len(given) != 1:
-        raise rule(f"expected exactly one of the keys {', '.join(names)}, got {' and '.join(given) or 'none'}")
-
-
 def require_unique(words: tuple[str, ...], key: str) -> None:
     """Refuse a list that names something twice."""
     for index, word in enumerate(words):
@@ -130,6 +125,24 @@ class Entry(BaseModel):
     def changed(self, **values: Any) -> Self:
         """The entry with other values, which are validated like those of a file."""
         return type(self).model_validate({**dict(self), **values})
+
+
+class OneOf(Entry):
+    """Base of entries that give exactly one of some keys, which are None where they are not given."""
+
+    alternatives: ClassVar[tuple[str, ...]] = ()
+    model_config: ClassVar[ConfigDict] = ConfigDict(
+        json_schema_extra=lambda schema, entry: schema.update(oneOf=[{"required": [key]} for key in entry.alternatives])
+    )
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Exactly one of the keys."""
+        given = [key for key in self.alternatives if getattr(self, key) is not None]
+        if len(given) != 1:
+            keys = ", ".join(self.alternatives)
+            raise rule(f"expected exactly one of the keys {keys}, got {' and '.join(given) or 'none'}")
+        return self
 
 
 class PoseEntry(Entry):

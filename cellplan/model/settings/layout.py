@@ -2,23 +2,21 @@
 
 from typing import Annotated, ClassVar, Final, Literal, Self
 
-from pydantic import ConfigDict, Field, Tag, WithJsonSchema, model_validator
+from pydantic import Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.model.settings.entry import (
     Coordinate,
     Entry,
     Name,
+    OneOf,
     PoseEntry,
     Size,
     Text,
     by_kind,
-    one_of_keys,
-    require_one,
     rule,
 )
 from cellplan.model.settings.units import Deg, Mm, Within
 
-KEEP_OUT_SHAPES: Final = ("box", "cylinder")
 ITEM_LIMIT: Final = 1000
 FARTHEST: Final = 1e6  # in the unit of the key
 RANGE_WORDS: Final = "a range [low, high] or a number"
@@ -79,19 +77,18 @@ class KeepOutCylinderEntry(Entry):
     radius_mm: Size = Field(description="Radius.")
 
 
-class KeepOutEntry(Entry):
+class KeepOutEntry(OneOf):
     """A floor area without robots, at any height: exactly one of box and cylinder."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(json_schema_extra=one_of_keys(*KEEP_OUT_SHAPES))
+    alternatives: ClassVar[tuple[str, ...]] = ("box", "cylinder")
 
     box: KeepOutBoxEntry | None = Field(default=None, description="Rectangle, centred on its pose.")
     cylinder: KeepOutCylinderEntry | None = Field(default=None, description="Circle, centred on its pose.")
     at: PoseEntry = Field(default=PoseEntry(), description="Pose in the world: x, y and yaw count.")
 
     @model_validator(mode="after")
-    def _is_one_upright_shape(self) -> Self:
-        """Exactly one shape, which stands upright."""
-        require_one(self, KEEP_OUT_SHAPES)
+    def _stands_upright(self) -> Self:
+        """An area of the floor has its heading only."""
         for index, word in enumerate(("roll", "pitch")):
             if self.at.rpy_deg[index]:
                 raise rule(f"expected 0, as an area of the floor has no {word}", f"at.rpy_deg[{index}]")

@@ -27,13 +27,9 @@ class Angle(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Axes:
-    """Which joints a controller counts as axes of the arm, and which as external axes.
+    """Which joints a controller counts as axes of the arm, and which as external axes."""
 
-    Attributes:
-        arm: Places of the axes of the arm among the joints of the model; empty for a positioner without an arm.
-    """
-
-    arm: tuple[int, ...]
+    arm: tuple[int, ...]  # places of the axes of the arm among the joints of the model; empty for a positioner
     external: tuple[int, ...]  # places of all others: a rail before the arm, or the axes of a positioner
 
     @classmethod

@@ -32,21 +32,15 @@ BOTH: tuple[Promise, ...] = (Promise.TIMED, Promise.SYNCHRONISED)  # promises th
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PreparedExport:
-    """What a format is to write.
-
-    Attributes:
-        skew: What the start skew may be; None where there is one controller only, or the promise does not depend on it.
-        orders: Marks and what was certified between them, of each program; empty unless robots wait at marks.
-        thinning: How far a tool in [mm] and a turning joint in [deg] may be off; None where no row is left out.
-    """
+    """What a format is to write."""
 
     dialect: Dialect  # the format
     job: ExportJob  # frame and rows, without notes
     promised: Promised  # what is promised
     requested: Promise | None  # the promise that was asked for; None where the best one was
-    skew: RunSkew | None
-    orders: tuple[Orders, ...]
-    thinning: tuple[float, float] | None
+    skew: RunSkew | None  # allowed start skew; None for one controller, or where the promise does not depend on it
+    orders: tuple[Orders, ...]  # marks and what is certified between them, of each program; empty unless robots wait
+    thinning: tuple[float, float] | None  # how far a tool in [mm] and a joint in [deg] may be off; None: all rows stay
     lead: float  # time in [s] by which the rows are later than those of the run
     shared: Shared  # what exports of the run share
 

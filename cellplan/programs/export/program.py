@@ -33,11 +33,10 @@ class Exporter:
     """A format that is no program of single robots: it is made from all of a run.
 
     Attributes:
-        render: Text of every file of a run, by its path in the folder of the export.
         read: What a reader of its own finds in these files: the tables of each motion, by robot.
     """
 
-    render: Callable[[VerifiedRun], dict[str, str]]
+    render: Callable[[VerifiedRun], dict[str, str]]  # text of every file of a run, by its path in the folder
     read: Callable[[VerifiedRun, Mapping[str, str]], tuple[dict[str, JointTable], ...]]
     decimals: int  # of a second, degree or millimetre in these files
 

@@ -69,17 +69,13 @@ class PhaseRows:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class WideRows:
-    """A program with all that its wide table shows.
-
-    Attributes:
-        process: Stretches of nominal time in [s] in which the tool of a task is on its path, by task.
-    """
+    """A program with all that its wide table shows."""
 
     cell: Cell
     times: Array  # times of the rows in [s], shape (N,)
     sigma: Array  # nominal times of the rows in [s], shape (N,)
     phases: Sequence[PhaseRows]  # its phases in their order; the row that two of them share is of the later one
-    process: Mapping[str, Sequence[Interval]]
+    process: Mapping[str, Sequence[Interval]]  # nominal times in [s] of a tool on its path, by task
 
     @property
     def tasks(self) -> tuple[str, ...]:

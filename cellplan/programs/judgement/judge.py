@@ -39,16 +39,12 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judgement:
-    """What was found.
-
-    Attributes:
-        corners: No tool is farther off by rounded rows than this; of every task, none where no row is rounded.
-    """
+    """What was found."""
 
     findings: tuple[str, ...]  # demands that are not kept; a program with any is not written
     deviations: tuple[Deviation, ...] = ()  # of every joint, then of every tool and further holder on the part
     not_judged: tuple[str, ...] = ()  # what does not hold on the files alone, with the reason
-    corners: tuple[Deviation, ...] = ()
+    corners: tuple[Deviation, ...] = ()  # by how much rounded rows may put tools off, of every task
     rounded: tuple[int, int] = (0, 0)  # rows of all robots that are rounded, and all rows of them
 
     @property

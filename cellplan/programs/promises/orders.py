@@ -39,17 +39,13 @@ Pair = tuple[str, str]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrderStretch:
-    """Rows between two neighbouring marks, within which every order of the robots is certified.
-
-    Attributes:
-        pairs: Robots that both move between them, of which all combinations of places are certified.
-    """
+    """Rows between two neighbouring marks, within which every order of the robots is certified."""
 
     phase: str  # name of the phase
     place: int  # number of the motion of the run that the phase repeats
     first: int  # row of the first mark
     last: int  # row of the second one
-    pairs: tuple[Pair, ...] = ()
+    pairs: tuple[Pair, ...] = ()  # robots that both move between them, certified in all combinations of places
     proved: float = np.inf  # distance in [m] that the bodies of these keep in every order; inf without such bodies
 
 

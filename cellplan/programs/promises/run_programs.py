@@ -29,17 +29,13 @@ class RunPhase:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RunProgram:
-    """A program of all robots of a cell.
-
-    Attributes:
-        process: Whether the tool of a task is in process, shape (N,), by task, both ends of a process included.
-    """
+    """A program of all robots of a cell."""
 
     name: str | None  # name of the program; None for the only one
     times: Array  # times of its rows in [s], from 0, shape (N,)
     q: Array  # stacked joint positions in [rad] or [m], shape (N, nq)
     phases: tuple[RunPhase, ...]  # its phases in their order
-    process: dict[str, Flags]
+    process: dict[str, Flags]  # whether the tool of a task is in process, both ends included, shape (N,), by task
 
     def phase_at(self, row: int) -> RunPhase:
         """The phase of a row; the earlier one of two that share it."""

@@ -15,15 +15,11 @@ PER_SECOND: Final = 1e3  # [ms/s]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockPair:
-    """Two robots on different controllers.
-
-    Attributes:
-        allowed: Largest skew in [s] of their clocks that keeps all that is demanded; ``MOST_SKEW`` for that or more.
-    """
+    """Two robots on different controllers."""
 
     first: str  # the one robot
     second: str  # the other one
-    allowed: float
+    allowed: float  # largest skew in [s] that keeps all that is demanded; ``MOST_SKEW`` for that or more
     stated: float | None  # largest difference in [s] that the cell states of them; None for nothing stated
     reason: str  # what more would break
 

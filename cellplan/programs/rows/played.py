@@ -31,11 +31,7 @@ class ExecutedStretch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExecutedProgram:
-    """One program as it is played: rows that were read, with those of the run for robots that are not exported.
-
-    Attributes:
-        shares: Share of the shorter neighbouring segment within which each of their rows is rounded, shape (N,).
-    """
+    """One program as it is played: rows that were read, with those of the run for robots that are not exported."""
 
     run: VerifiedRun
     place: int  # place of the program among those of the run
@@ -43,7 +39,7 @@ class ExecutedProgram:
     interpolation: Interpolation  # how the target moves the joints of the robots that are exported
     exported: tuple[str, ...]  # names of these
     lead: float  # time in [s] by which the rows are later than those of the run
-    shares: Mapping[str, Array]
+    shares: Mapping[str, Array]  # of the shorter segment within which their rows are rounded, shape (N,)
 
     @classmethod
     def of(

@@ -27,15 +27,11 @@ NO_ROWS: Final = EssentialRows((), ())
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ThinningLimits:
-    """How far thinned rows may be off the rows that they are chosen from.
-
-    Attributes:
-        tool: Of a tool on the part, or in the world for a task given there, in [m]; less where the cell allows less.
-    """
+    """How far thinned rows may be off the rows that they are chosen from."""
 
     turn: float  # of a turning joint in [rad]
     slide: float  # of a sliding joint in [m]
-    tool: float
+    tool: float  # of a tool on the part, or in the world for a task there, in [m]; less where the cell allows less
     shortest_time: float = 0.0  # shortest time in [s] between two rows, unless both must be kept; 0 for no limit
     shortest_distance: float = 0.0  # shortest way in [m] of the tool that moves most between two rows, likewise
 

@@ -19,17 +19,12 @@ TIGHT_TOL: Final = 2.5e-5  # [m] a proof this near to the proposed distance coun
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """Distance reading of two bodies at one sample.
-
-    Attributes:
-        direction: Direction from first to second in the world, shape (3,), that proves ``bound`` on the hulls; None
-            where no direction does.
-    """
+    """Distance reading of two bodies at one sample."""
 
     touches: bool  # whether they touch
     bound: float  # proved distance in [m], never above the truth; zero when they touch or nothing is proved
     is_exact: bool  # whether the truth is above the bound by no more than ``2 TIGHT_TOL``
-    direction: Array | None
+    direction: Array | None  # from first to second in the world, shape (3,), that proves it on hulls; None without one
 
 
 TOUCHING: Final = Reading(True, 0.0, True, None)

@@ -16,7 +16,7 @@ from cellplan.files.schema.mounting import (
     WallEntry,
 )
 from cellplan.files.schema.partial import ValidEntries
-from cellplan.files.schema.robot import MOUNTS, RobotEntry
+from cellplan.files.schema.robot import RobotEntry
 from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction
 from cellplan.files.yaml.reader import YamlDocument
@@ -52,9 +52,8 @@ def _column(entry: RobotEntry) -> tuple[KeyPath, ColumnEntry | None]:
     """The column that a robot is mounted on, and its key path below the robot; None without one."""
     if entry.mount is None:
         return ("pedestal",), entry.pedestal
-    mounts = {("mount", key): getattr(entry.mount, key) for key in MOUNTS}
-    path, given = next((path, given) for path, given in mounts.items() if given is not None)
-    return path, given if isinstance(given, ColumnEntry) else None
+    key, given = next((key, given) for key, given in entry.mount if given is not None)
+    return ("mount", key), given if isinstance(given, ColumnEntry) else None
 
 
 def with_floor_height(

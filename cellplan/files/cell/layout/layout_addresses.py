@@ -27,16 +27,12 @@ GRASP: Final = re.compile(r"part\.held_by\[([0-9]{1,3})\]\.at(.*)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Address:
-    """Something of a cell file, or one number of it.
-
-    Attributes:
-        parts: Endings of the addresses of all its numbers: ``.x_mm``, or ``[0]``; empty for what has none.
-    """
+    """Something of a cell file, or one number of it."""
 
     group: str  # what the number belongs to, as the file addresses it: ``robots.kuka.base``
     what: str  # its kind: the last key of the address as it may be written in a layout
     name: str  # robot or task; empty for the part at rest and the mode
-    parts: tuple[str, ...] = ()
+    parts: tuple[str, ...] = ()  # endings of the addresses of all its numbers, such as ``.x_mm`` or ``[0]``
     keys: tuple[str, ...] = ()  # what these numbers are called in a mapping of ranges
     index: int | None = None  # which of them it is; None for all
 

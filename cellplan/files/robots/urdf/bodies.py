@@ -22,17 +22,13 @@ PACKAGE: Final = "package://"
 
 @dataclass(slots=True)
 class MeshShelf:
-    """Finds and reads the mesh files of one URDF, each once.
-
-    Attributes:
-        remarks: Names of meshes that only some programs understand, one line for each kind.
-    """
+    """Finds and reads the mesh files of one URDF, each once."""
 
     folder: Path  # folder of the URDF
     package_dirs: tuple[Path, ...]  # folders that hold packages (or are one)
     within: AllowedFolders | None = None  # folders that a mesh must lie in to be read; None for all
     files: list[Path] = field(default_factory=list)  # mesh files read so far, in the order of first use
-    remarks: Remarks = field(default_factory=Remarks)
+    remarks: Remarks = field(default_factory=Remarks)  # names of meshes that only some programs understand
     _read: dict[tuple[Path, tuple[float, float, float]], Mesh] = field(default_factory=dict)
 
     def mesh(self, desired: UrdfMesh, element: Element) -> Mesh:

@@ -21,14 +21,10 @@ RANGE_TOL: Final = 1e-9  # [m] or [rad]: rounding of millimetres and degrees
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripperState:
-    """How far a cell opens the gripper of a URDF.
-
-    Attributes:
-        opening: Travel of all sliding fingers together from their closed ends in [m]; None for an angle.
-    """
+    """How far a cell opens the gripper of a URDF."""
 
     joints: tuple[str, ...] = ()  # joints that open it; none for the only movable one beyond the flange
-    opening: float | None = None
+    opening: float | None = None  # travel of all sliding fingers together from closed in [m]; None for an angle
     angle: float | None = None  # position of the one joint of turning fingers in [rad]; None for an opening
 
 

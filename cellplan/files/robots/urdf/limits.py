@@ -16,21 +16,6 @@ from cellplan.files.yaml.writer import flow_text
 BLANK: Final = "…"  # a value that the user has to state
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Range:
-    """Complete limits of one joint; infinite positions where it may turn without end.
-
-    ``rated_velocity`` is the velocity limit of the URDF where the cell states one; None where it does not.
-    """
-
-    lower: float
-    upper: float
-    velocity: float
-    acceleration: float | None = None
-    jerk: float | None = None
-    rated_velocity: float | None = None
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MissingLimits:
     """What a driven joint lacks."""
@@ -71,8 +56,10 @@ def with_blanks(text: str) -> str:
     return text.replace(f'"{BLANK}"', BLANK)
 
 
-def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJoint]) -> Range:
+def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJoint]) -> StatedLimits:
     """Limits of a driven joint: the tightest of the URDF's, the cell's and those of the joints that follow it.
+
+    Position and velocity are complete, with infinite positions where the joint may turn without end.
 
     ``InputError`` where one is missing or of an unlikely size, is widened by the cell, or leaves no range.
     """
@@ -93,14 +80,7 @@ def joint_range(joint: UrdfJoint, cell: StatedLimits, followers: Iterable[UrdfJo
     if not lower < upper:
         ends = f"{in_user_unit(joint, lower)} and {in_user_unit(joint, upper)}"
         raise joint.error(f"expected a lower limit below the upper one, got {ends}")
-    return Range(
-        lower=lower,
-        upper=upper,
-        velocity=velocity,
-        acceleration=limits.acceleration,
-        jerk=limits.jerk,
-        rated_velocity=None if cell.velocity is None else stated.velocity,
-    )
+    return limits
 
 
 def _missing_of(joint: UrdfJoint, cell: StatedLimits) -> MissingLimits:

@@ -8,7 +8,7 @@ from typing import Final
 
 from cellplan.errors import CellplanError, InvalidFileError
 from cellplan.files.input.files import AllowedFolders
-from cellplan.files.robots.limits import StatedLimits
+from cellplan.files.robots.limits import StatedLimits, rates_of
 from cellplan.files.robots.urdf.bodies import MeshShelf, link_bodies
 from cellplan.files.robots.urdf.document.document import UrdfDocument, UrdfJoint, read_document
 from cellplan.files.robots.urdf.document.xacro import XacroSettings
@@ -36,25 +36,15 @@ PLAIN_NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UrdfOptions:
-    """What a cell adds to a URDF.
+    """What a cell adds to a URDF."""
 
-    Attributes:
-        flange: Link taken as the flange; None for the usual one (``tool0``, ``flange``, the only moving leaf).
-        limits: Limits by joint name; they tighten the URDF's or stand in for missing ones.
-        locked: Position in [rad] or [m] of joints that are held still, by name.
-        locks_others: Whether all other movable joints that do not lead to the flange are held still where
-            `rest_position` says.
-        lock_units: Unit that such a position was written in, ``deg`` or ``mm``, by name; none where it was not written.
-        within: Folders that its meshes and the files that it includes must lie in; None for all.
-    """
-
-    flange: str | None = None
+    flange: str | None = None  # its link; None for the usual one (``tool0``, ``flange``, the only moving leaf)
     package_dirs: tuple[Path, ...] = ()  # folders in which ``package://`` names are looked up
-    limits: Mapping[str, StatedLimits] = field(default_factory=dict)
-    locked: Mapping[str, float] = field(default_factory=dict)
-    locks_others: bool = False
-    lock_units: Mapping[str, str] = field(default_factory=dict)
-    within: AllowedFolders | None = None
+    limits: Mapping[str, StatedLimits] = field(default_factory=dict)  # by joint; they tighten or supply the URDF's
+    locked: Mapping[str, float] = field(default_factory=dict)  # position in [rad] or [m] of joints at rest, by name
+    locks_others: bool = False  # whether all others that do not lead to the flange are held at their `rest_position`
+    lock_units: Mapping[str, str] = field(default_factory=dict)  # ``deg`` or ``mm``, by name, as positions were written
+    within: AllowedFolders | None = None  # folders that its meshes and included files must lie in; None for all
     moveit: MoveitLimits | None = None  # limits that MoveIt states
     xacro_args: Mapping[str, str] = field(default_factory=dict)  # values of the arguments of a xacro file, by name
     xacro_elsewhere: frozenset[str] = frozenset()  # names of those that another file of the robot takes
@@ -192,7 +182,6 @@ def _driven(
     """A driven joint with its axis in B."""
     followers = [other for other in roles.followers if other.mimic and other.mimic.leader == joint.name]
     stated = limits.get(joint.name, StatedLimits())
-    allowed = joint_range(joint, stated, followers)
     axis_B, point_B = _axis_in_base(joint, configuration)
     return Joint(
         name=joint.name,
@@ -200,12 +189,8 @@ def _driven(
         parent=configuration.carrier[joint.parent],
         axis_B=axis_B,
         point_B=point_B,
-        lower=allowed.lower,
-        upper=allowed.upper,
-        velocity=allowed.velocity,
-        acceleration=allowed.acceleration,
-        jerk=allowed.jerk,
-        rated_velocity=allowed.rated_velocity,
+        rated_velocity=None if stated.velocity is None else joint.limit.stated.velocity,
+        **rates_of(joint_range(joint, stated, followers)),
     )
 
 

@@ -76,16 +76,8 @@ def _narrowed(limit: UrdfLimit, moveit: StatedLimits, *, slides: bool, turns_on:
     if turns_on and (moveit.lower is not None or moveit.upper is not None):
         fault = "of a continuous joint were not used"
     both = tightest(limit.stated, replace(moveit, lower=None, upper=None))
-    return (
-        replace(
-            limit,
-            velocity=both.velocity,
-            acceleration=both.acceleration,
-            jerk=both.jerk,
-            soft=tightest(limit.soft, soft),
-        ),
-        fault,
-    )
+    rates = {name: getattr(both, name) for name in ("velocity", "acceleration", "jerk")}
+    return replace(limit, **rates, soft=tightest(limit.soft, soft)), fault
 
 
 def _limits(entry: Mapping[str, Any]) -> StatedLimits:

@@ -144,17 +144,13 @@ def _local(local: Val3Element) -> str:
 
 @dataclass(slots=True, kw_only=True)
 class _Val3Player:
-    """Follows the programs of a project statement by statement.
-
-    Attributes:
-        zones: Distance of the tool in [mm] within which each row is rounded; 0 for a stop.
-    """
+    """Follows the programs of a project statement by statement."""
 
     frame: ExportFrame  # which robots
     robot: str
     project: _ReadProject
     rows: list[Sequence[float]] = field(default_factory=list)  # joint positions of the controller in each row
-    zones: list[float] = field(default_factory=list)
+    zones: list[float] = field(default_factory=list)  # of the tool in [mm], by row; 0 for a stop
     marks: list[int] = field(default_factory=list)  # rows with a handshake
     calls: list[str] = field(default_factory=list)  # programs that were called
     used: dict[str, int] = field(default_factory=dict)  # number of values that were moved to, by the name of their data

@@ -43,13 +43,9 @@ ROUNDING_TOL: Final = 1e-9  # [m] taken off what is carried over, so that roundi
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Bends:
-    """How much the paths of points of two bodies may bend in each of the steps of a motion; time counts in steps.
+    """How much the paths of points of two bodies may bend in each of the steps of a motion; time counts in steps."""
 
-    Attributes:
-        second: Largest second derivative of any point of the second body seen from the first, in [m], shape (n - 1,).
-    """
-
-    second: Array
+    second: Array  # largest second derivative of a point of the second body seen from the first in [m], shape (n - 1,)
     first: Array  # likewise of the first seen from the second
     reach: Array  # no point of the one travels farther than this seen from the other, in [m], shape (n - 1,)
 

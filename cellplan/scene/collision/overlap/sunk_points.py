@@ -90,15 +90,11 @@ class Patches:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SurfaceTree:
-    """Binary tree of patches over triangles that are sorted along a space-filling curve.
-
-    Attributes:
-        centres: A point of the surface in each patch of each level above the triangles, shapes (2^level, 3).
-    """
+    """Binary tree of patches over triangles that are sorted along a space-filling curve."""
 
     count: int  # number of triangles F
     triangles: Array  # the sorted triangles in [m], the last one repeated until there are 2^D, shape (2^D, 3, 3)
-    centres: tuple[Array, ...]
+    centres: tuple[Array, ...]  # a point of the surface in each patch of each level above them, shapes (2^level, 3)
     radii: tuple[Array, ...]  # radii of the balls round them in [m], shapes (2^level,)
 
     @classmethod

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.files.input.findings import listed
-from cellplan.files.robots.limits import LIMIT_TOL, StatedLimits, tightest
+from cellplan.files.robots.limits import LIMIT_TOL, StatedLimits, rates_of, tightest
 from cellplan.files.robots.urdf.document.xml import Element, Remarks
 from cellplan.model.units import joint_unit
 
@@ -41,8 +41,7 @@ class UrdfLimit:
     @property
     def stated(self) -> StatedLimits:
         """All limits, the tighter of each kind."""
-        hard = StatedLimits(lower=self.lower, upper=self.upper, velocity=self.velocity)
-        return tightest(tightest(hard, StatedLimits(acceleration=self.acceleration, jerk=self.jerk)), self.soft)
+        return tightest(StatedLimits(**rates_of(self)), self.soft)
 
 
 def read_limit(joint: Element, owner: str, *, kind: str, remarks: Remarks) -> UrdfLimit:
