@@ -65,7 +65,8 @@ class _Table:
     def __init__(self, robot: str, run: RunSamples) -> None:
         """Sort the pairs of the robot into those that no other robot changes and the others."""
         self._scene, self._robot = run.scene, robot
-        self._robot_bodies = [index for index, body in enumerate(_solids(self._scene)) if body == robot]
+        solids = range(len(self._scene.engine.bodies))
+        self._robot_bodies = [index for index in solids if self._scene.carrier(index).robot == robot]
         self._pairs, rows = self._scene.solid_pairs, self._scene.solid_rows.tolist()
         is_alone = np.array([not _moving_robots(self._scene, row, but=robot) for row in rows], dtype=bool)
         self._alone, self._others = np.flatnonzero(is_alone), np.flatnonzero(~is_alone)
@@ -141,11 +142,6 @@ class _Table:
         if reading.bound <= APART_TOL and is_inside(engine, pair, poses, sample=sample):
             return True
         return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
-
-
-def _solids(scene: Scene) -> list[str | None]:
-    """The robot that moves each of the engine's bodies."""
-    return [scene.carrier(index).robot for index in range(len(scene.engine.bodies))]
 
 
 def _moving_robots(scene: Scene, row: int, *, but: str) -> set[str]:

@@ -73,7 +73,6 @@ def certify_regions(
     regions: Sequence[ClockRegion],
     *,
     with_minimum: bool = False,
-    progress: Callable[[float], object] | None = None,
 ) -> tuple[RegionBound, ...]:
     """Bound the distance of all pairs of bodies of two robots in regions of their programs, one result a region.
 
@@ -93,12 +92,7 @@ def certify_regions(
     motion = FreeMotion(scene, q)
     for region in regions:
         _refuse(motion, region)
-    bounds = []
-    for count, region in enumerate(regions, start=1):
-        bounds.append(_RegionSearch(motion, region).run(with_minimum=with_minimum))
-        if progress is not None:
-            progress(count / len(regions))
-    return tuple(bounds)
+    return tuple(_RegionSearch(motion, region).run(with_minimum=with_minimum) for region in regions)
 
 
 def band(

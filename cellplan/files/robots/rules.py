@@ -115,15 +115,11 @@ def tightened(
         if cell.wraps:
             wider = [("wrap", "unexpected key, only a continuous joint of a URDF may turn without end")]
         findings += [document.finding((*path, "limits", joint.name, key), text) for key, text in wider]
-        joints.append(
-            joint if wider else _within(joint, tightest(joint_limits, cell), is_slowed=cell.velocity is not None)
-        )
+        if not wider:  # one whose velocity the cell limits keeps its rated velocity
+            rated = None if cell.velocity is None else joint.top_speed
+            joint = replace(joint, rated_velocity=rated, **rates_of(tightest(joint_limits, cell)))  # noqa: PLW2901
+        joints.append(joint)
     return replace(model, joints=tuple(joints)), findings
-
-
-def _within(joint: Joint, limits: StatedLimits, *, is_slowed: bool) -> Joint:
-    """The joint with tighter limits; one whose velocity the cell limits keeps its rated velocity."""
-    return replace(joint, rated_velocity=joint.top_speed if is_slowed else None, **rates_of(limits))
 
 
 def with_statements(entry: RobotEntry, model: RobotModel) -> RobotModel:

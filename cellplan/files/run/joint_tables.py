@@ -115,7 +115,8 @@ def parse_table(text: str, source: str) -> JointTable:
     numbers = _parse_rows(lines, columns.split(","), places)
     times = numbers[:, 0].copy()
     _check_clock(times, places)
-    return JointTable(robot=robot, joints=joints, times=times, q=_to_si(numbers[:, 1:], is_angle), gaps=gaps)
+    q = np.where(is_angle, np.deg2rad(numbers[:, 1:]), numbers[:, 1:] / MM_PER_M)
+    return JointTable(robot=robot, joints=joints, times=times, q=q, gaps=gaps)
 
 
 def row_place(text: str, source: str, row: int) -> str:
@@ -222,10 +223,6 @@ def _parse_columns(line: str, where: str) -> tuple[tuple[str, ...], Flags]:
         joints.append(joint)
         units.append(unit)
     return tuple(joints), np.array([unit == "deg" for unit in units])
-
-
-def _to_si(numbers: Array, is_angle: Flags) -> Array:
-    return np.where(is_angle, np.deg2rad(numbers), numbers / MM_PER_M)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

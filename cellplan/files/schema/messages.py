@@ -167,7 +167,8 @@ class _MessageReader:
             kind = MismatchKind.CHOICE if self.type == "literal_error" else MismatchKind.TYPE
             return about(kind=kind, expected=branch[1:-1], allowed=tuple(_words(branch[1:-1])))
         if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
-            return about(kind=MismatchKind.COUNT, at_least=self.context.get("min_length"), at_most=self._most_entries())
+            at_least, at_most = (self.context.get(key) for key in ("min_length", "max_length"))
+            return about(kind=MismatchKind.COUNT, at_least=at_least, at_most=at_most)
         if self.type == "string_pattern_mismatch":
             return about(kind=MismatchKind.NAME)
         if self.type in BOUNDS:
@@ -179,10 +180,6 @@ class _MessageReader:
             expected=expected,
             allowed=tuple(_words(expected)) if is_literal else (),
         )
-
-    def _most_entries(self) -> int | None:
-        """Largest number of entries, where there are too many."""
-        return self.context["max_length"] if self.type == "too_long" else None
 
     def _bound(self) -> Mismatch:
         """A number beyond its bound, or one that is not finite."""

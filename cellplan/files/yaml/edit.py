@@ -7,8 +7,10 @@ from typing import Any, Final
 
 import yaml
 
+from cellplan.errors import InputError
 from cellplan.files.input.findings import KeyPath
-from cellplan.files.yaml.writer import flow_text
+from cellplan.files.yaml.reader import parse_yaml
+from cellplan.files.yaml.writer import flow_text, yaml_text
 
 REMOVED: Final = object()  # in place of a value: the key is removed
 Edit = tuple[int, int, int, str]  # begin and end of what is replaced, rank among edits at one place, the new text
@@ -25,6 +27,23 @@ class _Node:
     span: tuple[int, int]  # likewise of the value; of a block only up to its last entry
     is_block: bool = False  # whether it is a mapping or list with an entry to a line
     children: list[KeyPath] = field(default_factory=list)  # the paths of its entries
+
+
+def changed_text(text: str, values: Mapping[str, Any], *, head: str) -> str:
+    """The text of a cell file with other values, each beside what it was, below comment lines of a head without ``#``.
+
+    Where the text cannot be edited in place, all values are written anew, without its comments.
+    """
+    top = "".join(f"# {line}\n" for line in head.splitlines())
+    plain = text.removeprefix("\ufeff").replace("\r\n", "\n")
+    before = parse_yaml(plain.encode(), file="cell").root
+    try:
+        edited = edited_text(plain, dict(_changes(before, values, ())))
+        if parse_yaml(edited.encode(), file="cell").root == values:
+            return top + edited
+    except (InputError, KeyError, ValueError):
+        pass
+    return top + yaml_text(values)
 
 
 def edited_text(text: str, values: Mapping[KeyPath, object]) -> str:
@@ -70,7 +89,7 @@ def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int]
         return node
     end, places, is_mapping = node.span[1], 0, isinstance(event, yaml.MappingStartEvent)
     entry: Any
-    while not _ends(entry := next(events)):
+    while not isinstance(entry := next(events), yaml.CollectionEndEvent):
         child, where = entry, (entry.start_mark.index, entry.end_mark.index)
         step: str | int = places
         if is_mapping:
@@ -81,11 +100,6 @@ def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int]
     node.is_block = not event.flow_style
     node.span = (node.span[0], end if node.is_block else entry.end_mark.index)
     return node
-
-
-def _ends(event: object) -> bool:
-    """Whether an event ends a mapping or list."""
-    return isinstance(event, yaml.CollectionEndEvent)
 
 
 def _insertion(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath, value: object) -> Edit:
@@ -138,3 +152,26 @@ def _shown(old: str) -> str:
     """An old value on one line, short."""
     plain = " ".join(old.split())
     return plain if len(plain) <= SHOWN else f"{plain[:SHOWN]}…"
+
+
+def _changes(old: Any, new: Any, path: KeyPath) -> Iterator[tuple[KeyPath, object]]:
+    """New values by key path, as deep as mappings and lists of entries have a value to compare with."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping) and new:
+        for key in old:
+            if key in new:
+                yield from _changes(old[key], new[key], (*path, key))
+            else:
+                yield (*path, key), REMOVED
+        for key in new:
+            if key not in old:
+                yield (*path, key), new[key]
+    elif _are_entries(old) and _are_entries(new) and len(old) == len(new):
+        for index, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from _changes(one, other, (*path, index))
+    elif old != new:
+        yield path, new
+
+
+def _are_entries(value: Any) -> bool:
+    """Whether a value is a list of mappings."""
+    return isinstance(value, tuple) and all(isinstance(item, Mapping) for item in value)

@@ -1,7 +1,7 @@
 """Triangle meshes as surfaces: made of loose triangles by welding, with lost area accounted for and outside outside."""
 
 from itertools import product
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,8 @@ def make_mesh(vertices: Array, faces: Indices, *, source: str) -> Mesh:
     if is_closed:
         with_area = turn_outward(welded, with_area, source=source)
     used, compact = np.unique(with_area, return_inverse=True)
-    return Mesh(vertices=welded[used], faces=_as_faces(compact), source=source, is_closed=is_closed)
+    corners = np.ascontiguousarray(compact, dtype=np.int64).reshape(-1, 3)
+    return Mesh(vertices=welded[used], faces=corners, source=source, is_closed=is_closed)
 
 
 def mesh_volume(mesh: Mesh) -> float:
@@ -133,8 +134,3 @@ def _has_area(vertices: Array, faces: Indices) -> NDArray[np.bool_]:
     double_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     longest = np.sum((corner - np.roll(corner, -1, axis=1)) ** 2, axis=2).max(axis=1, initial=0.0)
     return double_area > AREA_FRACTION * longest
-
-
-def _as_faces(indices: NDArray[Any]) -> FaceArray:
-    """Index array in the form that meshes keep."""
-    return np.ascontiguousarray(indices, dtype=np.int64).reshape(-1, 3)

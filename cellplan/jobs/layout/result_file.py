@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
-from cellplan.files.cell.changed_text import changed_text
 from cellplan.files.input.files import digest, read_regular_file
+from cellplan.files.yaml.edit import changed_text
 from cellplan.model.cell.cell import Cell
 
 BEST: Final = "best.yaml"

@@ -1,7 +1,6 @@
 """Joint spline: the joints of one robot over the whole common clock as a B-spline, at rest at both ends."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -56,18 +55,13 @@ class JointSpline:
     @property
     def knots(self) -> Array:
         """Shares of the clock at which two polynomials meet, the ends left out, shape (K,)."""
-        return self._basis.inner_knots
+        return _functions(len(self.coefficients), self.degree).inner_knots
 
     def at(self, shares: Array, derivative: int = 0) -> Array:
         """Configurations, or their derivatives by the share, at shares of the clock of shape (N,); shape (N, n)."""
         if derivative:
             return basis(shares, len(self.coefficients), self.degree, derivative) @ self.coefficients
         return self.start + basis(shares, len(self.coefficients), self.degree) @ (self.coefficients - self.start)
-
-    @cached_property
-    def _basis(self) -> UniformBSpline:
-        """The functions before the ends are counted together."""
-        return _functions(len(self.coefficients), self.degree)
 
 
 def basis(shares: Array, count: int, degree: int, derivative: int = 0) -> Array:

@@ -79,11 +79,8 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
 
     Without a choice these are all whose controller plays it; ``InputError`` where there is none, or no such robot.
     """
-    names = [robot.name for robot in cell.robots]
-    for name in chosen:
-        if name not in names:
-            raise InputError(f"--robot: expected one of {listed(names)}, got '{name}'{did_you_mean(name, names)}")
-    requested = [name for name in names if not chosen or name in chosen]
+    refuse_unknown_robots(cell, chosen)
+    requested = [robot.name for robot in cell.robots if not chosen or robot.name in chosen]
     if not dialect.kinds:
         return tuple(requested)
     playing = tuple(name for name in requested if _plays(cell, dialect, name))
@@ -91,6 +88,14 @@ def exported_robots(cell: Cell, dialect: Dialect, chosen: Sequence[str]) -> tupl
     if missing and (chosen or not playing):
         raise_findings([InputError(_not_played(cell, dialect, name)) for name in missing])
     return playing
+
+
+def refuse_unknown_robots(cell: Cell, chosen: Sequence[str]) -> None:
+    """Refuse robots that the cell does not have, which no format could write."""
+    names = [robot.name for robot in cell.robots]
+    for name in chosen:
+        if name not in names:
+            raise InputError(f"--robot: expected one of {listed(names)}, got '{name}'{did_you_mean(name, names)}")
 
 
 def _plays(cell: Cell, dialect: Dialect, robot: str) -> bool:

@@ -7,11 +7,11 @@ from typing import Any, Final
 
 from cellplan.cache import without_cache
 from cellplan.errors import InputError, NotVerifiedError
-from cellplan.files.input.findings import did_you_mean, listed
+from cellplan.files.input.findings import listed
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.programs.elements.dialect import Dialect
-from cellplan.programs.export.choice import Choice
+from cellplan.programs.export.choice import Choice, refuse_unknown_robots
 from cellplan.programs.export.prepare import refuse_unfit
 from cellplan.programs.export.program import (
     EXPORTERS,
@@ -88,7 +88,7 @@ def export_programs(
     """
     chosen = chosen_formats(formats)
     refuse_unless_writable([folder / form for form in chosen], run.folder)
-    _refuse_unknown(run, choice.robots)
+    refuse_unknown_robots(run.cell, choice.robots)
     with without_cache():  # a proof rests on the files themselves
         return tuple(_exports(Shared(run), folder, chosen, choice, progress))
 
@@ -117,7 +117,7 @@ def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, 
         NotVerifiedError: No promise of the only format can be kept with this motion.
         NothingFitsError: One of these holds of each of several formats.
     """
-    _refuse_unknown(run, choice.robots)
+    refuse_unknown_robots(run.cell, choice.robots)
     refused: list[Exported] = []
     for form, is_named in formats.items():
         dialect = EXPORTERS[form]
@@ -157,11 +157,3 @@ def _exports(
 def _of(form: str, progress: Progress) -> Progress:
     """Progress that names the format."""
     return lambda stage, share: progress(f"{form}: {stage}", share)
-
-
-def _refuse_unknown(run: VerifiedRun | ReadRun, robots: Sequence[str]) -> None:
-    """Refuse robots that the cell does not have, which no format could write."""
-    names = [robot.name for robot in run.cell.robots]
-    for name in robots:
-        if name not in names:
-            raise InputError(f"--robot: expected one of {listed(names)}, got '{name}'{did_you_mean(name, names)}")

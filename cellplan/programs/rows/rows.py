@@ -1,6 +1,6 @@
 """Rows of a verified run as an exported program starts from them: positions, times, speeds and process."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +40,9 @@ class EssentialRows(NamedTuple):
     work: tuple[WorkRows, ...]  # the phases of the program
 
 
-def full_rows(run: VerifiedRun, robots: Collection[str] | None = None) -> tuple[ProgramRows, ...]:
-    """All rows, without marks, of every program of a run; of all its robots when ``robots`` is None."""
-    names = [robot.name for robot in run.cell.robots if robots is None or robot.name in robots]
+def full_rows(run: VerifiedRun) -> tuple[ProgramRows, ...]:
+    """All rows, without marks, of every program of a run."""
+    names = [robot.name for robot in run.cell.robots]
     plan = run.motion.plan
     return tuple(
         ProgramRows(

@@ -87,13 +87,13 @@ class Engine:
 
     def proposed_direction(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[float, Array]:
         """FCL's distance in [m] between the hulls of two bodies and the direction from first to second: unproven."""
-        distance, result = self._nearest("hull", (first, second), poses, sample)
+        distance, result = _nearest(self, "hull", (first, second), poses, sample)
         p, q = result.nearest_points
         return distance, np.subtract(q, p)
 
     def proposed_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array]:
         """FCL's nearest points of the hulls of two bodies in the world, shape (3,) each: unproven."""
-        p, q = self._nearest("hull", (first, second), poses, sample)[1].nearest_points
+        p, q = _nearest(self, "hull", (first, second), poses, sample)[1].nearest_points
         return np.array(p), np.array(q)
 
     def surface_points(self, first: int, second: int, poses: BodyPoses, *, sample: int) -> tuple[Array, Array] | None:
@@ -101,7 +101,7 @@ class Engine:
 
         Exact but slow.
         """
-        distance, result = self._nearest("core", (first, second), poses, sample)
+        distance, result = _nearest(self, "core", (first, second), poses, sample)
         p, q = (np.array(point) for point in result.nearest_points)
         inner, outer = self.bodies[first].inflation, self.bodies[second].inflation
         if not distance > inner + outer:
@@ -117,13 +117,6 @@ class Engine:
         if not np.isfinite(distance):
             raise CellplanError(NO_ANSWER.format(self.bodies[first].name, self.bodies[second].name))
         return max(0.0, distance - self.bodies[first].inflation - self.bodies[second].inflation)
-
-    def _nearest(self, kind: str, pair: tuple[int, int], poses: BodyPoses, sample: int) -> tuple[float, Any]:
-        """FCL's distance in [m] between the hulls or cores of two bodies, and its result with the nearest points."""
-        self.queries.distances += 1
-        a, b = (self._placed(kind, index, poses, sample) for index in pair)
-        result = fcl.DistanceResult()
-        return float(fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)), result
 
     def _placed(self, kind: str, index: int, poses: BodyPoses, sample: int) -> Any:
         """FCL's object for the solid, hull or core of a body, moved to its pose."""
@@ -142,13 +135,21 @@ class Engine:
         return fcl.CollisionObject(_geometry(body.core if kind == "core" else body.shape))
 
 
+def _nearest(engine: Engine, kind: str, pair: tuple[int, int], poses: BodyPoses, sample: int) -> tuple[float, Any]:
+    """FCL's distance in [m] between the hulls or cores of two bodies, and its result with the nearest points."""
+    engine.queries.distances += 1
+    a, b = (engine._placed(kind, index, poses, sample) for index in pair)
+    result = fcl.DistanceResult()
+    return float(fcl.distance(a, b, fcl.DistanceRequest(enable_nearest_points=True), result)), result
+
+
 def nearest_triangle(engine: Engine, mesh: int, other: int, poses: BodyPoses, *, sample: int) -> tuple[int, Array]:
     """The triangle of a mesh that is nearest to another body, and the vector to that body in [m], shape (3,).
 
     Where an edge is nearest, it is any of its triangles. The vector is zero between bodies that touch: FCL's nearest
     points are none there.
     """
-    distance, result = engine._nearest("core", (mesh, other), poses, sample)
+    distance, result = _nearest(engine, "core", (mesh, other), poses, sample)
     p, q = result.nearest_points
     return int(result.b1), np.subtract(q, p) if distance > 0.0 else np.zeros(3)
 

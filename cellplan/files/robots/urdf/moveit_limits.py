@@ -17,6 +17,7 @@ ABOVE: Final = "robot_description_planning"  # a key that some files have above 
 TOP: Final = "joint_limits"
 RATES: Final = ("velocity", "acceleration", "deceleration", "jerk")
 ENDS: Final = ("min_position", "max_position")
+KNOWN: Final = {*ENDS, *(f"max_{name}" for name in RATES), *(f"has_{name}_limits" for name in ("position", *RATES))}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +43,7 @@ def read_moveit_limits(path: Path, file: str) -> MoveitLimits:
         findings += _findings((*top, name), entry, document)
     raise_findings(file, findings)
     unused = {key for key in document.root if key not in (ABOVE, TOP)}
-    unused |= {key for entry in entries.values() for key in entry if key not in _known_keys()}
+    unused |= {key for entry in entries.values() for key in entry if key not in KNOWN}
     joints = {name: _limits(entry) for name, entry in entries.items()}
     return MoveitLimits(file=file, joints=joints, unused=tuple(sorted(unused)))
 
@@ -115,10 +116,3 @@ def _findings(path: KeyPath, entry: Mapping[str, Any], document: YamlDocument) -
                 yield document.finding((*path, key), f"expected {what}, got {shown(value)}")
             if flag is True and key not in entry:
                 yield document.finding(path, f"states has_{name}_limits: true, but no {key}")
-
-
-def _known_keys() -> frozenset[str]:
-    """Keys of a joint that are limits here."""
-    return frozenset(
-        {*ENDS, *(f"max_{name}" for name in RATES), *(f"has_{name}_limits" for name in ("position", *RATES))}
-    )

@@ -121,7 +121,8 @@ def stated_controller(frame: ExportFrame, robot: Robot) -> ControllerEntry | Non
 def _axis_record(axis: StreamAxis, quanta: NDArray[np.int64], *, decimals: int, cycle: int) -> dict[str, Written]:
     """Start, range and peaks of one column, all of them of the written numbers."""
     tick, seconds, start = 10.0**-decimals, cycle / MICRO, int(quanta[0])
-    peaks = [_peak(np.diff(quanta, n=order)) * tick / seconds**order for order in (1, 2, 3)]
+    largest = [int(np.abs(np.diff(quanta, n=order)).max(initial=0)) for order in (1, 2, 3)]
+    peaks = [change * tick / seconds**order for order, change in enumerate(largest, start=1)]
     return {
         "axis": axis.name,
         "joint": axis.joint.name,
@@ -133,8 +134,3 @@ def _axis_record(axis: StreamAxis, quanta: NDArray[np.int64], *, decimals: int, 
         "peak_per_s2": Raw(fixed(peaks[1], FIGURES)),
         "peak_per_s3": Raw(fixed(peaks[2], FIGURES)),
     }
-
-
-def _peak(changes: NDArray[np.int64]) -> int:
-    """Largest change without its sign."""
-    return int(np.abs(changes).max(initial=0))

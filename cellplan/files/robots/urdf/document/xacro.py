@@ -299,7 +299,7 @@ def _restore(owner: Any, name: str, value: object) -> None:
 def _element(node: minidom.Element, file: str, depth: int = 1) -> Element:
     """An expanded element with all below it."""
     place = node.getUserData(PLACE) or (file, 0)
-    attributes = {name: _with_packages(value) for name, value in node.attributes.items()}
+    attributes = {name: PACKAGE_PATH.sub("package://", value) for name, value in node.attributes.items()}
     element = Element(node.tagName, attributes, *place)
     if depth > MAX_DEPTH:
         raise element.error(f"expected at most {MAX_DEPTH} nested elements")
@@ -307,11 +307,6 @@ def _element(node: minidom.Element, file: str, depth: int = 1) -> Element:
         if isinstance(child, minidom.Element):
             element.children.append(_element(child, file, depth + 1))
     return element
-
-
-def _with_packages(text: str) -> str:
-    """A text in which files of packages are named as URDFs do."""
-    return PACKAGE_PATH.sub("package://", text)
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
