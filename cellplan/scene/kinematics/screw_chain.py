@@ -82,22 +82,6 @@ class ScrewChain:
         """
         return self._screws(self.link_displacements(q))
 
-    def axis_screws(self, D: Array) -> Array:
-        """Twist that unit speed of each axis, followers included, gives what it carries, shape (N, axes, 6).
-
-        Displacements are those of ``link_displacements``, twists as in ``flange_screws``.
-        """
-        if not self._axes:
-            return np.zeros((len(D), 0, 6))
-        carriers = D[:, [axis.parent + 1 for axis in self._axes]]
-        axes, points = (
-            np.array(part) for part in zip(*((axis.axis_B, axis.point_B) for axis in self._axes), strict=True)
-        )
-        s = (carriers[..., :3, :3] @ axes[..., None])[..., 0]
-        s0 = (carriers[..., :3, :3] @ points[..., None])[..., 0] + carriers[..., :3, 3]
-        is_revolute = np.array([axis.is_revolute for axis in self._axes])[:, None]
-        return np.concatenate([np.where(is_revolute, np.cross(s0, s), s), np.where(is_revolute, s, 0.0)], axis=-1)
-
     def tool_motion(self, q: Array) -> tuple[Array, Array]:
         """`tool_poses` and `flange_screws` at once, for searches that need both many times."""
         D, screws = np.tile(self._X_WB, (len(q), 1, 1)), np.zeros((len(q), 6, self._n))
