@@ -1,10 +1,7 @@
-"""Mismatches between a file and its format: pydantic's findings as data, located in the file."""
+"""Mismatches between a file and its format: pydantic's findings in words, located in the file."""
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import StrEnum
-from functools import partial
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin
 
@@ -39,9 +36,8 @@ def validate(model: type[AnyEntry], document: YamlDocument) -> tuple[AnyEntry | 
         return model.model_validate(document.root), []
     except ValidationError as error:
         findings = error.errors(include_url=False, include_context=True, include_input=False)
-    mismatches = [_MessageReader(model, document, dict(finding)).mismatch() for finding in findings[:FINDING_LIMIT]]
-    located = [_located(mismatch, document) for mismatch in mismatches if mismatch is not None]
-    return None, list(dict.fromkeys(located))
+    located = [_MessageReader(model, document, dict(finding)).finding() for finding in findings[:FINDING_LIMIT]]
+    return None, [finding for finding in dict.fromkeys(located) if finding is not None]
 
 
 def valid_entry(model: type[AnyEntry], document: YamlDocument, path: KeyPath) -> AnyEntry | None:
@@ -60,52 +56,6 @@ def value_at(root: Any, path: KeyPath) -> Any:
         except (KeyError, IndexError, TypeError):
             return None
     return root
-
-
-class MismatchKind(StrEnum):
-    """What is wrong with a value of a file."""
-
-    UNKNOWN_KEY = "unknown key"
-    MISSING = "missing"
-    NAME = "name"  # of an entry
-    TYPE = "type"
-    CHOICE = "choice"  # none of the words that are allowed
-    BOUND = "bound"  # of a number
-    COUNT = "count"  # of entries
-    RULE = "rule"  # between several keys; brings its own text
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mismatch:
-    """A value that the format does not allow, as data; `mismatch_text` renders it."""
-
-    kind: MismatchKind  # what is wrong
-    path: KeyPath  # key path of the value
-    expected: str = ""  # what may stand there, as a phrase; the whole text of a rule
-    allowed: tuple[str, ...] = ()  # words or keys that may stand there
-    at_least: float | None = None  # lower bound of a number or of a count; None without one
-    at_most: float | None = None  # upper bound; None without one
-    is_positive: bool = False  # whether the lower bound reads as "positive"
-    unit: str = ""  # unit of a number, as in "of millimetres"; empty without one
-    got: Any = None  # the value that was found
-
-    @property
-    def is_at_key(self) -> bool:
-        """Whether the key is wrong rather than its value."""
-        unexpected = self.kind is MismatchKind.RULE and self.expected.startswith("unexpected key")
-        return (
-            unexpected
-            or self.kind is MismatchKind.UNKNOWN_KEY
-            or (self.kind is MismatchKind.NAME and self.got is self.path[-1])
-        )
-
-
-def _located(mismatch: Mismatch, document: YamlDocument) -> Finding:
-    """A mismatch as a line of the file: at its key when the key is wrong, else at its value."""
-    text = mismatch_text(mismatch)
-    if mismatch.is_at_key:
-        return document.key_finding(mismatch.path, text)
-    return document.finding(mismatch.path, text)
 
 
 class _MessageReader:
@@ -128,72 +78,75 @@ class _MessageReader:
         """The value at the place of the finding."""
         return value_at(self.document.root, self.path)
 
-    def mismatch(self) -> Mismatch | None:
-        """The finding as data; None when another one about the same value says more."""
+    def finding(self) -> Finding | None:
+        """The finding in words, at its line: that of the key where the key is wrong, else of the value.
+
+        None when another one about the same value says more.
+        """
+        at_value, at_key = self.document.finding, self.document.key_finding
         if any(self.path[: n + 1] in self.document.unreadable for n in range(len(self.path))):
             return None
         if self.is_key and self.type != "rule":
-            return Mismatch(kind=MismatchKind.NAME, path=self.path, got=self.path[-1])
+            return at_key(self.path, f"expected {NAME_WORDS}, got {shown(self.path[-1])}")
         if self.type == "extra_forbidden":
-            allowed = fields_of(annotation_at(self.model, self.location[:-1]))
-            return Mismatch(kind=MismatchKind.UNKNOWN_KEY, path=self.path, allowed=tuple(allowed))
+            allowed = tuple(fields_of(annotation_at(self.model, self.location[:-1])))
+            hint = did_you_mean(str(self.path[-1]), allowed)
+            return at_key(self.path, f"unknown key{hint}; allowed: {listed(allowed)}")
         if self.type == "rule":
-            below = re.findall(r"[^.\[\]]+", self.context["key"])
+            text, below = self.context["text"], re.findall(r"[^.\[\]]+", self.context["key"])
             path = (*self.path, *(int(key) if key.isdigit() else key for key in below))
-            return Mismatch(kind=MismatchKind.RULE, path=path, expected=self.context["text"])
+            return (at_key if text.startswith("unexpected key") else at_value)(path, text)
         if self.type == "too_short" and len(self.value) >= self.context["min_length"]:
             return None  # short only of entries that are wrong themselves
-        return self._missing() if self.type == "missing" else self._about_value()
+        return self._missing() if self.type == "missing" else at_value(self.path, self._about_value())
 
-    def _missing(self) -> Mismatch:
+    def _missing(self) -> Finding:
         """A key or an element of a list of fixed length that is absent."""
         if isinstance(self.path[-1], int):
-            got = value_at(self.document.root, self.path[:-1])
-            return Mismatch(
-                kind=MismatchKind.TYPE, path=self.path[:-1], expected=self._type(self.location[:-1]), got=got
-            )
+            path = self.path[:-1]
+            got = shown(value_at(self.document.root, path))
+            return self.document.finding(path, f"expected {self._type(self.location[:-1])}, got {got}")
         fields = fields_of(annotation_at(self.model, self.location[:-1]))
         words = (fields[str(self.location[-1])].description or "a value").rstrip(".")
         expected = words if words[:2].isupper() else words[:1].lower() + words[1:]
-        return Mismatch(kind=MismatchKind.MISSING, path=self.path, expected=expected)
+        return self.document.finding(self.path, f"missing, expected {expected}")
 
-    def _about_value(self) -> Mismatch:
-        """A value that is not allowed."""
-        about = partial(Mismatch, path=self.path, got=self.value)
+    def _about_value(self) -> str:
+        """What is expected instead of a value that is not allowed, what was found, and the nearest allowed word."""
+        value, hint = self.value, ""
+        if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
+            got = str(len(value)) if isinstance(value, dict | tuple) else shown(value)
+            return f"expected {self._count()}, got {got}"
+        expected = self._expected()
+        if self.type == "literal_error" and isinstance(value, str):
+            hint = did_you_mean(value, _words(expected))
+        return f"expected {expected}, got {shown(value)}{hint}"
+
+    def _expected(self) -> str:
+        """The values allowed at the place, as a phrase."""
         branch = str(self.location[-1]) if self.location else ""
         if self.type == "choice":
-            return about(kind=MismatchKind.TYPE, expected=self.text)
+            return self.text
         if TAG.fullmatch(branch) and self.type in {"literal_error", "string_type"}:
-            kind = MismatchKind.CHOICE if self.type == "literal_error" else MismatchKind.TYPE
-            return about(kind=kind, expected=branch[1:-1], allowed=tuple(_words(branch[1:-1])))
-        if self.type in COUNTS and not _is_fixed_list(annotation_at(self.model, self.location)):
-            at_least, at_most = (self.context.get(key) for key in ("min_length", "max_length"))
-            return about(kind=MismatchKind.COUNT, at_least=at_least, at_most=at_most)
+            return branch[1:-1]
         if self.type == "string_pattern_mismatch":
-            return about(kind=MismatchKind.NAME)
-        if self.type in BOUNDS:
-            return self._bound()
-        expected = self._type(self.location)
-        is_literal = self.type == "literal_error"
-        return about(
-            kind=MismatchKind.CHOICE if is_literal else MismatchKind.TYPE,
-            expected=expected,
-            allowed=tuple(_words(expected)) if is_literal else (),
-        )
+            return NAME_WORDS
+        return self._bound() if self.type in BOUNDS else self._type(self.location)
 
-    def _bound(self) -> Mismatch:
-        """A number beyond its bound, or one that is not finite."""
-        lower = self.context.get("gt", self.context.get("ge"))
-        is_positive = lower is not None and lower >= 0.0 >= self.value and not (lower == 0.0 and "ge" in self.context)
-        return Mismatch(
-            kind=MismatchKind.BOUND,
-            path=self.path,
-            at_least=lower,
-            at_most=self.context.get("le", self.context.get("lt")),
-            is_positive=is_positive,
-            unit=self._unit(),
-            got=self.value,
-        )
+    def _count(self) -> str:
+        """How many entries there may be."""
+        least = self.context.get("min_length")
+        side, bound = ("most", self.context.get("max_length")) if least is None else ("least", least)
+        return f"at {side} {bound} {'entry' if bound == 1 else 'entries'}"
+
+    def _bound(self) -> str:
+        """The numbers within bounds, or those that are finite."""
+        lower, upper = (self.context.get(key, self.context.get(other)) for key, other in (("gt", "ge"), ("le", "lt")))
+        number = f"number{self._unit()}"
+        if lower is not None:
+            is_positive = lower >= 0.0 >= self.value and not (lower == 0.0 and "ge" in self.context)
+            return f"a positive {number}" if is_positive else f"a {number} of at least {shown(lower)}"
+        return f"a finite {number}" if upper is None else f"a {number} of at most {shown(upper)}"
 
     def _unit(self) -> str:
         """`` of millimetres``, from the ending of the nearest key."""
@@ -282,35 +235,3 @@ def _phrase(annotation: Any) -> str:
         return f"a mapping with keys out of {', '.join(fields)}"
     kinds = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
     return kinds.get(annotation, "a mapping")
-
-
-def mismatch_text(mismatch: Mismatch) -> str:
-    """A mismatch as text: what is expected, what was found, and the nearest allowed word."""
-    if mismatch.kind is MismatchKind.RULE:
-        return mismatch.expected
-    if mismatch.kind is MismatchKind.MISSING:
-        return f"missing, expected {mismatch.expected}"
-    if mismatch.kind is MismatchKind.UNKNOWN_KEY:
-        hint = did_you_mean(str(mismatch.path[-1]), mismatch.allowed)
-        return f"unknown key{hint}; allowed: {listed(mismatch.allowed)}"
-    counted = mismatch.kind is MismatchKind.COUNT and isinstance(mismatch.got, dict | tuple)
-    got = str(len(mismatch.got)) if counted else shown(mismatch.got)
-    is_word = mismatch.kind is MismatchKind.CHOICE and isinstance(mismatch.got, str)
-    hint = did_you_mean(mismatch.got, mismatch.allowed) if is_word else ""
-    return f"expected {_expected_text(mismatch)}, got {got}{hint}"
-
-
-def _expected_text(mismatch: Mismatch) -> str:
-    """The values allowed at the place of a mismatch, as a phrase."""
-    if mismatch.kind is MismatchKind.NAME:
-        return NAME_WORDS
-    bound = mismatch.at_most if mismatch.at_least is None else mismatch.at_least
-    side = "most" if mismatch.at_least is None else "least"
-    if mismatch.kind is MismatchKind.COUNT:
-        return f"at {side} {bound} {'entry' if bound == 1 else 'entries'}"
-    if mismatch.kind is not MismatchKind.BOUND:
-        return mismatch.expected
-    number = f"number{mismatch.unit}"
-    if mismatch.is_positive:
-        return f"a positive {number}"
-    return f"a finite {number}" if bound is None else f"a {number} of at {side} {shown(bound)}"
