@@ -25,7 +25,7 @@ from cellplan.certify.lever_arms import LeverArms
 from cellplan.certify.run_pairs import scene_of_rows, scene_of_run
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.units import MM
-from cellplan.scene.collision.distance import APART_TOL, exact_reading, measure, quick_reading
+from cellplan.scene.collision.distance import APART_TOL, is_nearer, measure
 from cellplan.scene.collision.overlap.containment import is_inside
 from cellplan.scene.collision.overlap.depth import overlap_depth
 from cellplan.scene.collision.overlap.sunk_points import SUNK_TOL
@@ -88,8 +88,6 @@ def scene_at_stop(scene: Scene) -> Scene:
 
     The full distance is demanded of every tool and the part, and what of a tool lies outside its contact zone must not
     touch the part.
-
-    What of a tool lies outside its contact zone must not touch the part besides.
     """
     clear = scene_of_run(scene, ())
     outside = [
@@ -105,20 +103,16 @@ def rows_too_near(scene: Scene, q: Array) -> list[int]:
     poses, engine = scene.body_poses(q[None]), scene.engine
     centres, near_rows = engine.sphere_centres(poses, sample=0), []
     for row, pair in enumerate(scene.pairs):
-        demand = _demand(pair)
         if pair.is_ground:
-            is_near = float(scene.ground_heights(pair, poses)[0]) < demand
+            is_near = float(scene.ground_heights(pair, poses)[0]) < pair.least_distance
         elif pair.solids is None:
             continue
         else:
             first, second = pair.solids
             gap = float(np.linalg.norm(centres[first] - centres[second])) - engine.radii[first] - engine.radii[second]
-            if gap >= demand:
-                continue
-            reading = quick_reading(engine, pair.solids, poses, sample=0)
-            if not reading.touches and reading.bound < demand:
-                reading = exact_reading(engine, pair.solids, poses, sample=0, reading=reading)
-            is_near = reading.touches or reading.bound < demand or is_inside(engine, pair.solids, poses, sample=0)
+            is_near = gap < pair.least_distance and is_nearer(
+                engine, pair.solids, poses, sample=0, limit=pair.least_distance
+            )
         if is_near:
             near_rows.append(row)
     return near_rows
@@ -169,7 +163,8 @@ class _Separation:
 
     def __init__(self, scene: Scene, row: int, q: Array, *, is_sampled: bool = False) -> None:
         self._pair, self._q, self._scene = scene.pairs[row], q, scene_of_rows(scene, [row])
-        self._is_sampled, self._demand = is_sampled, _demand(self._pair)
+        self._is_sampled = is_sampled
+        self._demand = self._pair.demand if self._pair.rule is Rule.CLEARANCE else APART_TOL
         self._reach = _reach(scene, self._pair, q)
         self._begin = float(signed_distances(scene, self._pair, q[:1])[0])
         depth = max(0.0, -self._begin)
@@ -269,11 +264,6 @@ class _Separation:
         pair = replace(self._pair, rule=Rule.CLEARANCE, demand=max(APART_TOL, demand))
         scene = replace(self._scene, pairs=(pair,))
         return certify(scene, self._q[first : last + 1], with_minimum=False).is_met
-
-
-def _demand(pair: ScenePair) -> float:
-    """Distance in [m] that a pair is to keep: where only contact is forbidden, more than rounding."""
-    return pair.demand if pair.rule is Rule.CLEARANCE else APART_TOL
 
 
 def _reach(scene: Scene, pair: ScenePair, q: Array) -> Array:

@@ -13,10 +13,7 @@ import numpy as np
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.report import ClearanceClass
 from cellplan.scene.collision.bodies import BodyPoses
-from cellplan.scene.collision.continuous.motion_bound import Pair
-from cellplan.scene.collision.distance import APART_TOL, exact_reading, quick_reading
-from cellplan.scene.collision.overlap.containment import is_inside
-from cellplan.scene.pairs import Rule
+from cellplan.scene.collision.distance import is_nearer
 from cellplan.scene.scene import Scene
 
 
@@ -70,7 +67,7 @@ class _Table:
         self._pairs, rows = self._scene.solid_pairs, self._scene.solid_rows.tolist()
         is_alone = np.array([not _moving_robots(self._scene, row, but=robot) for row in rows], dtype=bool)
         self._alone, self._others = np.flatnonzero(is_alone), np.flatnonzero(~is_alone)
-        self._demanded = np.array([self._limit(row) for row in rows])
+        self._demanded = np.array([self._scene.pairs[row].least_distance for row in rows])
         is_part = np.array([self._scene.pairs[row].clearance_class is ClearanceClass.PART for row in rows], dtype=bool)
         self._has_extra, self._limits = ~is_alone | is_part, self._demanded
         self._q = run.q
@@ -110,14 +107,10 @@ class _Table:
                 return self._scene.names(self._scene.pairs[row])
         return None
 
-    def _limit(self, row: int) -> float:
-        """Distance in [m] that a pair is to keep."""
-        pair = self._scene.pairs[row]
-        return max(APART_TOL, pair.demand) if pair.rule is Rule.CLEARANCE else APART_TOL
-
     def _on_ground(self, poses: BodyPoses) -> int | None:
         for row in self._scene.ground_rows.tolist():
-            if self._scene.ground_heights(self._scene.pairs[row], poses)[0] < self._limit(row):
+            pair = self._scene.pairs[row]
+            if self._scene.ground_heights(pair, poses)[0] < pair.least_distance:
                 return int(row)
         return None
 
@@ -129,19 +122,9 @@ class _Table:
         reach = engine.radii[pairs[:, 0]] + engine.radii[pairs[:, 1]] + self._limits[places]
         for place in places[np.einsum("ij,ij->i", apart, apart) <= reach**2]:
             pair = (int(self._pairs[place, 0]), int(self._pairs[place, 1]))
-            if self._is_too_near(pair, poses, sample, float(self._limits[place])):
+            if is_nearer(engine, pair, poses, sample=sample, limit=float(self._limits[place])):
                 return int(self._scene.solid_rows[place])
         return None
-
-    def _is_too_near(self, pair: Pair, poses: BodyPoses, sample: int, limit: float) -> bool:
-        """Whether two bodies touch, or are nearer than they may be."""
-        engine = self._scene.engine
-        reading = quick_reading(engine, pair, poses, sample=sample)
-        if reading.touches or reading.bound >= limit:
-            return reading.touches
-        if reading.bound <= APART_TOL and is_inside(engine, pair, poses, sample=sample):
-            return True
-        return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
 
 
 def _moving_robots(scene: Scene, row: int, *, but: str) -> set[str]:

@@ -18,7 +18,7 @@ from cellplan.certify.pair_state import SEARCH_TOL, PairState
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.report.report import ClearanceClass
 from cellplan.scene.collision.distance import APART_TOL
-from cellplan.scene.pairs import Rule, ScenePair
+from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
 MAX_BLOCKS: Final = 200  # stretches of the motion that have a bound of their own
@@ -57,7 +57,7 @@ class Survey:
         self.is_ignored = np.zeros(self.low.shape, dtype=bool)
         for row, (first, last) in parts.items():
             self.is_ignored[row] = (self.edges[:-1] < first) | (self.edges[1:] > last)
-        self.states = [_initial_state(pair) for pair in scene.pairs]
+        self.states = [PairState(demand=pair.least_distance) for pair in scene.pairs]
         self.at_surface: dict[int, tuple[int, int]] = {}
         self.at_work = [row for row, pair in enumerate(scene.pairs) if pair.rule is Rule.PROCESS]
         self._nearest = np.full(count, np.inf)  # smallest distance found in [m], zero where a pair touches
@@ -148,9 +148,3 @@ def _raised_demands(scene: Scene) -> Array:
     least of what is demanded of it; so every pair is searched up to its own demand.
     """
     return np.array([pair.demand if pair.rule is Rule.CLEARANCE else 0.0 for pair in scene.pairs])
-
-
-def _initial_state(pair: ScenePair) -> PairState:
-    """The state before anything is searched, with what is to be proved first."""
-    demand = pair.demand if pair.rule is Rule.CLEARANCE else 0.0
-    return PairState(demand=max(APART_TOL, demand))

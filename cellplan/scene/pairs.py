@@ -15,6 +15,7 @@ from cellplan.model.robot.robot import BASE
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.units import MM
 from cellplan.scene.bodies import Kind, SceneBody, is_ground
+from cellplan.scene.collision.distance import APART_TOL
 from cellplan.scene.link_tree import NO_BODY, LinkTree
 from cellplan.scene.mounting import Mount, grasp_of, keeps_out_of_grip, left_out_kind, mounted_pair
 
@@ -49,6 +50,11 @@ class ScenePair:
     demand: float = 0.0  # distance in [m] that a pair with the rule ``clearance`` is to keep
     samples: tuple[int, int] | None = None  # between which it is watched, two solids only; None for all of a motion
     where: str = ""  # where it must not touch, added to the words on a contact of it
+
+    @property
+    def least_distance(self) -> float:
+        """Distance in [m] that it is to keep: where only contact is forbidden, more than rounding."""
+        return max(APART_TOL, self.demand) if self.rule is Rule.CLEARANCE else APART_TOL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -15,7 +15,7 @@ import numpy as np
 from cellplan.certify.free_clocks.free_boxes import BoxBounds, Boxes, is_below
 from cellplan.certify.free_clocks.free_motion import FreeMotion
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.scene.collision.distance import APART_TOL, Reading
+from cellplan.scene.collision.distance import Reading
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
@@ -146,7 +146,7 @@ def watched_pairs(scene: Scene, first: str, second: str) -> RobotPairs:
         if set(carriers) == {first, second}:
             rows.append(row)
             ends.append((u, v) if carriers[0] == first else (v, u))
-            demands.append(max(APART_TOL, pair.demand) if pair.rule is Rule.CLEARANCE else APART_TOL)
+            demands.append(pair.least_distance)
     return RobotPairs(
         np.array(rows, dtype=np.intp),
         np.array(ends, dtype=np.intp).reshape(-1, 2),

@@ -89,7 +89,7 @@ def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int]
         return node
     end, places, is_mapping = node.span[1], 0, isinstance(event, yaml.MappingStartEvent)
     entry: Any
-    while not isinstance(entry := next(events), yaml.CollectionEndEvent):
+    while not _ends(entry := next(events)):
         child, where = entry, (entry.start_mark.index, entry.end_mark.index)
         step: str | int = places
         if is_mapping:
@@ -100,6 +100,11 @@ def _read(events: Iterator[Any], event: Any, path: KeyPath, key: tuple[int, int]
     node.is_block = not event.flow_style
     node.span = (node.span[0], end if node.is_block else entry.end_mark.index)
     return node
+
+
+def _ends(event: object) -> bool:
+    """Whether an event ends a mapping or list."""
+    return isinstance(event, yaml.CollectionEndEvent)
 
 
 def _insertion(text: str, nodes: Mapping[KeyPath, _Node], path: KeyPath, value: object) -> Edit:

@@ -61,6 +61,16 @@ def exact_reading(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sa
     return Reading(False, max(distance, reading.bound), True, reading.direction if reading.bound > 0.0 else None)
 
 
+def is_nearer(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int, limit: float) -> bool:
+    """Whether two bodies touch, lie in each other, or are nearer than a limit in [m], ``APART_TOL`` or more."""
+    reading = quick_reading(engine, pair, poses, sample=sample)
+    if reading.touches or reading.bound >= limit:
+        return reading.touches
+    if reading.bound <= APART_TOL and is_inside(engine, pair, poses, sample=sample):
+        return True
+    return exact_reading(engine, pair, poses, sample=sample, reading=reading).bound < limit
+
+
 def measure(engine: Engine, pair: tuple[int, int], poses: BodyPoses, *, sample: int) -> Reading:
     """Exact reading of two bodies."""
     return exact_reading(engine, pair, poses, sample=sample, reading=quick_reading(engine, pair, poses, sample=sample))
