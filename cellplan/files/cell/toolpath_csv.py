@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.errors import InputError
-from cellplan.files.input.files import read_regular_file
+from cellplan.files.input.files import read_regular_file, utf8_text
 from cellplan.files.input.findings import Finding, did_you_mean, kind_of, listed, raise_findings, shown
 from cellplan.geometry.arrays import Flags
 from cellplan.geometry.transforms import Array, quaternion_to_rotation
@@ -120,12 +120,7 @@ def read_toolpath_csv(
 
 def _read_text(path: Path, name: str) -> str:
     """Content of a regular file of sensible size, as text without control characters."""
-    data = read_regular_file(path, file=name, limit=MOST_BYTES)
-    try:
-        text = data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{name}:{line}: expected text in UTF-8, got byte 0x{data[error.start]:02x}") from None
+    text = utf8_text(read_regular_file(path, file=name, limit=MOST_BYTES), file=name)
     match = _CONTROL.search(text)
     if match:
         line = text.count("\n", 0, match.start()) + 1

@@ -26,6 +26,15 @@ def read_regular_file(path: Path, *, file: str, limit: int) -> bytes:
     return data
 
 
+def utf8_text(data: bytes, *, file: str) -> str:
+    """Content of a file as text; an ``InputError`` has the line of the first byte that is none of UTF-8."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = 1 + data.count(b"\n", 0, error.start)
+        raise InputError(f"{file}:{line}: expected text in UTF-8, got byte 0x{data[error.start]:02x}") from None
+
+
 def digest(data: bytes) -> str:
     """SHA-256 of bytes, in hexadecimal."""
     return hashlib.sha256(data).hexdigest()

@@ -5,16 +5,15 @@ from collections.abc import Mapping
 from typing import Any, NoReturn
 
 from cellplan.errors import InputError
+from cellplan.files.input.files import utf8_text
 from cellplan.files.input.findings import shown
 
 
 def parse_json(data: bytes, file: str) -> dict[str, Any]:
     """The object of a JSON file with finite numbers and each key once; an ``InputError`` has file and line."""
+    text = utf8_text(data, file=file)
     try:
-        value = json.loads(data.decode("utf-8"), object_pairs_hook=_unique_keys, parse_constant=_refuse_constant)
-    except UnicodeDecodeError as error:
-        line = 1 + data.count(b"\n", 0, error.start)
-        raise InputError(f"{file}:{line}: expected text in UTF-8, got byte 0x{data[error.start]:02x}") from None
+        value = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
         raise InputError(f"{file}:{error.lineno}: expected JSON: {error.msg.lower()}") from None
     except RecursionError:

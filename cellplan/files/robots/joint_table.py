@@ -25,7 +25,7 @@ from cellplan.files.yaml.reader import YamlDocument, read_yaml
 from cellplan.geometry.mesh.load import read_drawing
 from cellplan.geometry.shapes import Mesh
 from cellplan.guard import Guard, in_child
-from cellplan.model.robot.robot import BASE, Body, Joint, JointKind, Link, RobotModel
+from cellplan.model.robot.robot import BASE, Body, Joint, JointKind, Link, RobotModel, free_name
 from cellplan.model.settings.robot import BodyAccuracyEntry
 from cellplan.model.settings.units import in_si, si_or_none
 
@@ -131,22 +131,12 @@ def _bodies(table: RobotTableDocument, meshes: _Meshes) -> Iterator[Body]:
     for index, entry in enumerate(table.solids):
         if entry.mesh is not None and meshes.mesh(entry.mesh.file, entry.mesh.unit, index=index) is None:
             continue
-        name = entry.name or _free_name(entry.link, taken)
+        name = entry.name or free_name(entry.link, taken)
         taken.add(name)
         shape, X_BS = link_solid(entry, partial(meshes.known, index=index))
         accuracy = si_or_none(entry.accuracy_mm)
         link = links[entry.link]
         yield Body(name=name, link=link, shape=shape, X_BS=X_BS, accuracy=accuracy, link_name=entry.link)
-
-
-def _free_name(link: str, taken: set[str]) -> str:
-    """Name of the link, numbered from 2 when it is taken."""
-    if link not in taken:
-        return link
-    number = 2
-    while f"{link}_{number}" in taken:
-        number += 1
-    return f"{link}_{number}"
 
 
 def _model(table: RobotTableDocument, bodies: tuple[Body, ...]) -> RobotModel:

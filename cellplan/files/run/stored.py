@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from cellplan.errors import InputError, InvalidFileError
-from cellplan.files.input.files import digest, read_regular_file
+from cellplan.files.input.files import digest, read_regular_file, utf8_text
 from cellplan.files.input.findings import shown
 from cellplan.files.input.json_reader import parse_json, required
 from cellplan.files.run.clock_table import parse_clock
@@ -164,15 +164,8 @@ def _contradictions(
 def _tables(folder: Path, manifest: Manifest) -> Iterator[tuple[str, str]]:
     """Name and text of each table of the program."""
     for name in manifest.files:
-        path = PurePosixPath(name)
         if _is_table(name):
-            data = _content(folder, name, manifest)
-            try:
-                yield path.stem, data.decode("utf-8")
-            except UnicodeDecodeError as error:
-                line = 1 + data.count(b"\n", 0, error.start)
-                text = f"expected text in UTF-8, got byte 0x{data[error.start]:02x}"
-                raise InputError(f"{folder / name}:{line}: {text}") from None
+            yield PurePosixPath(name).stem, utf8_text(_content(folder, name, manifest), file=str(folder / name))
 
 
 def _is_table(name: str, folder: str = "tables") -> bool:

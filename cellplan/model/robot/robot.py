@@ -1,8 +1,9 @@
 """Robot: joint axes and link bodies at the reference configuration, where every joint reads zero."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -251,6 +252,12 @@ class RobotModel:
     def velocity(self) -> Array:
         """Speed limits, shape (n,)."""
         return np.array([joint.velocity for joint in self.joints])
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """The name of a body, numbered from 2 where it is taken: ``forearm``, ``forearm_2``, …."""
+    numbered = (name if number == 1 else f"{name}_{number}" for number in count(1))
+    return next(word for word in numbered if word not in taken)
 
 
 def start_keys(model: RobotModel) -> tuple[str, ...]:

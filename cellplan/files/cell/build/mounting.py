@@ -21,7 +21,7 @@ from cellplan.files.schema.shapes import ObstacleEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction
 from cellplan.files.yaml.reader import YamlDocument
 from cellplan.model.cell.mounting import Bracket, Hanger, Mount, Pedestal, Wedge
-from cellplan.model.robot.robot import BASE, Body, Joint, JointKind, RobotModel, on_rail
+from cellplan.model.robot.robot import BASE, Body, Joint, JointKind, RobotModel, free_name, on_rail
 from cellplan.model.settings.units import Mm, si_or_none
 
 PEDESTAL: Final = "pedestal"  # name of the body
@@ -138,9 +138,7 @@ def attachment_names(entries: Iterable[AttachmentEntry]) -> tuple[str, ...]:
     taken = {entry.name for entry in entries if entry.name is not None}
     names = []
     for entry in entries:
-        name, number = entry.name or "attachment", 2
-        while entry.name is None and name in taken:
-            name, number = f"attachment_{number}", number + 1
+        name = entry.name or free_name("attachment", taken)
         taken.add(name)
         names.append(name)
     return tuple(names)

@@ -15,7 +15,7 @@ from cellplan.files.robots.urdf.document.xml import Element, Remarks
 from cellplan.files.robots.urdf.tree import UrdfTree, ZeroConfiguration, links_in_order
 from cellplan.geometry.mesh.load import FORMATS, is_flat, read_mesh, unknown_format
 from cellplan.geometry.shapes import Mesh, Solid
-from cellplan.model.robot.robot import Body
+from cellplan.model.robot.robot import Body, free_name
 
 PACKAGE: Final = "package://"
 
@@ -60,7 +60,7 @@ def link_bodies(tree: UrdfTree, configuration: ZeroConfiguration, shelf: MeshShe
     bodies: list[Body] = []
     for link in links:
         for place, solid in enumerate(link.solids):
-            name = link.name if place == 0 else _free_name(link.name, taken)
+            name = link.name if place == 0 else free_name(link.name, taken)
             taken.add(name)
             X_BS = configuration.X_BL[link.name] @ solid.X_LS
             carrier = configuration.carrier[link.name]
@@ -139,11 +139,3 @@ def _solid(link: UrdfLink, solid: UrdfSolid, shelf: MeshShelf) -> Solid:
     except InputError as error:
         place = solid.element.tag if solid.element.tag == "collision" else "visual, used as it has no collision element"
         raise solid.element.error(f"link '{link.name}' ({place}): mesh '{solid.shape.uri}': {error}") from None
-
-
-def _free_name(link: str, taken: set[str]) -> str:
-    """``link_2`` or the next number that no link or body has."""
-    number = 2
-    while f"{link}_{number}" in taken:
-        number += 1
-    return f"{link}_{number}"
