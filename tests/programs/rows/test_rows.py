@@ -49,7 +49,6 @@ def test_rows_are_those_of_the_tables(run: VerifiedRun) -> None:
         assert np.all(rows.qd[[0, -1]] == 0.0)
         inner = (rows.q[2:] - rows.q[:-2]) / (rows.times[2:] - rows.times[:-2])[:, None]
         np.testing.assert_allclose(rows.qd[1:-1], inner, atol=1e-9)
-    assert list(full_rows(run, ["right"])[0].robots) == ["right"]
 
 
 def test_only_the_robot_whose_tool_works_is_in_process(run: VerifiedRun) -> None:
