@@ -38,16 +38,32 @@ class WatchedPairs:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NearbyPairs:
-    """Near pairs; M of them, ordered by sample and row."""
+class NearPairs:
+    """Pairs that come nearer than a distance at some configurations; M of them, ordered by configuration and pair.
 
-    rows: Indices  # what each pair is called, shape (M,)
+    Attributes:
+        distances: Signed distances in [m], negative where the bodies overlap by so much, shape (M,). Of bodies that are
+            not convex it is that of their hulls, never more than the true one, where that keeps what is demanded of the
+            pair or the surfaces touch; that of their surfaces otherwise. Of a tool that is cut off before its tip it is
+            that of its hull.
+        normals: Unit directions from the first body to the second in W: the distance grows when the second moves along
+            them, shape (M, 3).
+    """
+
+    rows: Indices  # their places in ``Scene.pairs``, or in the pairs of a table of its own, shape (M,)
     samples: Indices  # at which configuration, shape (M,)
-    distances: Array  # signed distances in [m], shape (M,)
-    normals: Array  # unit directions from the first body to the second, shape (M, 3)
-    first: Array  # points of the first bodies in the world in [m], shape (M, 3)
-    second: Array  # points of the second bodies, shape (M, 3)
+    distances: Array
+    normals: Array
+    first: Array  # points of the first bodies that are so far from the second ones, in W in [m], shape (M, 3)
+    second: Array  # points of the second bodies likewise, shape (M, 3)
+    by_joints: Array  # derivatives of the distances by the stacked joints, in [m/rad] or [m/m], shape (M, nq)
     bodies: Indices  # the bodies by their places in the engine, -1 for a half-space, shape (M, 2)
+    D: Array  # displacements of the links, shape (links, K, 4, 4)
+
+    @property
+    def wrenches(self) -> Array:
+        """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
+        return _wrenches(self.second, self.normals)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,7 +79,7 @@ class NearTable:
         """The same with some bodies elsewhere on their links, and others in place of some; see ``BodyTable``."""
         return replace(self, bodies=self.bodies.replaced(poses, bodies))
 
-    def find(self, engine: Engine, D: Array, within: float) -> NearbyPairs:
+    def find(self, engine: Engine, D: Array, within: float) -> NearPairs:
         """All pairs nearer than ``within`` in [m], from displacements of the links, shape (links, K, 4, 4)."""
         poses = self.bodies.poses(D)
         centres, lines = self.bodies.bounds(poses)
@@ -73,32 +89,31 @@ class NearTable:
         )
         order = np.lexsort((rows, samples))
         order = order[distances[order] < within]
-        return NearbyPairs(
+        samples, normals, second, bodies = samples[order], normals[order], second[order], bodies[order]
+        return NearPairs(
             rows=rows[order],
-            samples=samples[order],
+            samples=samples,
             distances=distances[order],
-            normals=normals[order],
+            normals=normals,
             first=first[order],
-            second=second[order],
-            bodies=bodies[order],
+            second=second,
+            by_joints=self._by_joints(D, samples, bodies, _wrenches(second, normals)),
+            bodies=bodies,
+            D=D,
         )
 
-    def by_joints(self, D: Array, nearby: NearbyPairs) -> Array:
-        """Derivatives of the distances by the stacked joints in [m/rad] or [m/m], shape (M, nq)."""
-        return self.by_axes(nearby, self.forest.screws(D)) @ self.forest.shares
+    def _by_joints(self, D: Array, samples: Indices, bodies: Indices, forces: Array) -> Array:
+        """Derivatives of distances by the stacked joints, from the unit forces along the normals, shape (M, 6).
 
-    def by_axes(self, nearby: NearbyPairs, screws: Array) -> Array:
-        """The work of a unit force along each normal on every axis, shape (M, axes), from screws of shape (axes, K, 6).
-
-        It is the same at both points, as the normal goes through both.
+        They are the work of each force on the axes between its bodies; it acts through both points.
         """
-        links = np.where(nearby.bodies < 0, WORLD, self.bodies.links[nearby.bodies])  # that carry the bodies, (M, 2)
-        forces, count = wrenches(nearby), screws.shape[1]
+        screws = self.forest.screws(D)
+        links = np.where(bodies < 0, WORLD, self.bodies.links[bodies])  # that carry the bodies, (M, 2)
         moved = self.forest.carries[links[:, 1]] - self.forest.carries[links[:, 0]]
-        bounds = np.searchsorted(nearby.samples, np.arange(count + 1)).tolist()
+        bounds = np.searchsorted(samples, np.arange(screws.shape[1] + 1)).tolist()
         for sample, (first, last) in enumerate(pairwise(bounds)):
             moved[first:last] *= forces[first:last] @ screws[:, sample].T
-        return moved
+        return moved @ self.forest.shares
 
     def _solids(self, engine: Engine, poses: BodyPoses, bounds: tuple[Array, Array], within: float) -> "Parts":
         """Pairs of solids: bounding spheres, bounding lines, hulls, then surfaces where the hull is not what counts."""
@@ -167,12 +182,12 @@ class NearTable:
         return rows, samples, heights, -up, first, first - heights[:, None] * up, ends
 
 
-Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # the attributes of ``NearbyPairs``
+Parts = tuple[Indices, Indices, Array, Array, Array, Array, Indices]  # attributes of ``NearPairs``, from rows to bodies
 
 
-def wrenches(nearby: NearbyPairs) -> Array:
-    """Unit forces along the normals with their moments about the world's origin, shape (M, 6)."""
-    (x, y, z), (a, b, c) = nearby.second.T, nearby.normals.T
+def _wrenches(points: Array, normals: Array) -> Array:
+    """Unit forces at points with their moments about the world's origin, shape (M, 6)."""
+    (x, y, z), (a, b, c) = points.T, normals.T
     return np.stack([a, b, c, y * c - z * b, z * a - x * c, x * b - y * a], axis=1)
 
 
@@ -200,46 +215,10 @@ def _directions(distances: Array, first: Array, second: Array, centres: Array) -
     return along / np.where(norms > 0.0, norms, 1.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class NearPairs:
-    """Pairs that come nearer than a distance at some configurations; M of them, ordered by configuration and pair.
-
-    Attributes:
-        distances: Signed distances in [m], negative where the bodies overlap by so much, shape (M,). Of bodies that are
-            not convex it is that of their hulls, never more than the true one, where that keeps what is demanded of the
-            pair or the surfaces touch; that of their surfaces otherwise. Of a tool that is cut off before its tip it is
-            that of its hull.
-        normals: Unit directions from the first body to the second in W: the distance grows when the second moves along
-            them, shape (M, 3).
-    """
-
-    rows: Indices  # their places in ``Scene.pairs``, shape (M,)
-    samples: Indices  # at which configuration, shape (M,)
-    distances: Array
-    normals: Array
-    first: Array  # points of the first bodies that are so far from the second ones, in W in [m], shape (M, 3)
-    second: Array  # points of the second bodies likewise, shape (M, 3)
-    by_joints: Array  # derivatives of the distances by the stacked joints, in [m/rad] or [m/m], shape (M, nq)
-
-
-def near_pairs(scene: "Scene", q: Array, within: float) -> NearPairs:
-    """See ``Scene.near``."""
-    return near_pairs_of(scene.near_table, scene, q, within)
-
-
-def near_pairs_of(table: NearTable, scene: "Scene", q: Array, within: float) -> NearPairs:
-    """The same of the pairs of a table."""
+def near_pairs(table: NearTable, scene: "Scene", q: Array, within: float) -> NearPairs:
+    """Pairs of a table as ``Scene.near`` has those of a scene."""
     D = table.forest.displacements(q, np.array([robot.X_WB for robot in scene.cell.robots]))
-    nearby = table.find(scene.engine, D, within)
-    return NearPairs(
-        rows=nearby.rows,
-        samples=nearby.samples,
-        distances=nearby.distances,
-        normals=nearby.normals,
-        first=nearby.first,
-        second=nearby.second,
-        by_joints=table.by_joints(D, nearby),
-    )
+    return table.find(scene.engine, D, within)
 
 
 def near_table_of(scene: "Scene") -> NearTable:

@@ -132,7 +132,7 @@ class Scene:
 
         Joint positions are stacked, in [rad] or [m], shape (K, nq).
         """
-        return near_pairs(self, q, within)
+        return near_pairs(self.near_table, self, q, within)
 
     def body_poses(self, q: Array) -> BodyPoses:
         """Poses of the engine's bodies for stacked joint positions in [rad] or [m], shape (N, nq)."""

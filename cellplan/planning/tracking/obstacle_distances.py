@@ -8,7 +8,7 @@ import numpy as np
 from cellplan.geometry.arrays import Flags, Indices
 from cellplan.geometry.transforms import Array
 from cellplan.model.report.report import ClearanceClass
-from cellplan.scene.near import NearPairs, NearTable, WatchedPairs, near_pairs_of
+from cellplan.scene.near import NearPairs, NearTable, WatchedPairs, near_pairs
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 
@@ -54,7 +54,7 @@ class ClosestPairs:
             q: Stacked joint vectors, shape (K, nq), in [rad] or [m].
             within: Distance in [m] from which on pairs are left out.
         """
-        return near_pairs_of(self._table, self._scene, q, within)
+        return near_pairs(self._table, self._scene, q, within)
 
     def at(self, q: Array, *, within: float) -> tuple[ClosestPair, ...]:
         """Pairs nearer than a distance at one configuration, shape (nq,), in the order of ``Scene.pairs``.

@@ -8,7 +8,7 @@ the normal; for one whose shape changes, the change of its reach in that directi
 
 from collections.abc import Iterator, Sequence, Set
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -21,7 +21,7 @@ from cellplan.scene.body_table import BodyTable
 from cellplan.scene.collision.bodies import CollisionBody, prepare
 from cellplan.scene.collision.engine import Engine
 from cellplan.scene.kinematics.link_forest import WORLD
-from cellplan.scene.near import NearbyPairs, NearTable, wrenches
+from cellplan.scene.near import NearPairs, NearTable
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.keep_out import keep_out_bodies
 from cellplan.search.distances.layout_pairs import (
@@ -39,36 +39,6 @@ STEP: Final = (
 )
 TURNS: Final = 3  # place of the first of the rotations among the components of a twist
 RAISED: Final = 0.1  # [m] by which a base on the floor is raised so that its column exists
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LayoutDistances:
-    """Pairs that are nearer than a distance in one layout; M of them, ordered by configuration and pair."""
-
-    pairs: Indices  # their places in ``CellDistances.pairs``, shape (M,)
-    keys: Indices  # at which configuration, shape (M,); the first one for bodies without a joint between them
-    distances: Array  # signed distances in [m], negative where bodies overlap by so much, shape (M,)
-    demands: Array  # what is demanded of them in [m], shape (M,)
-    within_robot: Flags  # whether both bodies belong to one robot, shape (M,)
-    normals: Array  # unit directions from the first body to the second in W, shape (M, 3)
-    first: Array  # nearest points of the first bodies in W in [m], shape (M, 3)
-    second: Array  # nearest points of the second bodies, shape (M, 3)
-    by_joints: Array  # derivatives by the stacked joints in [m/rad] or [m/m], shape (M, nq)
-    bodies: Indices  # the bodies by their places in the engine, -1 for a half-space, shape (M, 2)
-    D: Array  # displacements of the links, shape (links, K, 4, 4)
-
-    @property
-    def nearby(self) -> NearbyPairs:
-        """The same as the table of bodies has them."""
-        return NearbyPairs(
-            rows=self.pairs,
-            samples=self.keys,
-            distances=self.distances,
-            normals=self.normals,
-            first=self.first,
-            second=self.second,
-            bodies=self.bodies,
-        )
 
 
 class CellDistances:
@@ -104,8 +74,9 @@ class CellDistances:
             pairs=among(watched, _concerned(self.pairs, changed)),
             is_hull=np.append(scene.near_table.is_hull, [True] * len(added)).astype(bool),
         )
-        self._demands, self._within_robot = demands_of(self.pairs), are_within_robot(self.pairs)
-        self.most_demanded = float(self._demands.max(initial=0.0))  # the largest demand in [m]
+        self.demands = demands_of(self.pairs)  # what is demanded of each pair in [m], shape (P,)
+        self.within_robot = are_within_robot(self.pairs)  # whether both of its bodies belong to one robot, shape (P,)
+        self.most_demanded = float(self.demands.max(initial=0.0))  # the largest demand in [m]
         index = {robot.name: place for place, robot in enumerate(self._cell.robots)}
         self._robots = np.array(
             [-1 if carrier.robot is None else index[carrier.robot] for carrier in carriers], dtype=np.intp
@@ -133,7 +104,7 @@ class CellDistances:
         distances._variables = variables
         return distances
 
-    def near(self, x: Array, q: Array, within: float) -> LayoutDistances:
+    def near(self, x: Array, q: Array, within: float) -> NearPairs:
         """All pairs of one layout that are nearer than a distance.
 
         Args:
@@ -144,31 +115,18 @@ class CellDistances:
         cell = self._variables.placed(x)
         table, engine = self._placed(cell)
         D = table.forest.displacements(q, _bases(cell))
-        nearby = table.find(engine, D, within)
-        return LayoutDistances(
-            pairs=nearby.rows,
-            keys=nearby.samples,
-            distances=nearby.distances,
-            demands=self._demands[nearby.rows],
-            within_robot=self._within_robot[nearby.rows],
-            normals=nearby.normals,
-            first=nearby.first,
-            second=nearby.second,
-            by_joints=table.by_joints(D, nearby),
-            bodies=nearby.bodies,
-            D=D,
-        )
+        return table.find(engine, D, within)
 
-    def derivatives(self, near: LayoutDistances, x: Array, dq: Array) -> Array:
+    def derivatives(self, near: NearPairs, x: Array, dq: Array) -> Array:
         """Derivatives of near distances by the variables, shape (M, n).
 
         Args:
             x: The variables, shape (n,).
             dq: Derivatives of the joints at the keys by the variables, shape (K, nq, n).
         """
-        derivatives, base = np.empty((len(near.pairs), dq.shape[2])), self._variables.base_twists(x)
+        derivatives, base = np.empty((len(near.rows), dq.shape[2])), self._variables.base_twists(x)
         for key in range(len(dq)):
-            rows = near.keys == key
+            rows = near.samples == key
             derivatives[rows] = near.by_joints[rows] @ dq[key]
         self._add_by_bases(derivatives, near, base)
         self._add_by_shapes(derivatives, near, x, base)
@@ -185,7 +143,7 @@ class CellDistances:
         poses = {index: body.X_LS if body.shape is not None else far_away(index) for index, body in placed.items()}
         return self._table.moved(poses, other), self._engine.with_bodies(other) if other else self._engine
 
-    def _add_by_bases(self, derivatives: Array, near: LayoutDistances, base: Array) -> None:
+    def _add_by_bases(self, derivatives: Array, near: NearPairs, base: Array) -> None:
         """Add derivatives while joints stand still, of what moves as a whole with the bases, shape (M, n)."""
         X_WB = near.D[[self._scene.near_table.forest.place(robot.name) for robot in self._cell.robots], 0]
         twists = np.zeros((len(base) + 1, 6, base.shape[2]))  # at the world's origin; the last one for the world
@@ -195,13 +153,13 @@ class CellDistances:
         robots = np.append(self._robots, -1)  # -1 for a half-space as well
         robots[list(self._moving.columns.values())] = -1  # they do not lean with their bases
         ends = robots[near.bodies]
-        forces = wrenches(near.nearby)
+        forces = near.wrenches
         for side, sign in ((0, -1.0), (1, 1.0)):
             for robot in range(len(base)):
                 rows = (ends[:, side] == robot) & (ends[:, 1 - side] != robot)
                 derivatives[rows] += sign * forces[rows] @ twists[robot]
 
-    def _add_by_shapes(self, derivatives: Array, near: LayoutDistances, x: Array, base: Array) -> None:
+    def _add_by_shapes(self, derivatives: Array, near: NearPairs, x: Array, base: Array) -> None:
         """Add derivatives while links stand still, of what moves on its link or changes its shape, shape (M, n)."""
         directions = dict[int, tuple[Indices, Array]]()
         for index, by, forward, back in self._changes(near, x, base):
@@ -218,7 +176,7 @@ class CellDistances:
         column = self._moving.of_base(name, X_WB)
         return PlacedBody(column.shape, X_WB @ column.X_LS)
 
-    def _directions(self, near: LayoutDistances, index: int) -> tuple[Indices, Array]:
+    def _directions(self, near: NearPairs, index: int) -> tuple[Indices, Array]:
         """The pairs of a body, and where the others are, seen from its link: unit directions of shape (M, 3).
 
         A column is seen from the world, all other bodies from what carries them. No body is in a pair with itself.
@@ -226,11 +184,9 @@ class CellDistances:
         link = WORLD if index in self._moving.columns.values() else int(self._table.bodies.links[index])
         rows, sides = np.nonzero(near.bodies == index)
         n = near.normals[rows] * np.where(sides == 0, 1.0, -1.0)[:, None]
-        return rows, (n[:, None] @ near.D[link, near.keys[rows], :3, :3])[:, 0]
+        return rows, (n[:, None] @ near.D[link, near.samples[rows], :3, :3])[:, 0]
 
-    def _changes(
-        self, near: LayoutDistances, x: Array, base: Array
-    ) -> Iterator[tuple[int, Array, PlacedBody, PlacedBody]]:
+    def _changes(self, near: NearPairs, x: Array, base: Array) -> Iterator[tuple[int, Array, PlacedBody, PlacedBody]]:
         """Bodies a step forward and back of one number, and by how much that grows with each variable, (n,)."""
         forest = self._scene.near_table.forest
         for name, index in self._moving.columns.items():

@@ -11,7 +11,8 @@ from cellplan.geometry.frozen import derive
 from cellplan.model.cell.cell import joint_at
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.robot.robot import JointLimits
-from cellplan.search.distances.cell_distances import CellDistances, LayoutDistances
+from cellplan.scene.near import NearPairs
+from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.derivatives import differentiate
 from cellplan.search.kernel.job import Job, enough_nodes
 from cellplan.search.kernel.run import run, run_near
@@ -98,7 +99,7 @@ class LayoutProblem:
 class PairsAtNodes:
     """Near pairs and the nodes that their keys are."""
 
-    near: LayoutDistances  # the pairs
+    near: NearPairs  # the pairs
     nodes: Indices  # the nodes, shape (K,)
 
     @classmethod
@@ -120,10 +121,10 @@ def distances_at(bodies: CellDistances, x: Array, q: Array, nodes: Indices, with
     """
     near = bodies.near(x, q[nodes], within + bodies.most_demanded)
     return Distances(
-        pairs=near.pairs,
-        nodes=nodes[near.keys],
+        pairs=near.rows,
+        nodes=nodes[near.samples],
         values=near.distances,
-        demands=near.demands,
-        within_robot=near.within_robot,
+        demands=bodies.demands[near.rows],
+        within_robot=bodies.within_robot[near.rows],
         detail=PairsAtNodes(near=near, nodes=nodes),
     )

@@ -106,7 +106,7 @@ class PathProblem:
         """See ``Problem``."""
         pairs, count, (_, others) = PairsAtNodes.of(distances), len(self.path.names), self._split(point.x)
         near, dq = pairs.near, by_joints.q[pairs.nodes]
-        by_path = (near.by_joints[:, None] @ dq[near.keys][..., :count])[:, 0]
+        by_path = (near.by_joints[:, None] @ dq[near.samples][..., :count])[:, 0]
         if not len(others):
             return by_path
         return np.concatenate([by_path, self.bodies.derivatives(near, others, dq[..., count:])], axis=1)

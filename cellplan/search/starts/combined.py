@@ -134,10 +134,10 @@ def _exact_shortfall(problem: StartProblem, x: Array, q: Array, drops: Counter[s
     """The same of one candidate at more nodes, its columns and tools as they are."""
     keys = q[_keys(len(q), MORE_KEYS)]
     near = problem.distances.near(x, keys, problem.distances.most_demanded)
-    short = near.demands - near.distances
+    short = problem.distances.demands[near.rows] - near.distances
     if not short.max(initial=0.0) > 0.0:
         return 0.0
-    names = problem.distances.pairs[near.pairs[int(np.argmax(short))]].names
+    names = problem.distances.pairs[near.rows[int(np.argmax(short))]].names
     drops[f"{names[0]} too near {names[1]}"] += 1
     return float(short.max())
 

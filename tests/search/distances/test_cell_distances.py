@@ -43,7 +43,7 @@ def test_distances_are_those_of_a_scene_built_from_the_changed_cell(
     }
     known = {
         (distances.pairs[row].names, k): d
-        for row, k, d in zip(near.pairs.tolist(), near.keys.tolist(), near.distances, strict=True)
+        for row, k, d in zip(near.rows.tolist(), near.samples.tolist(), near.distances, strict=True)
         if row < len(built.pairs)
     }
     assert len(known) > 30
@@ -64,13 +64,13 @@ def test_derivatives_are_those_of_differences(
     near = distances.near(x, q, WITHIN)
     exact = distances.derivatives(near, x, dq)
     result = np.full_like(exact, np.nan)
-    keys = list(zip(near.pairs.tolist(), near.keys.tolist(), strict=True))
+    keys = list(zip(near.rows.tolist(), near.samples.tolist(), strict=True))
     for j, unit in enumerate(np.eye(n)):
         sides = []
         for sign in (1.0, -1.0):
             side = distances.near(x + sign * STEP * unit, q + sign * STEP * dq[..., j], 2.0 * WITHIN)
             sides.append(
-                dict(zip(zip(side.pairs.tolist(), side.keys.tolist(), strict=True), side.distances, strict=True))
+                dict(zip(zip(side.rows.tolist(), side.samples.tolist(), strict=True), side.distances, strict=True))
             )
         result[:, j] = [(sides[0][key] - sides[1][key]) / (2.0 * STEP) for key in keys]
     is_close = np.abs(result - exact) < 1e-3 * (1.0 + np.abs(result))

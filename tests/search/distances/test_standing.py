@@ -139,8 +139,8 @@ def test_what_stands_in_another_thing_fails_the_checks_and_falls_short_of_its_di
     for deep in (-0.02, 0.03):
         x = np.array([-apart - sign * deep, 0.0, 0.0])
         near = distances.near(x, AT_REST[:1], 0.1)
-        short = near.distances < near.demands
-        failing = [set(distances.pairs[row].names) for row in near.pairs[short].tolist()]
+        short = near.distances < distances.demands[near.rows]
+        failing = [set(distances.pairs[row].names) for row in near.rows[short].tolist()]
         assert verdict(variables.placed(x)) is (deep < 0.0)
         assert failing == ([names] if deep > 0.0 else [])
 
@@ -157,7 +157,7 @@ def test_bases_and_columns_keep_out_of_areas_by_their_footprints(height: float, 
         distances_by_name = {
             distances.pairs[pair].names[1]: (float(d), slope)
             for pair, d, slope in zip(
-                near.pairs.tolist(),
+                near.rows.tolist(),
                 near.distances,
                 distances.derivatives(near, np.zeros(3), np.zeros((1, 12, 3))),
                 strict=True,
@@ -177,11 +177,11 @@ def test_the_distances_of_what_stands_change_with_the_base_as_differences_say(ki
     x = np.array([np.copysign(0.01, apart) - apart, 0.01, 0.02])
     near = distances.near(x, AT_REST[:1], 0.1)
     exact = distances.derivatives(near, x, np.zeros((1, cell.joint_count, 3)))
-    row = next(row for row, pair in enumerate(near.pairs.tolist()) if set(distances.pairs[pair].names) == names)
+    row = next(row for row, pair in enumerate(near.rows.tolist()) if set(distances.pairs[pair].names) == names)
     step = 1e-5
     for variable in range(3):
         results = []
         for sign in (step, -step):
             other = distances.near(x + sign * np.eye(3)[variable], AT_REST[:1], 0.2)
-            results.append(float(other.distances[other.pairs == near.pairs[row]][0]))
+            results.append(float(other.distances[other.rows == near.rows[row]][0]))
         assert exact[row, variable] == pytest.approx((results[0] - results[1]) / (2.0 * step), abs=1e-4)
