@@ -31,8 +31,11 @@ Names are imported at first use, so that ``import cellplan`` and the help of the
 """
 
 import os
+from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
+
+from cellplan.model.presented import Presented, Presenter
 
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")  # the matrices are small; before numpy is imported, or it has no effect
@@ -207,7 +210,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
+def __getattr__(name: str) -> Any:
     """Import a public name on first access."""
     if name not in _HOME:
         raise AttributeError(f"module 'cellplan' has no attribute '{name}'")
@@ -217,3 +220,11 @@ def __getattr__(name: str) -> object:
 def __dir__() -> list[str]:
     """The public names, before they are imported too."""
     return sorted({*globals(), *__all__})
+
+
+def _called(name: str, *arguments: Any) -> Any:
+    """Call a public function, which is imported now."""
+    return __getattr__(name)(*arguments)
+
+
+Presented.presenter = Presenter(to_frame=partial(_called, "to_frame"), to_html=partial(_called, "to_html"))

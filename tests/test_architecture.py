@@ -145,6 +145,21 @@ def module_imports(path: Path) -> set[str]:
     return {node.module for node in result} | {f"{node.module}.{alias.name}" for node in result for alias in node.names}
 
 
+def test_fields_of_frozen_classes_are_set_by_one_helper() -> None:
+    setters = re.compile(r"object\.__setattr__|\bvars\(.+\)\[|\.__dict__\[")
+
+    assert [place(path) for path in SOURCES if setters.search(path.read_text(encoding="utf-8"))] == [
+        "cellplan/geometry/frozen.py"
+    ]
+
+
+def test_the_package_uses_no_public_name_but_its_version() -> None:
+    """Results know nothing of what stands above them: ``cellplan`` introduces their presenter."""
+    attributes = (node for path in SOURCES for node in nodes(path) if isinstance(node, ast.Attribute))
+
+    assert {node.attr for node in attributes if ast.unparse(node.value) == "cellplan"} == {"__version__"}
+
+
 def test_measures_give_no_verdicts() -> None:
     judged = {place(path) for path in SOURCES if PACKAGE / "measures" in path.parents and "Check" in names(path)}
 
@@ -185,6 +200,26 @@ def is_door(path: Path, engine: str, doors: dict[str, list[str]]) -> bool:
     """Whether a file may import an engine."""
     inside = PurePosixPath(path.relative_to(PACKAGE).as_posix())
     return any(inside.match(door) for door in doors.get(engine, []))
+
+
+def test_the_table_of_engines_is_that_of_the_imports() -> None:
+    doors: dict[str, set[str]] = {}
+    for path in SOURCES:
+        for name in imported_modules(path) - sys.stdlib_module_names - EVERYWHERE:
+            if path.name != "presented.py":  # names pandas for type checkers only
+                doors.setdefault(name.removesuffix("_core"), set()).add(path.relative_to(PACKAGE).as_posix())
+    page = (ROOT / "docs" / "developing.md").read_text(encoding="utf-8")
+    table = re.findall(r"^\| (\w+) \| (`[^|]+`) \|$", page.partition("| engine | door |")[2], re.MULTILINE)
+
+    assert table == [(name, ", ".join(f"`{door}`" for door in short(places))) for name, places in sorted(doors.items())]
+
+
+def short(places: set[str]) -> list[str]:
+    """Two files at most by their names; more by their package, or by their folders."""
+    if len(places) < 3:
+        return sorted(places)
+    packages = {place.partition("/")[0] for place in places}
+    return [f"{packages.pop()}/"] if len(packages) == 1 else sorted({f"{PurePosixPath(it).parent}/" for it in places})
 
 
 def test_every_engine_is_a_declared_dependency() -> None:

@@ -2,6 +2,6 @@
 
 
 def derive(instance: object, **values: object) -> None:
-    """Set fields of a frozen instance that follow from the others; only its ``__post_init__`` may call it."""
+    """Set fields of a frozen instance that follow from the others; only what makes the instance may call it."""
     for name, value in values.items():
         object.__setattr__(instance, name, value)

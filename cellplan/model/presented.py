@@ -1,21 +1,29 @@
 """What all results can do: become pandas frames, and show themselves in a notebook.
 
-Results know nothing of pages and frames: both methods hand over to the public functions of the package, which find the
-tables of a result and its page.
+Results know nothing of frames and pages. Their presenter does: the package sets it when it is imported.
 """
 
-from typing import TYPE_CHECKING
-
-import cellplan
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Presenter:
+    """How results are shown."""
+
+    to_frame: "Callable[[object, str | None], pd.DataFrame]"  # a table of a result by its name, None for the first one
+    to_html: Callable[[object], str]  # what a notebook shows of a result
 
 
 class Presented:
     """A result that becomes pandas frames and that notebooks show."""
 
     __slots__ = ()
+    presenter: ClassVar[Presenter]
 
     def to_frame(self, table: str | None = None) -> "pd.DataFrame":
         """One of its tables as a pandas frame, with units in the names of the columns; see ``cellplan.to_frame``.
@@ -27,8 +35,8 @@ class Presented:
             InputError: It has no such table.
             MissingPackageError: pandas is not installed.
         """
-        return cellplan.to_frame(self, table)
+        return self.presenter.to_frame(self, table)
 
     def _repr_html_(self) -> str:
         """What a notebook shows of it: a page without scripts; see ``cellplan.to_html``."""
-        return cellplan.to_html(self)
+        return self.presenter.to_html(self)

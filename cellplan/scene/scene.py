@@ -121,7 +121,7 @@ class Scene:
         engine = self.engine.with_bodies(made) if made else self.engine
         other = replace(self, cell=cell, chains={**self.chains, **chains}, bodies=bodies, engine=engine)
         poses = {index: body.X_BS for index, body in placed.items()}
-        vars(other)["near_table"] = self.near_table.moved(poses, made)  # as the property keeps it, not made anew
+        derive(other, near_table=self.near_table.moved(poses, made))  # as the property keeps it, not made anew
         return other
 
     def near(self, q: Array, within: float) -> NearPairs:
