@@ -133,13 +133,11 @@ def layout_record(
     *,
     tried: Mapping[int, CandidateResult],
     best: CandidateResult | None,
-    solves: int,
 ) -> LayoutRecord:
     """The search in printed units.
 
     Args:
         tried: What came of those that were solved in full, by number.
-        solves: How often a layout was solved in full.
     """
     request, cell = ready.request, ready.cell
     listed = list(_candidates(ready, finished, tried))
@@ -162,7 +160,7 @@ def layout_record(
         "seed": request.seed,
         "trials": len(finished.trials),
         "rounds": -(-len(finished.trials) // SIZE),
-        "solves": solves,
+        "solves": sum(result.solves for result in tried.values()),
         "given": given.record,
         "best": next((candidate for candidate in listed if best and candidate["trial"] == best.trial), None),
         "velocity_only_s": _velocity_only(best) if best and has_accelerations else None,

@@ -98,12 +98,13 @@ class _Search:
 
     def _best(self, finished: Finished) -> CandidateResult | None:
         """The first candidate that passes, best first."""
-        for trial in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
-            if trial.number not in self.tried:
-                self.progress(f"certifying trial {trial.number}", 1.0)
-                self.tried[trial.number] = self.finish.certified(trial)
-            if self.tried[trial.number].passed:
-                return self.tried[trial.number]
+        for finalist in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
+            number = finalist.trial.number
+            if number not in self.tried:
+                self.progress(f"certifying trial {number}", 1.0)
+                self.tried[number] = self.finish.certified(finalist)
+            if self.tried[number].passed:
+                return self.tried[number]
         return None
 
     def candidates(self, finished: Finished) -> list[StudyTrial]:
@@ -197,9 +198,9 @@ def finish_of(ready: PreparedSearch, progress: Progress, *, workers: int | Execu
 def _written(search: _Search, finished: Finished, best: CandidateResult | None) -> LayoutResult:
     """The record and all files."""
     given = given_layout(search.request) if search.given is None else search.given()
-    record = layout_record(search.ready, finished, given, tried=search.tried, best=best, solves=search.finish.solves)
+    record = layout_record(search.ready, finished, given, tried=search.tried, best=best)
     if best is not None:
-        record["misplacement"] = search.finish.records.get(best.trial)
+        record["misplacement"] = best.misplacement
     files: dict[str, bytes] = {}
     if best is not None:
         head = head_of(record, search.request)

@@ -6,7 +6,9 @@ Nodes and keys are added where the solved motion asks for more time, or comes ne
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from functools import lru_cache
+from itertools import count
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -33,6 +35,9 @@ from cellplan.search.variables.variables import Variables
 from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Workers
 
+if TYPE_CHECKING:
+    from cellplan.search.misplacement.robust import Robust, RobustSearch
+
 NODES: Final = 129  # [-] of the finish
 KEYS: Final = 25  # [-] configurations at which distances are asked there
 ITERATIONS: Final = 25
@@ -58,6 +63,7 @@ class CandidateResult:
         reason: Why it is rejected; empty where it passed.
         standing: How it stands at the nodes of the finish.
         solves: How often it was solved in full.
+        misplacement: What came of it with displaced bases; None where none are asked for, or where it is rejected.
     """
 
     trial: int
@@ -67,6 +73,7 @@ class CandidateResult:
     reason: str
     standing: Standing
     solves: int
+    misplacement: MisplacementRecord | None = None
 
     @property
     def passed(self) -> bool:
@@ -89,7 +96,7 @@ class CandidateResult:
         return None if self.program is None else clearance_of(self.program, within_robot=False)
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Reserves:
     """What is asked for beyond the demands, as verified motions have shown to be needed."""
 
@@ -102,12 +109,11 @@ class _Reserves:
     denser: tuple[float, ...] = ()
     also_at: tuple[float, ...] = ()
 
-    def add_nodes(self, times: Sequence[float], span: float) -> bool:
-        """Add nodes about times in [s] of a motion of so many seconds; False where there are more already."""
+    def denser_at(self, times: Sequence[float], span: float) -> "_Reserves | None":
+        """With more nodes about times in [s] of a motion of so many seconds; None where there are more already."""
         step = span / (self.nodes - 1)
         new = [time for time in times if all(abs(time - other) > step for other in self.denser)]
-        self.denser = (*self.denser, *new)
-        return bool(new)
+        return replace(self, denser=(*self.denser, *new)) if new else None
 
     @property
     def effort(self) -> Effort:
@@ -124,39 +130,48 @@ class _Timed:
     start: Array
     standing: Standing
     demands: Demands
+    reserves: _Reserves
     early: EarlyClearance
     program: TimedProgram | None = None
     reason: str = ""
 
 
-@dataclass(slots=True, kw_only=True)
-class Finish:
-    """The finish of layouts of one cell.
+@dataclass(frozen=True, slots=True, eq=False)
+class Finalist:
+    """A trial that is to be finished."""
 
-    Attributes:
-        records: What was found of each layout with displaced bases, by its trial; empty where none are asked for.
-    """
+    trial: StudyTrial
+    begun: "tuple[RobustSearch, Robust | None] | None" = None  # the layout with displaced bases, where it is begun
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Finish:
+    """The finish of layouts of one cell."""
 
     ready: PreparedSearch  # the cell
     progress: Progress  # called with the stage and the fraction done
     workers: int | Executor = 1  # processes that help where they are idle; or how many each study begins
-    solves: int = 0  # how often a layout was solved in full so far
-    records: dict[int, MisplacementRecord] = field(default_factory=dict)
-    choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices that the cell was made ready with
-    _problems: dict[tuple[PreparedSearch, int, tuple[float, ...]], Any] = field(default_factory=dict)
+    choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices that the cell is made ready with
 
-    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[StudyTrial]:
+    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[Finalist]:
         """Trials that conform by the search, best first, in the order in which they are finished."""
-        return trials
+        return [Finalist(trial) for trial in trials]
 
-    def certified(self, trial: StudyTrial) -> CandidateResult:
+    def certified(self, finalist: Finalist) -> CandidateResult:
         """A layout of the search, certified or with the reason why not."""
-        x, start = self._layout(trial)
-        reserves, is_first, before = _Reserves(), True, self.solves
-        while True:
-            timed = self._refined(x, start, reserves, is_first=is_first)
+        return self._with_choice_of(finalist.trial)._certified(finalist.trial)
+
+    def _with_choice_of(self, trial: StudyTrial) -> Self:
+        """The finish of layouts with the discrete choices of a trial."""
+        choice = choice_of(trial)
+        return replace(self, ready=prepared(self.ready.request, choice), choice=choice)
+
+    def _certified(self, trial: StudyTrial) -> CandidateResult:
+        """See ``certified``; the cell is made ready with the choices of the trial."""
+        (x, start), reserves = layout_of(trial), _Reserves()
+        for solves in count(1):
+            timed = self._refined(x, start, reserves, is_first=solves == 1)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
-            self.solves += 1
             if program is not None:
                 program = program.certified(self.progress, timed.early)
                 reason = rejection_of(program, self.ready.variables) or too_singular(
@@ -169,17 +184,13 @@ class Finish:
                 program=program,
                 reason=reason,
                 standing=timed.standing,
-                solves=self.solves - before,
+                solves=solves,
             )
-            if result.passed or program is None or result.solves >= ROUNDS or not _enlarged(reserves, timed, program):
-                return result
-            is_first = False
-
-    def _layout(self, trial: StudyTrial) -> tuple[Array, Array]:
-        """Variables and start posture of a layout of the search; the cell is made ready with its discrete choices."""
-        self.choice = choice_of(trial)
-        self.ready = prepared(self.ready.request, self.choice)
-        return np.array(trial.figures["x"], dtype=float), np.array(trial.figures["start"], dtype=float)
+            more = None if result.passed or program is None or solves >= ROUNDS else _enlarged(timed, program)
+            if more is None:
+                break
+            reserves = more
+        return result
 
     def _refined(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
         """The layout and its motion, improved again with more nodes where it asks for more time than the others do."""
@@ -189,13 +200,15 @@ class Finish:
                 return best
             problem, measures = best.standing.problem, best.standing.measures
             peaks = exceeded_at(best.program, measures.cycle, measures.span)
-            if not isinstance(problem, LayoutProblem) or not reserves.add_nodes(peaks, measures.span):
+            denser = reserves.denser_at(peaks, measures.span)
+            if not isinstance(problem, LayoutProblem) or denser is None:
                 break
+            reserves = denser
             refined = self._drafted(best.x, best.start, reserves, is_first=False)
             if refined.program is None or time_of(refined.program) > (1.0 - GAIN) * time_of(best.program):
                 break
             best = refined
-        return self._shortest(best)
+        return self._shortest(replace(best, reserves=reserves))
 
     def _drafted(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
         """The layout improved at more nodes, with its motion in the cycle that it has there."""
@@ -203,7 +216,7 @@ class Finish:
         is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
         helping = self.workers if isinstance(self.workers, Workers) else None
         early = EarlyClearance(helping.begin if is_once and helping is not None else None)
-        timed = _Timed(x=x, start=start, standing=standing, demands=demands, early=early)
+        timed = _Timed(x=x, start=start, standing=standing, demands=demands, reserves=reserves, early=early)
         try:
             cell = self._cell(x, start)
             program = draft(self.ready, cell, standing.measures.cycle, self.progress, early)
@@ -232,7 +245,7 @@ class Finish:
         self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool
     ) -> tuple[Array, Array, Standing, Demands]:
         """The layout improved at more nodes; one that only has to conform is taken as it is at first."""
-        demands, problem = self._demands(x, start), self._problem(reserves.nodes, reserves.denser)
+        demands, problem = self._demands(x, start), problem_of(self.ready, reserves.nodes, reserves.denser)
         if is_first and demands.objective is Objective.CONFORMING:
             problem, effort = self.ready.coarse, Effort()
             point = problem.evaluate(x, start)
@@ -252,15 +265,19 @@ class Finish:
         point = self.ready.coarse.evaluate(x, start)
         return self.ready.demands() if point is None else demands_near(self.ready, point)
 
-    def _problem(self, nodes: int, denser: tuple[float, ...] = ()) -> Any:
-        """The layout problem at about so many nodes, and more about some times in [s] on their clock."""
-        key = (self.ready, nodes, denser)
-        if key not in self._problems:
-            problem = self.ready.problem(nodes)
-            if denser and isinstance(problem, LayoutProblem):
-                problem = problem.finer(self.ready.schedule, nodes=nodes, denser=denser)
-            self._problems[key] = problem
-        return self._problems[key]
+
+def layout_of(trial: StudyTrial) -> tuple[Array, Array]:
+    """Variables and start posture of a layout of the search, shapes (n,) and (nq,)."""
+    return np.array(trial.figures["x"], dtype=float), np.array(trial.figures["start"], dtype=float)
+
+
+@lru_cache(maxsize=8)
+def problem_of(ready: PreparedSearch, nodes: int, denser: tuple[float, ...] = ()) -> Any:
+    """The layout problem at about so many nodes, and more about some times in [s] on their clock."""
+    problem = ready.problem(nodes)
+    if denser and isinstance(problem, LayoutProblem):
+        return problem.finer(ready.schedule, nodes=nodes, denser=denser)
+    return problem
 
 
 def rejection_of(program: TimedProgram, variables: Variables) -> str:
@@ -299,34 +316,34 @@ def certified_cell(result: CandidateResult) -> Cell:
     return result.program.solution.cell
 
 
-def _enlarged(reserves: _Reserves, timed: _Timed, program: TimedProgram) -> bool:
-    """Ask for what the verified motion missed, with nodes and keys there; False where it missed nothing of the kind."""
+def _enlarged(timed: _Timed, program: TimedProgram) -> _Reserves | None:
+    """Reserves for what the verified motion missed, nodes and keys there; None where it missed nothing of the kind."""
     problem, span, times = timed.standing.problem, timed.standing.measures.span, list[float]()
-    demanded = float(timed.demands.margin.max(initial=0.0))
+    demanded, reserves = float(timed.demands.margin.max(initial=0.0)), timed.reserves
     margin, load = margin_of(program), load_of(program)
     missed_margin = margin is not None and margin < DEG * demanded
     if margin is not None and missed_margin:
-        reserves.angle += demanded - np.radians(margin) + MORE_ANGLE
+        reserves = replace(reserves, angle=reserves.angle + (demanded - np.radians(margin) + MORE_ANGLE))
         times += margins_missed_at(program, demanded, span)
     required = program.solution.cell.checks.clearance_mm
     others, inner = (clearance_of(program, within_robot=within_robot) for within_robot in (False, True))
     keys = list[float]()
     if others is not None and others < required:
-        reserves.length += (required - others) / MM + MORE_LENGTH
+        reserves = replace(reserves, length=reserves.length + ((required - others) / MM + MORE_LENGTH))
         keys += distances_missed_at(program, span, within_robot=False)
     if inner is not None and inner < required:
-        reserves.within_robot += (required - inner) / MM + MORE_WITHIN
+        reserves = replace(reserves, within_robot=reserves.within_robot + ((required - inner) / MM + MORE_WITHIN))
         keys += distances_missed_at(program, span, within_robot=True)
     if load > 1.0:
-        reserves.time += load - 1.0 + MORE_TIME
+        reserves = replace(reserves, time=reserves.time + (load - 1.0 + MORE_TIME))
         times += exceeded_at(program, program.cycle, span)
     if not (missed_margin or keys or load > 1.0):
-        return False
-    reserves.also_at = (*reserves.also_at, *keys)
-    if not isinstance(problem, LayoutProblem) or not reserves.add_nodes([*times, *keys], span):
-        reserves.nodes = 2 * reserves.nodes - 1
-        reserves.keys = 2 * reserves.keys - 1 if keys else reserves.keys
-    return True
+        return None
+    reserves = replace(reserves, also_at=(*reserves.also_at, *keys))
+    denser = reserves.denser_at([*times, *keys], span) if isinstance(problem, LayoutProblem) else None
+    if denser is not None:
+        return denser
+    return replace(reserves, nodes=2 * reserves.nodes - 1, keys=2 * reserves.keys - 1 if keys else reserves.keys)
 
 
 def margin_of(program: TimedProgram) -> float | None:

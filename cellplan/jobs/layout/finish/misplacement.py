@@ -1,7 +1,7 @@
 """Finish of a layout whose bases may all be off their places: one cycle for all corners, each of them verified."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,9 +19,12 @@ from cellplan.jobs.layout.finish.finish import (
     MORE_ANGLE,
     NODES,
     CandidateResult,
+    Finalist,
     Finish,
     clearance_of,
+    layout_of,
     margin_of,
+    problem_of,
     rejection_of,
     too_singular,
 )
@@ -70,53 +73,48 @@ class _Verdict:
     is_mendable: bool  # whether only a margin or a distance is missed, so that the search may ask for more
 
 
-@dataclass(slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MisplacedFinish(Finish):
     """The finish of layouts that must keep all demands with all bases off their places."""
 
     misplacement: MisplacementEntry  # by how much
-    _begun: dict[int, tuple[RobustSearch, Robust | None]] = field(default_factory=dict)
 
-    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[StudyTrial]:
+    def ordered(self, trials: Sequence[StudyTrial]) -> Sequence[Finalist]:
         """See ``Finish``: of the best ones that differ, the one with the shortest cycle with displaced bases first."""
         if self.ready.request.objective is not Objective.CYCLE:
-            return trials
+            return Finish.ordered(self, trials)
         listed = list[StudyTrial]()
         for trial in trials:
             cycle = trial.figures[BESTS[Objective.CYCLE].figure]
             if all(abs(cycle - other.figures["cycle_s"]) > SAME * cycle for other in listed):
                 listed.append(trial)
         listed = listed[:FINALISTS]
-        for trial in listed:
-            if trial.number not in self._begun:
-                self._begin(trial)
 
-        def rank(trial: StudyTrial) -> tuple[int, float]:
-            robust = self._begun[trial.number][1]
+        def rank(finalist: Finalist) -> tuple[int, float]:
+            robust = None if finalist.begun is None else finalist.begun[1]
             return (10**9, np.inf) if robust is None else (len(robust.corners) - robust.passing, robust.cycle)
 
-        first = sorted(listed, key=rank)
-        return [*first, *(trial for trial in trials if all(trial is not leading for leading in first))]
+        first = sorted((Finalist(trial, self._begun(trial)) for trial in listed), key=rank)
+        return [*first, *(Finalist(trial) for trial in trials if all(trial is not leading for leading in listed))]
 
-    def certified(self, trial: StudyTrial) -> CandidateResult:
+    def certified(self, finalist: Finalist) -> CandidateResult:
         """A layout of the search with all its corners; see ``Finish``.
 
         Raises:
             NoSolutionError: A tool loses its path at the nodes of the search.
         """
-        self._layout(trial)
-        if trial.number not in self._begun:
-            self._begin(trial)
-        search, robust = self._begun[trial.number]
+        trial = finalist.trial
+        search, robust = finalist.begun or self._begun(trial)
         if robust is None:
             raise NoSolutionError(NOT_FOLLOWED)
         self.progress(f"displacing the bases of trial {trial.number}", 1.0)
-        before, effort = self.solves, MANY
-        search = search.finer(GuardedProblem.like(self._problem(NODES)), robust, effort)
+        made, effort = self._with_choice_of(trial), MANY
+        corners = _Corners(made, trial.number)
+        search = search.finer(GuardedProblem.like(problem_of(made.ready, NODES)), robust, effort)
         for _ in range(ATTEMPTS):
             x, start = robust.improved.x, robust.improved.start
-            robust = robust_layout(search, (x, start), signs=self._signs(search)) or robust
-            result, missing = self._result(trial.number, robust, effort, before)
+            robust = robust_layout(search, (x, start), signs=made.signs(search)) or robust
+            result, missing = corners.result(robust, effort)
             if result.passed or missing is None:
                 break
             reserve = effort.reserve
@@ -125,34 +123,40 @@ class MisplacedFinish(Finish):
             search.effort = effort
         return result
 
-    def _begin(self, trial: StudyTrial) -> None:
-        """Improve a layout with displaced bases at few nodes."""
+    def _begun(self, trial: StudyTrial) -> tuple[RobustSearch, Robust | None]:
+        """A layout improved with displaced bases at few nodes."""
         self.progress(f"displacing the bases of trial {trial.number}", 0.0)
-        x, start = self._layout(trial)
+        made, (x, start) = self._with_choice_of(trial), layout_of(trial)
         search = RobustSearch(
-            problem=GuardedProblem.like(self._problem(FEW_NODES)),
-            displacements=BaseDisplacements.of(self.ready.variables, x, self.misplacement),
-            demands=self.ready.demands(),
+            problem=GuardedProblem.like(problem_of(made.ready, FEW_NODES)),
+            displacements=BaseDisplacements.of(made.ready.variables, x, self.misplacement),
+            demands=made.ready.demands(),
             effort=FEW,
         )
-        robust = robust_layout(search, (x, start), signs=self._signs(search), rounds=FEW_ROUNDS)
-        self._begun[trial.number] = search, robust
+        return search, robust_layout(search, (x, start), signs=made.signs(search), rounds=FEW_ROUNDS)
 
-    def _signs(self, search: RobustSearch) -> Array:
+    def signs(self, search: RobustSearch) -> Array:
         """The seeded corners."""
         return seeded_signs(generator("layout/misplacement", self.ready.request.seed), len(search.displacements.names))
 
-    def _result(
-        self, trial: int, robust: Robust, effort: Effort, before: int
-    ) -> tuple[CandidateResult, tuple[float, float] | None]:
+
+@dataclass(slots=True)
+class _Corners:
+    """One layout with displaced bases while it is solved and its corners are verified."""
+
+    finish: MisplacedFinish  # the cell, made ready with the choices of the layout
+    trial: int  # number of the trial
+    solves: int = 0  # how often it was solved in full so far
+
+    def result(self, robust: Robust, effort: Effort) -> tuple[CandidateResult, tuple[float, float] | None]:
         """The layout solved and all its corners verified, and the margin and distance to ask for where one failed."""
-        x, start, demands = robust.improved.x, robust.improved.start, self.ready.demands()
-        standing = standing_of(self._problem(NODES), robust.improved.point, demands, effort)
+        x, start, demands = robust.improved.x, robust.improved.start, self.finish.ready.demands()
+        standing = standing_of(problem_of(self.finish.ready, NODES), robust.improved.point, demands, effort)
         program, solved, reason, verdicts = None, list[CornerRecord](), "", list[_Verdict]()
-        missing = None
+        missing, record = None, None
         try:
             program, solved, reason, verdicts = self._in_one_cycle(robust)
-            reason = reason or too_singular(self.ready, standing, program)
+            reason = reason or too_singular(self.finish.ready, standing, program)
         except (InputError, NoSolutionError) as error:
             reason = str(error).splitlines()[0]
         failed = [verdict for verdict in verdicts if verdict.reason]
@@ -162,15 +166,16 @@ class MisplacedFinish(Finish):
                 missing = (MORE_ANGLE, MORE_LENGTH) if failed[0].is_mendable else None
             if not reason:
                 limits = self._tolerances(robust, program, effort)
-                self.records[trial] = self._record(robust, program.cycle, verdicts, solved, limits)
+                record = self._record(robust, program.cycle, verdicts, solved, limits)
         result = CandidateResult(
-            trial=trial,
+            trial=self.trial,
             x=x,
             start=start,
             program=program,
             reason=reason,
             standing=standing,
-            solves=self.solves - before,
+            solves=self.solves,
+            misplacement=record,
         )
         return result, missing
 
@@ -181,11 +186,11 @@ class MisplacedFinish(Finish):
             The program of the layout, its worst corners, why one of them failed, and the verdicts.
         """
         of, listed = robust.displacements, list(_chosen(robust))
-        cells = [self.ready.variables.cell(robust.improved.x, robust.improved.start)]
+        cells = [self.finish.ready.variables.cell(robust.improved.x, robust.improved.start)]
         cells += [of.cell(corner.d, corner.start) for _, corner in listed]
         factor = None
-        if self.ready.request.objective is Objective.CYCLE:
-            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * robust.cycle / self.ready.duration)
+        if self.finish.ready.request.objective is Objective.CYCLE:
+            factor = whole_steps(cells[0], (1.0 + MORE_TIME) * robust.cycle / self.finish.ready.duration)
         for _ in range(DURATIONS):
             programs, factor = self._solved_together(cells, factor)
             verdicts = self._verdicts(
@@ -195,8 +200,8 @@ class MisplacedFinish(Finish):
             if factor is None or most <= 1.0:
                 break
             factor = whole_steps(cells[0], factor * most, longer_than=factor)
-        programs = [program.certified(self.progress, EarlyClearance()) for program in programs]
-        reasons = [rejection_of(program, self.ready.variables) for program in programs]
+        programs = [program.certified(self.finish.progress, EarlyClearance()) for program in programs]
+        reasons = [rejection_of(program, self.finish.ready.variables) for program in programs]
         corners = [
             _corner(what, of.names, corner.d, (program, reason))
             for (what, corner), program, reason in zip(listed, programs[1:], reasons[1:], strict=True)
@@ -207,10 +212,12 @@ class MisplacedFinish(Finish):
         """Programs of cells in the shortest common cycle that all of them keep, from a given one on, and its factor."""
         self.solves += len(cells)
         if factor is None:
-            solved = partial(TimedProgram.solved, law=Law.AS_WRITTEN, values={}, task=None, progress=self.progress)
+            solved = partial(
+                TimedProgram.solved, law=Law.AS_WRITTEN, values={}, task=None, progress=self.finish.progress
+            )
             return [solved(cell) for cell in cells], None
         for _ in range(DURATIONS):
-            programs = [scaled(cell, factor, self.progress) for cell in cells]
+            programs = [scaled(cell, factor, self.finish.progress) for cell in cells]
             required = max(max(load_of(program), required_time(program)) for program in programs)
             if required <= 1.0:
                 break
@@ -226,8 +233,8 @@ class MisplacedFinish(Finish):
         """
         of, x = robust.displacements, robust.improved.x
         layout = DisplacedLayout(
-            request=self.ready.request.anywhere,
-            choice=self.choice,
+            request=self.finish.ready.request.anywhere,
+            choice=self.finish.choice,
             x=tuple(x.tolist()),
             robots=of.robots,
             components=of.components,
@@ -236,14 +243,16 @@ class MisplacedFinish(Finish):
         variants = [
             Variant(place, {"d": d.tolist(), "start": start.tolist()}) for place, (d, start) in enumerate(placed)
         ]
-        header = {"kind": "displaced", "cell": self.ready.cell.name, "x": x.tolist(), "factor": factor}
+        header = {"kind": "displaced", "cell": self.finish.ready.cell.name, "x": x.tolist(), "factor": factor}
         with TemporaryDirectory(prefix="cellplan-displaced-") as folder:
             study = Study.of_variants(Path(folder), header, variants)
             if is_first_enough:
                 study = replace(study, enough=_is_lost)
             limits, evaluate = Limits(seconds=SECONDS), partial(verified, layout)
             try:
-                trials = study.run(evaluate, workers=self.workers, limits=limits, progress=self.progress).trials
+                trials = study.run(
+                    evaluate, workers=self.finish.workers, limits=limits, progress=self.finish.progress
+                ).trials
             except KeyboardInterrupt:
                 raise KeyboardInterrupt(
                     "interrupted while displaced bases were verified; --resume begins with that"
@@ -253,7 +262,7 @@ class MisplacedFinish(Finish):
 
     def _verdict(self, trial: StudyTrial) -> _Verdict:
         """The verdict of one trial."""
-        figures, demanded = trial.figures, DEG * float(self.ready.variables.margin.max(initial=0.0))
+        figures, demanded = trial.figures, DEG * float(self.finish.ready.variables.margin.max(initial=0.0))
         margin = figures.get("margin_deg")
         is_mendable = bool(figures) and (not figures["is_apart"] or (margin is not None and margin < demanded))
         reason = "" if trial.passed else trial.outcome.reason
@@ -262,9 +271,9 @@ class MisplacedFinish(Finish):
     def _tolerances(self, robust: Robust, program: TimedProgram, effort: Effort) -> list[BaseTolerance]:
         """How far each base may be off, found at the nodes and verified; less where that fails."""
         factor = None
-        if self.ready.request.objective is Objective.CYCLE:
-            factor = program.cycle / self.ready.duration
-        finer, demands, start = replace(effort, within=WITHIN), self.ready.demands(), robust.improved.start
+        if self.finish.ready.request.objective is Objective.CYCLE:
+            factor = program.cycle / self.finish.ready.duration
+        finer, demands, start = replace(effort, within=WITHIN), self.finish.ready.demands(), robust.improved.start
         measured = list(tolerances(robust.problem, start, demands, finer, max(program.cycle, robust.cycle)))
         of = robust.displacements
         ends = np.tile(of.amounts, 2)  # verified already, as far as the nodes do not say otherwise
@@ -304,8 +313,8 @@ class MisplacedFinish(Finish):
         groups = (verdicts[: robust.worst_ones], verdicts[robust.worst_ones : ends], verdicts[ends:])
         passing = [sum(not corner.reason for corner in group) for group in groups]
         return {
-            "position_mm": number(self.misplacement.position_mm),
-            "orientation_deg": number(self.misplacement.orientation_deg),
+            "position_mm": number(self.finish.misplacement.position_mm),
+            "orientation_deg": number(self.finish.misplacement.orientation_deg),
             "cycle_s": number(round(cycle, 6)),
             "nominal_cycle_s": number(round(robust.nominal, 6)),
             "seeded": len(groups[2]),
