@@ -14,7 +14,15 @@ from cellplan.jobs.layout.given_layout import Given, GivenRecord, standing_of_gi
 from cellplan.jobs.layout.misplacement_record import MisplacementRecord
 from cellplan.jobs.layout.trials.limits import LimitRecord
 from cellplan.jobs.layout.trials.prepared import PreparedSearch, prepared, values_of
-from cellplan.jobs.layout.trials.proposals import BESTS, SIZE, choice_of, choice_text, is_candidate, origin_text
+from cellplan.jobs.layout.trials.proposals import (
+    BESTS,
+    SIZE,
+    Proposal,
+    choice_of,
+    choice_text,
+    is_candidate,
+    origin_text,
+)
 from cellplan.jobs.layout.trials.trial import change_of
 from cellplan.jobs.layout.variable_records import PathRecord, VariableRecord, path_record, variable_records
 from cellplan.model.cell.joint_limits import acceleration_limits
@@ -244,7 +252,7 @@ def _candidate(ready: PreparedSearch, trial: StudyTrial, certified: CandidateRes
     rounded = {key: None if value is None else number(round(value, FINE)) for key, value in shown.items()}
     return {
         "trial": trial.number,
-        "origin": origin_text(trial.variant.values, is_sampled="sampled" in figures),
+        "origin": origin_text(Proposal.of_trial(trial), is_sampled="sampled" in figures),
         "status": status,
         "reason": reason,
         "cycle_s": rounded["cycle_s"],

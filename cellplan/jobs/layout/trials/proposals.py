@@ -2,10 +2,13 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Final
 
+import numpy as np
+
 from cellplan.errors import NoSolutionError
+from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.prepared import PreparedSearch
 from cellplan.search.programs.objective import Objective
@@ -29,6 +32,48 @@ BESTS: Final[Mapping[Objective, Best]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """Where a trial begins, and what is asked of it; the fields are its values in a study."""
+
+    kind: str  # given, attempt, branch, sampled, perturbed, or improved: the same layout with more clearance
+    of: int | None = None  # number of the trial at whose end it begins; None for the given layout
+    spread: float | None = None  # usual steps of a perturbation
+    index: int | None = None  # of a layout of the user's, or of a sample
+    x: Sequence[float] | None = None  # variables that it begins with
+    start: Sequence[float] | None = None  # start posture in [rad] or [m]
+    choice: Mapping[str, object] = field(default_factory=dict)  # discrete choices, values by address
+    unled: Mapping[str, Any] | None = None  # ``x`` and ``start`` of the motion without the joint path that it led to
+    clearance_m: float | None = None  # clearance beyond what is demanded
+    give_up_above_s: float | None = None  # cycle above which it is given up on its way
+
+    @classmethod
+    def of_trial(cls, trial: StudyTrial) -> "Proposal":
+        """What a trial of a study began with."""
+        return cls(**trial.variant.values)  # type: ignore[arg-type]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """The values of the trial: those that there are, and the layout that is perturbed."""
+        written = {key.name: getattr(self, key.name) for key in fields(self)}
+        return {key: value for key, value in written.items() if value is not None or (key == "of" and self.is_near)}
+
+    @property
+    def is_near(self) -> bool:
+        """Whether it begins near another layout."""
+        return self.kind == "perturbed"
+
+    @property
+    def is_near_given(self) -> bool:
+        """Whether it begins at the given layout or near it."""
+        return self.kind == "given" or (self.is_near and self.of is None)
+
+    @property
+    def begin(self) -> tuple[Array, Array]:
+        """Variables, shape (n,), and start posture, shape (nq,), that it begins with."""
+        return np.array(self.x, dtype=float), np.array(self.start, dtype=float)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Proposals:
     """What each round tries; the same for the same finished rounds."""
 
@@ -39,6 +84,10 @@ class Proposals:
 
     def __call__(self, finished: Sequence[StudyTrial]) -> list[dict[str, Any]]:
         """Values of the trials of the next round."""
+        return [proposal.values for proposal in self.next_round(finished)]
+
+    def next_round(self, finished: Sequence[StudyTrial]) -> list[Proposal]:
+        """What the next round tries."""
         first = self._first()[len(finished) : len(finished) + SIZE]
         if first:
             return first
@@ -54,26 +103,23 @@ class Proposals:
             self._perturbed(second, NARROW[(number + 1) % len(NARROW)], number),
             self._fourth(best, number, is_conforming=bool(following)),
         ]
-        lost = [trial.variant.values.get("choice", {}) for trial in finished if _leads_nowhere(trial)]
-        for place, trial in enumerate(proposed):
-            is_far = trial["kind"] == "sampled" or (trial["kind"] == "perturbed" and trial["of"] is None)
-            if is_far and trial["choice"] in lost:
-                proposed[place] = {**self._sampled(len(finished) + place, 0), "choice": trial["choice"]}
+        lost = [choice_of(trial) for trial in finished if _leads_nowhere(trial)]
+        for place, proposal in enumerate(proposed):
+            if (proposal.kind == "sampled" or proposal.is_near_given) and proposal.choice in lost:
+                proposed[place] = replace(self._sampled(len(finished) + place, 0), choice=proposal.choice)
         if not following or self.request.objective is not Objective.CYCLE:
             return proposed
         limit = GIVEN_UP * (BESTS[Objective.CYCLE].value(following[0]) or math.inf)
-        return [values if "clearance_m" in values else values | {"give_up_above_s": limit} for values in proposed]
+        return [it if it.clearance_m is not None else replace(it, give_up_above_s=limit) for it in proposed]
 
-    def _first(self) -> list[dict[str, Any]]:
+    def _first(self) -> list[Proposal]:
         """The given layout and those of the user with all choices, then perturbations of the given one and samples."""
-        listed: list[dict[str, Any]] = [
-            {"kind": "given"},
-            *({"kind": "attempt", "index": k} for k in range(len(self.request.attempts))),
-        ]
+        attempts = (Proposal(kind="attempt", index=k) for k in range(len(self.request.attempts)))
+        listed = [Proposal(kind="given"), *attempts]
         if self.request.seed and self.request.objective is Objective.CONFORMING:
-            listed[0] = {"kind": "perturbed", "of": None, "spread": SLIGHT}  # another seed, another layout
-        options: list[dict[str, Any]] = [{**options, "choice": choice} for choice in self.choices for options in listed]
-        options += [{"kind": "branch", **branch, "choice": self.choices[0]} for branch in self.branches]
+            listed[0] = Proposal(kind="perturbed", spread=SLIGHT)  # another seed, another layout
+        options = [replace(proposal, choice=choice) for choice in self.choices for proposal in listed]
+        options += [Proposal(kind="branch", choice=self.choices[0], **branch) for branch in self.branches]
         options += [self._sampled(0, number) for number in range(1, len(self.choices))]
         rest = [self._perturbed(None, WIDE[0], 0), self._perturbed(None, WIDE[1], 1), self._sampled(0, 0)]
         return [*options, *rest[: -len(options) % SIZE]]
@@ -93,27 +139,26 @@ class Proposals:
                 last = value
                 yield trial
 
-    def _perturbed(self, trial: StudyTrial | None, spread: float, number: int) -> dict[str, Any]:
+    def _perturbed(self, trial: StudyTrial | None, spread: float, number: int) -> Proposal:
         """A trial near the end of another one; None for the given layout."""
         if trial is None:
-            choices = self.choices
-            return {"kind": "perturbed", "of": None, "spread": spread, "choice": choices[number % len(choices)]}
-        figures, values = trial.outcome.figures, trial.variant.values
-        return {
-            "kind": "perturbed",
-            "of": trial.variant.number,
-            "spread": spread,
-            "x": figures["x"],
-            "start": figures["start"],
-            "choice": values.get("choice", {}),
-            **({"unled": figures["unled"]} if "unled" in figures else {}),
-        }
+            return Proposal(kind="perturbed", spread=spread, choice=self.choices[number % len(self.choices)])
+        figures = trial.figures
+        return Proposal(
+            kind="perturbed",
+            of=trial.number,
+            spread=spread,
+            x=figures["x"],
+            start=figures["start"],
+            choice=choice_of(trial),
+            unled=figures.get("unled"),
+        )
 
-    def _sampled(self, index: int, number: int) -> dict[str, Any]:
+    def _sampled(self, index: int, number: int) -> Proposal:
         """A trial anywhere within the bounds."""
-        return {"kind": "sampled", "index": index, "choice": self.choices[number % len(self.choices)]}
+        return Proposal(kind="sampled", index=index, choice=self.choices[number % len(self.choices)])
 
-    def _fourth(self, best: StudyTrial | None, number: int, *, is_conforming: bool) -> dict[str, Any]:
+    def _fourth(self, best: StudyTrial | None, number: int, *, is_conforming: bool) -> Proposal:
         """In turn a sample, the given layout perturbed, and the best one asked for more clearance than is demanded.
 
         While nothing conforms, a sample in every round.
@@ -123,8 +168,8 @@ class Proposals:
             return self._sampled(number, number)
         if turn != 2 or best is None or self.request.objective is not Objective.CYCLE:
             return self._perturbed(None, WIDE[(number + 1) % len(WIDE)], number)
-        more = self._perturbed(best, 0.0, number) | {"kind": "improved"}
-        return more | {"clearance_m": ADDED[number // 4 % len(ADDED)]}
+        more = ADDED[number // 4 % len(ADDED)]
+        return replace(self._perturbed(best, 0.0, number), kind="improved", clearance_m=more)
 
 
 def proposals_of(request: LayoutRequest, ready: PreparedSearch) -> "Proposals":
@@ -150,40 +195,38 @@ def _branches(ready: PreparedSearch) -> list[dict[str, list[float]]]:
 
 def _leads_nowhere(trial: StudyTrial) -> bool:
     """Whether a trial is the given layout and no motion begins there."""
-    figures = trial.outcome.figures
-    return trial.variant.values["kind"] == "given" and ("x" not in figures or "sampled" in figures)
+    return Proposal.of_trial(trial).kind == "given" and ("x" not in trial.figures or "sampled" in trial.figures)
 
 
 def choice_of(trial: StudyTrial) -> Mapping[str, object]:
     """The discrete choices of a trial; empty for those of the cell."""
-    choice: Any = trial.variant.values.get("choice")
-    return choice or {}
+    return Proposal.of_trial(trial).choice
 
 
 def is_candidate(trial: StudyTrial) -> bool:
     """Whether a trial conforms to what is demanded; one that asks for more clearance only leads to others."""
-    return trial.passed and not trial.variant.values.get("clearance_m")
+    return trial.passed and not Proposal.of_trial(trial).clearance_m
 
 
-def origin_text(values: Mapping[str, Any], *, is_sampled: bool = False) -> str:
+def origin_text(proposal: Proposal, *, is_sampled: bool = False) -> str:
     """Where a trial began, in words; ``is_sampled`` says that a sample took the place of the given layout."""
-    match values["kind"]:
+    match proposal.kind:
         case _ if is_sampled:
             text = "a sample in place of the given layout"
         case "given":
             text = "the given layout"
         case "attempt":
-            text = f"layout {values['index'] + 1} of --try"
+            text = f"layout {(proposal.index or 0) + 1} of --try"
         case "branch":
             text = "the given layout, another branch"
         case "sampled":
-            text = f"sample {values['index']}"
+            text = f"sample {proposal.index}"
         case "improved":
-            text = f"trial {values['of']}, {1000.0 * values['clearance_m']:g} mm more clearance"
+            text = f"trial {proposal.of}, {1000.0 * (proposal.clearance_m or 0.0):g} mm more clearance"
         case _:
-            of = "the given layout" if values["of"] is None else f"trial {values['of']}"
+            of = "the given layout" if proposal.of is None else f"trial {proposal.of}"
             text = f"{of}, perturbed"
-    chosen = choice_text(values.get("choice") or {})
+    chosen = choice_text(proposal.choice)
     return f"{text} ({chosen})" if chosen else text
 
 

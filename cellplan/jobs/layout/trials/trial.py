@@ -1,7 +1,6 @@
 """One trial of a layout search: from a start to a local optimum and its figures."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Final
@@ -14,7 +13,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.limits import reason, standing_of
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED, PreparedSearch, demands_near, prepared
-from cellplan.jobs.layout.trials.proposals import SIZE, proposals_of
+from cellplan.jobs.layout.trials.proposals import SIZE, Proposal, proposals_of
 from cellplan.model.cell.cell import Cell
 from cellplan.model.seeds import generator
 from cellplan.search.programs.improve import Improved, improve
@@ -60,22 +59,20 @@ def evaluate_first(request: LayoutRequest) -> None:
 @lru_cache(maxsize=1)
 def _evaluated(request: LayoutRequest, number: int, text: str) -> TrialOutcome:
     """See ``evaluate``; the values of the trial as JSON."""
-    values = json.loads(text)
+    proposal = Proposal(**json.loads(text))
     try:
-        ready = prepared(request, _mapping(values.get("choice")))
-        begin = _begin(ready, values, number)
+        ready = prepared(request, proposal.choice)
+        begin = _begin(ready, proposal, number)
     except (InputError, NoSolutionError) as error:
         return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=str(error).splitlines()[0], figures={})
-    added = float(str(values.get("clearance_m", 0.0)))
-    demands = ready.demands(clearance=added)
-    limit = values.get("give_up_above_s")
+    demands, limit = ready.demands(clearance=proposal.clearance_m or 0.0), proposal.give_up_above_s
     effort = EFFORT if ready.unled is None else PATH
-    effort = effort if limit is None else replace(effort, give_up_above=float(str(limit)))
+    effort = effort if limit is None else replace(effort, give_up_above=limit)
     improved = None if begin is None else _improved(ready, begin, demands, effort)
     if begin is None or improved is None:
         return TrialOutcome(status=TrialStatus.NO_SOLUTION, reason=NOT_FOLLOWED, figures={})
     outcome = _outcome(ready, improved, begin.unled)
-    return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, values) else outcome
+    return replace(outcome, figures={**outcome.figures, "sampled": True}) if _is_far(ready, proposal) else outcome
 
 
 def _improved(ready: PreparedSearch, begin: _Begin, demands: Demands, effort: Effort) -> Improved | None:
@@ -89,37 +86,37 @@ def _improved(ready: PreparedSearch, begin: _Begin, demands: Demands, effort: Ef
     return improve(ready.coarse, improved.x, improved.start, demands_met, effort)
 
 
-def _begin(ready: PreparedSearch, values: Mapping[str, object], number: int) -> _Begin | None:
+def _begin(ready: PreparedSearch, proposal: Proposal, number: int) -> _Begin | None:
     """Where a trial begins; None where the tools cannot follow their paths."""
     if ready.unled is not None:
-        return _path(ready, ready.unled, values, number)
-    layout = _layout(ready, values, number)
+        return _path(ready, ready.unled, proposal, number)
+    layout = _layout(ready, proposal, number)
     return None if layout is None else _Begin(*layout)
 
 
-def _path(ready: PreparedSearch, unled: PreparedSearch, values: Mapping[str, Any], number: int) -> _Begin | None:
+def _path(ready: PreparedSearch, unled: PreparedSearch, proposal: Proposal, number: int) -> _Begin | None:
     """Where a trial of a joint path begins: near a path that is known, or at that of a motion by the pseudo-inverse.
 
     Such a motion, from wherever the trial begins, is brought to its own shortest cycle first. Trials of odd numbers
     that perturb another one begin near its path, those of even numbers near the motion that led to it.
     """
-    search, known = ready.path_search, values.get("unled")
-    if values["kind"] == "given" and search.is_given:
+    search, kind, known = ready.path_search, proposal.kind, proposal.unled
+    if kind == "given" and search.is_given:
         return _Begin(ready.coarse.given, ready.given_start)
-    if values["kind"] == "attempt":
-        cell = _attempted(ready, int(values["index"]))
+    if kind == "attempt":
+        cell = _attempted(ready, proposal.index or 0)
         path = cell.robot(search.settings.robot).path
         if path is not None:
             others = search.layout_variables.read_from(cell)
             return _Begin(search.variables(search.resampled(path), others), ready.start_of(cell))
-    if values.get("of") is not None and (values["kind"] == "improved" or number % 2 or known is None):
-        x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-        if values["kind"] == "improved" or not isinstance(ready.coarse, PathProblem):
+    if proposal.of is not None and (kind == "improved" or number % 2 or known is None):
+        x, start = proposal.begin
+        if kind == "improved" or not isinstance(ready.coarse, PathProblem):
             return _Begin(x, start)
         rng = generator(f"layout/{number}", ready.request.seed)
-        point = perturbed_path(ready.coarse, x, start, rng, size=float(values["spread"]))
+        point = perturbed_path(ready.coarse, x, start, rng, size=proposal.spread or 0.0)
         return None if point is None else _Begin(point.x, point.start)
-    begin = _layout(unled, {**values, **(known or {})}, number)
+    begin = _layout(unled, replace(proposal, **(known or {})), number)
     return None if begin is None else _led(ready, unled, begin)
 
 
@@ -172,40 +169,35 @@ def _path_of(ready: PreparedSearch, begin: Begin) -> _Begin | None:
     return None if ready.coarse.evaluate(x, fitted[1]) is None else _Begin(x, fitted[1], unled=begin)
 
 
-def _layout(ready: PreparedSearch, values: Mapping[str, object], number: int) -> Begin | None:
+def _layout(ready: PreparedSearch, proposal: Proposal, number: int) -> Begin | None:
     """Where a trial of a layout begins; None where the tools cannot follow their paths."""
-    kind = values["kind"]
-    if kind == "given" or (kind == "perturbed" and values["of"] is None):
-        return _near_given(ready, values, number)
-    if kind == "attempt":
-        return _attempt(ready, int(str(values["index"])))
-    if kind == "sampled":
-        return _sampled(ready, int(str(values["index"])))
-    x, start = (np.array(values[key], dtype=float) for key in ("x", "start"))
-    if kind in {"improved", "branch"}:
-        return x, start
-    return _perturbed(ready, (x, start), values, number)
+    if proposal.is_near_given:
+        return _near_given(ready, proposal, number)
+    if proposal.kind == "attempt":
+        return _attempt(ready, proposal.index or 0)
+    if proposal.kind == "sampled":
+        return _sampled(ready, proposal.index or 0)
+    return _perturbed(ready, proposal.begin, proposal, number) if proposal.is_near else proposal.begin
 
 
-def _perturbed(ready: PreparedSearch, begin: Begin, values: Mapping[str, object], number: int) -> Begin | None:
+def _perturbed(ready: PreparedSearch, begin: Begin, proposal: Proposal, number: int) -> Begin | None:
     """A layout near another one."""
     rng = generator(f"layout/{number}", ready.request.seed)
-    point = perturbed(ready.coarse, *begin, rng, size=float(str(values["spread"])))
+    point = perturbed(ready.coarse, *begin, rng, size=proposal.spread or 0.0)
     return None if point is None else (point.x, point.start)
 
 
-def _near_given(ready: PreparedSearch, values: Mapping[str, object], number: int) -> Begin | None:
+def _near_given(ready: PreparedSearch, proposal: Proposal, number: int) -> Begin | None:
     """The given layout or one near it; where no motion begins there, a sample that no other trial takes."""
     begin = _given(ready)
     if begin is None:
         return _sampled(ready, number or SIZE - 1)  # the last trial of the first round is sample 0
-    return begin if values["kind"] == "given" else _perturbed(ready, begin, values, number)
+    return begin if proposal.kind == "given" else _perturbed(ready, begin, proposal, number)
 
 
-def _is_far(ready: PreparedSearch, values: Mapping[str, object]) -> bool:
+def _is_far(ready: PreparedSearch, proposal: Proposal) -> bool:
     """Whether a trial of the given layout, or near it, began at a sample instead."""
-    is_near = values["kind"] == "given" or (values["kind"] == "perturbed" and values["of"] is None)
-    if not is_near or (ready.unled is not None and ready.path_search.is_given):
+    if not proposal.is_near_given or (ready.unled is not None and ready.path_search.is_given):
         return False
     return _given(ready.unled or ready) is None
 
@@ -267,8 +259,3 @@ def _outcome(ready: PreparedSearch, improved: Improved, unled: Begin | None) -> 
     violations = standing.violations()
     why = reason(violations[0]) if violations else "less room than the search asks for beyond the demands"
     return TrialOutcome(status=TrialStatus.FAILED, reason=why, figures=figures)
-
-
-def _mapping(value: object) -> Mapping[str, object]:
-    """Discrete choices of a trial."""
-    return value if isinstance(value, Mapping) else {}

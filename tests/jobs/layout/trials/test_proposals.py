@@ -5,7 +5,7 @@ from typing import Any
 
 from cellplan import LayoutRequest
 from cellplan.jobs.layout.trials.prepared import NOT_FOLLOWED
-from cellplan.jobs.layout.trials.proposals import SIZE, Proposals, choice_text, origin_text
+from cellplan.jobs.layout.trials.proposals import SIZE, Proposal, Proposals, choice_text, origin_text
 from cellplan.search.programs.objective import Objective
 from cellplan.study.trial import StudyTrial, TrialOutcome, TrialStatus, Variant
 
@@ -46,7 +46,7 @@ def test_other_branches_are_tried_as_they_are() -> None:
     first = Proposals(request=REQUEST, branches=branches)([])
 
     assert [entry["start"] for entry in first if entry["kind"] == "branch"] == [[1.0], [2.0]]
-    assert origin_text(first[1]) == "the given layout, another branch"
+    assert origin_text(Proposal(**first[1])) == "the given layout, another branch"
 
 
 def test_later_rounds_go_on_from_the_best_trial_of_finished_rounds() -> None:
@@ -97,7 +97,7 @@ def test_a_rejected_trial_is_not_built_on() -> None:
 
 
 def test_the_beginning_of_a_trial_in_words() -> None:
-    values = {"kind": "improved", "of": 3, "clearance_m": 0.01, "choice": {"motion.mode": "part_at_rest"}}
+    more = Proposal(kind="improved", of=3, clearance_m=0.01, choice={"motion.mode": "part_at_rest"})
 
-    assert origin_text(values) == "trial 3, 10 mm more clearance (motion.mode = part_at_rest)"
-    assert origin_text({"kind": "perturbed", "of": None}) == "the given layout, perturbed"
+    assert origin_text(more) == "trial 3, 10 mm more clearance (motion.mode = part_at_rest)"
+    assert origin_text(Proposal(kind="perturbed")) == "the given layout, perturbed"
