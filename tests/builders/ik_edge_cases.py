@@ -8,9 +8,10 @@ import numpy as np
 from builders.random_cells import random_cell
 from builders.search_arms import PUMA, arm_cell, dh_arm
 from cellplan.geometry.transforms import Array, inverse, pose_from, rotation_exp
-from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.robot.robot import Joint
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.solver import SearchEntry
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -121,7 +122,7 @@ def off_the_path() -> Situation:
 def locked(situation: Situation, *names: str, since: float = 0.0) -> Situation:
     """The same with joints that fail."""
     robot = situation.cell.robots[-1].name
-    locks = tuple(LockedJoint(robot=robot, joint=name, since=since) for name in names)
+    locks = tuple(LockedJointEntry(robot=robot, joint=name, from_s=since) for name in names)
     return replace(situation, cell=replace(situation.cell, motion=replace(situation.cell.motion, locked=locks)))
 
 

@@ -112,8 +112,8 @@ def _judged(cell: Cell, times: Array) -> Flags:
     step = float(times[-1]) / (len(times) - 1)
     judged = np.ones(len(times), dtype=bool)
     for lock in cell.motion.locked:
-        if lock.since > 0.0:
-            late = (times - lock.since) / step
+        if lock.from_s > 0.0:
+            late = (times - lock.from_s) / step
             judged &= (late < -FAILURE_ROWS[0]) | (late > FAILURE_ROWS[1])
     return judged
 
@@ -129,8 +129,8 @@ def _not_judged(cell: Cell) -> Iterator[NotJudged]:
             what = f"accelerations of {', '.join(missing)}"
             yield NotJudged(robot=robot.name, what=what, reason="no limit is stated")
     for lock in cell.motion.locked:
-        if lock.since > 0.0:
-            what = f"accelerations at {lock.since:.3f} s, when {lock.robot}/{lock.joint} fails"
+        if lock.from_s > 0.0:
+            what = f"accelerations at {lock.from_s:.3f} s, when {lock.robot}/{lock.joint} fails"
             yield NotJudged(robot="", what=what, reason=FAILURE_REASON)
 
 

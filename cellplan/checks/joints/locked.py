@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check, TaskAccuracy
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.task import ToleranceEntry
 
 STANDSTILL_TOL: Final = 1e-9  # [deg] or [mm] a joint that stands still may differ by: a thousand units in the tables
@@ -30,7 +31,7 @@ def with_locked_joints(
     tolerance: ToleranceEntry,
     *,
     times: Array,
-    locked: Iterable[LockedJoint],
+    locked: Iterable[LockedJointEntry],
 ) -> list[Check]:
     """Failed checks on the accuracy of one task, with the joints that had failed when its tool left the path.
 
@@ -42,34 +43,34 @@ def with_locked_joints(
     if not outside.any():
         return list(checks)
     left = float(times[np.argmax(outside)])
-    names = [f"{lock.robot}/{lock.joint} locked at {lock.since:.3f} s" for lock in locked if lock.since <= left]
+    names = [f"{lock.robot}/{lock.joint} locked at {lock.from_s:.3f} s" for lock in locked if lock.from_s <= left]
     if not names:
         return list(checks)
     reason = f"after {' and '.join(names)}: the other joints cannot compensate"
     return [check if check.passed else replace(check, message=f"{check.message}, {reason}") for check in checks]
 
 
-def _check(cell: Cell, lock: LockedJoint, times: Array, q: Array) -> Check:
+def _check(cell: Cell, lock: LockedJointEntry, times: Array, q: Array) -> Check:
     """One joint: the farthest it goes from where it was when it failed."""
     index = cell.robot(lock.robot).model.joint_names.index(lock.joint)
     unit, scale = cell.robot(lock.robot).model.joints[index].display_unit
-    after = np.flatnonzero(times >= lock.since)
+    after = np.flatnonzero(times >= lock.from_s)
     name = f"joint {lock.robot}/{lock.joint}"
     if not len(after):
-        message = f"{name} is locked from {lock.since:.3f} s on, after the end at {times[-1]:.3f} s"
+        message = f"{name} is locked from {lock.from_s:.3f} s on, after the end at {times[-1]:.3f} s"
         return _verdict(lock, message, value=0.0, unit=unit, at_s=None)
     first = int(after[0])
     moved = scale * np.abs(q[first:, index] - q[first, index])
     worst = int(np.argmax(moved))
     value, at_s = float(moved[worst]), float(times[first + worst])
     if value <= STANDSTILL_TOL:
-        message = f"{name} stands still at {scale * q[first, index]:.4f} {unit} from {lock.since:.3f} s on"
+        message = f"{name} stands still at {scale * q[first, index]:.4f} {unit} from {lock.from_s:.3f} s on"
     else:
-        message = f"{name} is locked from {lock.since:.3f} s on but moves by {value:.4g} {unit}, worst at {at_s:.3f} s"
+        message = f"{name} is locked from {lock.from_s:.3f} s on but moves by {value:.4g} {unit}, worst at {at_s:.3f} s"
     return _verdict(lock, message, value=value, unit=unit, at_s=at_s)
 
 
-def _verdict(lock: LockedJoint, message: str, *, value: float, unit: str, at_s: float | None) -> Check:
+def _verdict(lock: LockedJointEntry, message: str, *, value: float, unit: str, at_s: float | None) -> Check:
     """The check of one joint."""
     return Check(
         name="locked_joint",

@@ -22,9 +22,9 @@ from cellplan.model.settings.entry import (
     rule,
 )
 from cellplan.model.settings.layout import LayoutEntry
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
-from cellplan.model.settings.task import LONGEST_S
 from cellplan.model.settings.units import Mm, Ms, Within
 
 SCHEMA_VERSION: Final = 1
@@ -101,16 +101,6 @@ class PartEntry(Entry):
             words = "unexpected key, the first holder carries the part frame; further holders may leave axes open"
             raise rule(words, "held_by[0].axes")
         return self
-
-
-class LockedJointEntry(Entry):
-    """A joint that fails during the motion."""
-
-    robot: Name = Field(description="Robot of the joint.")
-    joint: Text = Field(description="Joint that is locked.")
-    from_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = Field(
-        default=0.0, description="Time from which on it is locked."
-    )
 
 
 class CycleEntry(Entry):

@@ -192,8 +192,8 @@ def scaled_values(cell: Cell, factor: float) -> dict[str, object]:
     if motion.duration is not None:
         values["motion.duration_s"] = motion.duration * factor
     for index, lock in enumerate(motion.locked):
-        if lock.since > 0.0:
-            values[f"motion.locked_joints[{index}].from_s"] = lock.since * factor
+        if lock.from_s > 0.0:
+            values[f"motion.locked_joints[{index}].from_s"] = lock.from_s * factor
     for task in cell.tasks:
         values |= {f"tasks.{task.name}.{key}": value for key, value in _scaled_task(task, factor).items()}
     return values

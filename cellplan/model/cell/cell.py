@@ -20,6 +20,7 @@ from cellplan.model.presented import Presented
 from cellplan.model.robot.robot import Body, JointLimits, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.program import ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task.task import Frame, Task
@@ -198,15 +199,6 @@ class Obstacle:
     X_WS: Array
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LockedJoint:
-    """A joint that fails: from the time ``since`` in [s] on it is locked."""
-
-    robot: str
-    joint: str
-    since: float
-
-
 class Timing(StrEnum):
     """What times the motion along the path."""
 
@@ -237,7 +229,7 @@ class MotionSettings:
     duration: float | None
     step: float
     cyclic: bool = False
-    locked: tuple[LockedJoint, ...] = ()
+    locked: tuple[LockedJointEntry, ...] = ()
     timing: Timing = Timing.AS_WRITTEN
     cycle: float | None = None
     build_up: float | None = 0.05

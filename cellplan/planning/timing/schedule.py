@@ -117,9 +117,9 @@ def _refuse_poor_sampling(cell: Cell, paths: Sequence[ClockedPath]) -> None:
     """Refuse tasks that have too few samples, and joints that fail after the end."""
     end = _step_count(cell, paths) * cell.motion.step
     for index, lock in enumerate(cell.motion.locked):
-        if lock.since >= end:
+        if lock.from_s >= end:
             where = cell.origin.at(f"motion.locked_joints[{index}].from_s")
-            raise InputError(f"{where}: expected a time before the end at {end:g} s, got {lock.since:g}")
+            raise InputError(f"{where}: expected a time before the end at {end:g} s, got {lock.from_s:g}")
     least = FEWEST_STEPS * cell.motion.step
     for path in paths:
         task, whole = path.task, path.end - path.start

@@ -53,5 +53,5 @@ def locked_since(cell: Cell) -> Array:
     since = np.full(cell.joint_count, np.inf)
     for lock in cell.motion.locked:
         index = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)
-        since[index] = min(since[index], lock.since)
+        since[index] = min(since[index], lock.from_s)
     return since

@@ -11,9 +11,10 @@ from cellplan.checks.joints.acceleration_limits import check_accelerations, moti
 from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.cell.acceleration import AccelerationRule, LimitSource, MotionAccelerations
-from cellplan.model.cell.cell import Cell, Grasp, LockedJoint
+from cellplan.model.cell.cell import Cell, Grasp
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Check
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 STEPS = 1000  # of 1 ms
@@ -114,7 +115,7 @@ def test_the_instant_at_which_a_joint_fails_is_left_out_and_reported() -> None:
     share = np.minimum(smooth(times), smooth(np.array([0.0, 0.5, 1.0]))[1])  # stops at once in the middle
     assert not accelerations_of(cell, turning(share))[1]["joint_acceleration_assumed"][0].passed
 
-    locked = replace(cell.motion, locked=(LockedJoint(robot="arm", joint="q1", since=0.5),))
+    locked = replace(cell.motion, locked=(LockedJointEntry(robot="arm", joint="q1", from_s=0.5),))
     accelerations, checks = accelerations_of(replace(cell, motion=locked), turning(share))
 
     assert all(check.passed for check in checks["joint_acceleration_assumed"])

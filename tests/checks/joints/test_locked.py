@@ -9,8 +9,8 @@ from builders.planar_arm import START, circle_schedule, planar_arm_cell
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.tools.tracking import check_accuracy
 from cellplan.measures.tool_errors import part_poses, task_accuracy
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.robot.robot import JointKind
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -20,7 +20,7 @@ TIMES = np.linspace(0.0, 4.0, 4001)
 
 def locked_cell(*locks, **changes):
     cell = planar_arm_cell(method="weighted_pseudo_inverse", limits={"q2": changes})
-    locked = tuple(LockedJoint(robot="arm", joint=joint, since=since) for joint, since in locks)
+    locked = tuple(LockedJointEntry(robot="arm", joint=joint, from_s=since) for joint, since in locks)
     return replace(cell, motion=replace(cell.motion, locked=locked))
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from builders.timed_cells import Case, case_of, shipped, slowly_clocked
 
 from cellplan.geometry.transforms import Array, pose
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.motion.motion import Schedule
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.solver import Integrator
 from cellplan.planning.collocation.at_samples import brought_onto_tasks
 from cellplan.planning.collocation.run import AccurateRun
@@ -56,7 +56,7 @@ def test_what_is_far_away_stays_where_it_is() -> None:
 
 def test_a_joint_that_fails_leaves_everything_as_it_is() -> None:
     case, q = stepped()
-    lock = LockedJoint(robot="kuka", joint="A2", since=0.5)
+    lock = LockedJointEntry(robot="kuka", joint="A2", from_s=0.5)
     cell = replace(case.cell, motion=replace(case.cell.motion, locked=(lock,)))
 
     assert brought_onto_tasks(MotionTask(cell, case.schedule, case.moving, q[0]), q) is q

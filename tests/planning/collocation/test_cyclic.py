@@ -10,7 +10,7 @@ from builders.planar_arms import planar_cell
 from builders.random_cells import make_task
 from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 
-from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task.task import CirclePath, PlaneName, StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.cyclic import PERIODIC, closed_path
@@ -124,7 +124,7 @@ def test_a_start_beside_the_path_spoils_the_first_cycle_only() -> None:
 )
 def test_cycles_close_before_and_after_a_joint_fails(since: float) -> None:
     case = cyclic(triangles(CELLS["sliding"]), 3)
-    lock = LockedJoint(robot="op1", joint="j1", since=since)
+    lock = LockedJointEntry(robot="op1", joint="j1", from_s=since)
     case = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, locked=(lock,))))
     path = closed(case)
     result = drift(path, [0.0, 1.0, 2.0, 3.0])

@@ -9,8 +9,9 @@ from builders.batch_cells import CELLS
 from builders.timed_cells import Case, between_samples, case_of, largest_error, shipped, slowly_clocked, triangles
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.solver import WeightingEntry
 from cellplan.model.solver import Integrator
 from cellplan.planning.collocation.batch_targets import sampled
@@ -168,7 +169,7 @@ def test_obstacles_are_kept_off_with_exact_tools() -> None:
 def test_robots_that_stand_and_joints_that_are_locked_are_not_moved() -> None:
     cell = replace(CELLS["plain"])
     name = cell.tasks[0].robot
-    locked = LockedJoint(robot=name, joint=cell.robot(name).model.joints[1].name, since=0.5)
+    locked = LockedJointEntry(robot=name, joint=cell.robot(name).model.joints[1].name, since=0.5)
     case = with_solver(triangles(replace(cell, motion=replace(cell.motion, locked=(locked,)))), *GOALS.values())
     path = case.path()
     later = path.at(np.linspace(0.5, path.end, 20))

@@ -11,7 +11,8 @@ from builders.timed_cells import Case, between_samples, case_of, largest_error, 
 
 from cellplan.geometry.mesh.tessellation import tessellate
 from cellplan.geometry.shapes import Cylinder
-from cellplan.model.cell.cell import Cell, LockedJoint, Mode
+from cellplan.model.cell.cell import Cell, Mode
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.task.task import StraightMove, TimeLaw, TimeLawKind
 from cellplan.planning.collocation.run import SETTLING_STEPS, AccurateRun
 from cellplan.planning.modes import plan_phases
@@ -100,7 +101,7 @@ def test_a_start_beside_the_path_is_left_without_a_jump(settle: float) -> None:
 def test_a_joint_that_fails_stands_still_to_the_last_bit(since: float) -> None:
     case = triangles(CELLS["sliding"])
     column = case.cell.columns("op1").start + 2
-    lock = LockedJoint(robot="op1", joint="j2", since=since)
+    lock = LockedJointEntry(robot="op1", joint="j2", from_s=since)
     failing = replace(case, cell=replace(case.cell, motion=replace(case.cell.motion, locked=(lock,))))
 
     assert_on_tasks(failing)
@@ -187,7 +188,7 @@ def test_a_path_on_a_mesh_takes_fewer_panels_than_rays() -> None:
 
 def test_stretches_are_cut_where_joints_fail() -> None:
     case = triangles(CELLS["sliding"])
-    lock = LockedJoint(robot="op1", joint="j2", since=0.31)
+    lock = LockedJointEntry(robot="op1", joint="j2", from_s=0.31)
     cell = replace(case.cell, motion=replace(case.cell.motion, locked=(lock,)))
     ends = [panel.end for panel in replace(case, cell=cell).path().panels]
     assert any(end == pytest.approx(0.31, abs=1e-12) for end in ends)

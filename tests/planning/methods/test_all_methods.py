@@ -74,7 +74,7 @@ def assert_nobody_else_moved(situation: Situation, q) -> None:
             assert np.ptp(q[:, cell.columns(robot.name)], axis=0).max() == 0.0
     for lock in cell.motion.locked:
         column = cell.columns(lock.robot).start + cell.robot(lock.robot).model.joint_names.index(lock.joint)
-        assert np.ptp(q[situation.schedule.times >= lock.since - 1e-12, column]) == 0.0
+        assert np.ptp(q[situation.schedule.times >= lock.from_s - 1e-12, column]) == 0.0
 
 
 def assert_judged_honestly(situation: Situation, motion) -> None:

@@ -10,8 +10,8 @@ from builders.random_cells import random_cell
 from builders.vargas_cases import TRANSIENT, vargas_run
 
 from cellplan.errors import DivergedError
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.solver import FilteredInverseEntry, SolverEntry
 from cellplan.planning.methods import method_named
 from cellplan.planning.tracking.motion_task import MotionTask
@@ -156,7 +156,7 @@ def test_speed_that_no_sub_step_follows_is_refused_by_name(method):
 def test_locked_and_idle_joints_stand_exactly_still(method):
     cell = random_cell(41, operators=2, joints=7)
     solver = cell.solver.changed(gain_per_s=50.0, filtered_inverse=FilteredInverseEntry(gain_per_s=100.0))
-    locked = LockedJoint(robot="op0", joint="j3", since=0.095)
+    locked = LockedJointEntry(robot="op0", joint="j3", from_s=0.095)
     cell = replace(cell, solver=solver, motion=replace(cell.motion, locked=(locked,)))
     q = np.random.default_rng(4).uniform(-1, 1, cell.joint_count)
     problem = TrackingProblem(

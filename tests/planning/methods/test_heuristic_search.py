@@ -22,9 +22,9 @@ from builders.search_arms import (
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, pose_from, rotation_exp
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.origin import Origin
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.tracking.motion_task import MotionTask
 from cellplan.scene.kinematics.screw_chain import ScrewChain
@@ -234,7 +234,7 @@ def test_rotations_that_cannot_be_taken_apart_are_refused_with_their_place(metho
 def test_joints_stay_inside_their_position_limits_and_locked_ones_where_they_are(method):
     model = dh_arm(FOUR_LINKS, limits={3: (0.70, 0.80)})
     cell = arm_cell(model, method=method, axes=(0, 1))
-    cell = replace(cell, motion=replace(cell.motion, locked=(LockedJoint(robot="arm", joint="j1", since=0.5),)))
+    cell = replace(cell, motion=replace(cell.motion, locked=(LockedJointEntry(robot="arm", joint="j1", from_s=0.5),)))
     start = np.array([np.pi / 4, np.pi / 6, np.pi / 2, np.pi / 4])
     at = tool_poses(cell, start[None])[0, :3, 3]
     times = np.linspace(0.0, 1.0, 101)

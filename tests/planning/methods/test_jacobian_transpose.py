@@ -8,7 +8,7 @@ from builders.planar_arms import planar_cell, tip_schedule, tips
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cellplan.model.cell.cell import LockedJoint
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.jacobian_transpose import (
@@ -115,7 +115,7 @@ def test_far_and_unreachable_points_are_approached_without_leaps(gain, offset):
 
 
 def test_a_joint_that_fails_stands_still_and_the_others_take_over():
-    cell = arm(1.0 / STEP, locked=(LockedJoint(robot="arm", joint="j1", since=0.995),))
+    cell = arm(1.0 / STEP, locked=(LockedJointEntry(robot="arm", joint="j1", from_s=0.995),))
     schedule = line(cell, np.array([-0.1, 0.05]))
     motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     assert np.all(np.diff(motion.q[101:, 1]) == 0.0)

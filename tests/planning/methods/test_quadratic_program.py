@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cellplan.errors import DivergedError, StartOutsideLimitsError
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.methods.quadratic_program import bounded_velocities
 from cellplan.planning.methods.support.speed_bounds import VelocityBounds
@@ -160,7 +160,7 @@ def test_a_start_outside_the_limits_is_refused_also_from_python():
 
 def test_a_locked_joint_stands_still_and_others_do_its_share():
     cell = planar_arm_cell()
-    cell = replace(cell, motion=replace(cell.motion, locked=(LockedJoint(robot="arm", joint="q2", since=0.3),)))
+    cell = replace(cell, motion=replace(cell.motion, locked=(LockedJointEntry(robot="arm", joint="q2", from_s=0.3),)))
     schedule = circle_schedule(cell)
     motion = integrate_schedule(MotionTask(cell, schedule, ["arm"], START))
     assert np.ptp(motion.q[300:, 1]) == 0.0

@@ -9,8 +9,9 @@ from builders.random_cells import carried, moved, random_cell, random_pose, shar
 
 from cellplan.errors import DivergedError, InputError
 from cellplan.geometry.transforms import inverse, rotation_vector
-from cellplan.model.cell.cell import Grasp, LockedJoint, Mode
+from cellplan.model.cell.cell import Grasp, Mode
 from cellplan.model.motion.motion import Schedule
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.model.task.task import Frame
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.tracking.motion_task import MotionTask, closures, locked_since
@@ -130,9 +131,9 @@ def test_the_part_cannot_be_carried_while_it_is_to_rest():
 def test_each_joint_stands_still_from_its_earliest_instant_on() -> None:
     cell = random_cell(1, operators=2)
     locks = (
-        LockedJoint(robot="op1", joint="j2", since=0.7),
-        LockedJoint(robot="op1", joint="j2", since=0.4),
-        LockedJoint(robot="holder", joint="j0", since=0.0),
+        LockedJointEntry(robot="op1", joint="j2", from_s=0.7),
+        LockedJointEntry(robot="op1", joint="j2", from_s=0.4),
+        LockedJointEntry(robot="holder", joint="j0", from_s=0.0),
     )
 
     since = locked_since(replace(cell, motion=replace(cell.motion, locked=locks)))

@@ -9,9 +9,10 @@ import pytest
 from builders.random_cells import random_cell
 
 from cellplan.files.cell.load import load_cell
-from cellplan.model.cell.cell import Cell, LockedJoint
+from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Motion, Schedule, TaskSchedule
 from cellplan.model.robot.robot import start_keys
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.planning.euler.integrate import integrate_schedule
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import schedule_tasks
@@ -222,7 +223,7 @@ def test_gain_means_the_same_for_one_and_for_three_operators() -> None:
 
 def test_robots_that_stand_and_joints_that_are_locked_are_not_moved() -> None:
     cell = random_cell(7, operators=2, joints=7)
-    locked = LockedJoint(robot="op0", joint="j4", since=0.0)
+    locked = LockedJointEntry(robot="op0", joint="j4", from_s=0.0)
     cell = replace(cell, motion=replace(cell.motion, locked=(locked,)))
     cell = with_goals(cell, *(goal for kind, goal in GOALS.items() if kind != "obstacles"))
     start = np.random.default_rng(7).uniform(-1.0, 1.0, cell.joint_count)

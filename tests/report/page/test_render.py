@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from jinja2 import DictLoader, Environment, StrictUndefined
 
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.motion.plan import Phase, Work
 from cellplan.model.report.report import Check
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.report.page import render
 from cellplan.report.page.render import SCRIPTS, CompiledTemplates, overview_page, report_page
 from cellplan.report.plots.rendering import pictures
@@ -269,7 +269,7 @@ def test_joints_that_do_not_come_back_have_a_table(passed_run: Any) -> None:
 
 
 def test_a_failed_joint_is_reported_in_plain_words(passed_run: Any) -> None:
-    locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+    locked = (LockedJointEntry(robot="kuka", joint="B2", from_s=2.0),)
     cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
 
     record = run_record(passed_run.report, cell=cell, provenance=passed_run.provenance)

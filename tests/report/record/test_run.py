@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cellplan.files.run.folder import RunFolder
-from cellplan.model.cell.cell import LockedJoint
 from cellplan.model.report.report import ClearanceClass, ClosureAccuracy
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
+from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.report.record.common import as_json, number
 from cellplan.report.record.run import run_record
 from cellplan.report.record.summary import summary_record, worst_of
@@ -233,7 +233,7 @@ def test_conversion_leaves_no_noise() -> None:
 
 def test_failed_joints_are_reported_with_instant_and_place(passed_run: Any, failed_run: Any) -> None:
     for run, is_met in ((passed_run, True), (failed_run, None)):
-        locked = (LockedJoint(robot="kuka", joint="B2", since=2.0),)
+        locked = (LockedJointEntry(robot="kuka", joint="B2", from_s=2.0),)
         cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
 
         (record,) = read(as_json(run_record(run.report, cell=cell, provenance=run.provenance)))["locked_joints"]

@@ -21,7 +21,7 @@ from cellplan.files.schema.task import BlendEntry, TaskEntry, TrapezoidEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
 from cellplan.geometry.transforms import Array
-from cellplan.model.cell.cell import Grasp, LockedJoint, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
+from cellplan.model.cell.cell import Grasp, Mode, MotionSettings, Obstacle, Part, Robot, Timing, Tool
 from cellplan.model.cell.rod import Holder, Rod, tool_body_name
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import BASE, Body, RobotModel, configuration_in_si
@@ -305,7 +305,7 @@ def build_motion(entry: MotionEntry) -> MotionSettings:
         grid=None if entry.grid_ms is None else entry.grid_ms.si,
         finer=None if entry.row_step == entry.step_s else entry.step_s,
         cyclic=entry.cyclic,
-        locked=tuple(LockedJoint(robot=it.robot, joint=it.joint, since=it.from_s) for it in entry.locked_joints),
+        locked=entry.locked_joints,
         timing=Timing(entry.timing) if isinstance(entry.timing, str) else Timing.CYCLE,
         cycle=cycle,
         build_up=None if isinstance(entry.jerk_build_up_s, str) else entry.jerk_build_up_s,

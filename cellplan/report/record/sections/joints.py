@@ -219,12 +219,12 @@ def locked_joints_record(report: Report, cell: Cell) -> list[LockedJointRecord]:
         model = cell.robot(lock.robot).model
         index = model.joint_names.index(lock.joint)
         unit, scale = model.joints[index].display_unit
-        positions = report.q[lock.robot][report.times >= lock.since, index]
+        positions = report.q[lock.robot][report.times >= lock.from_s, index]
         records.append(
             {
                 "robot": lock.robot,
                 "joint": lock.joint,
-                "from_s": number(lock.since),
+                "from_s": number(lock.from_s),
                 "position": number(scale * positions[0]) if len(positions) else None,
                 "unit": unit,
                 "tasks_kept": are_tasks_met,
