@@ -9,20 +9,14 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.units import MM
 from cellplan.search.distances.keep_out import in_areas
+from cellplan.search.starts.effort import EFFORT
 from cellplan.search.starts.freedom import FIXED, random_within
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.starts.reaching import FreeArm, Goal, PlacedDraws, followed, matched, reached
 
-SETTINGS: Final = 400  # [-] configurations of the holder that are drawn
-MATCHED: Final = 150  # [-] of these, free of contact, that are compared by what operators reach of them
-MATCHES: Final = 300  # [-] configurations of each operator for that
 NEAR: Final = 0.5  # [rad] and half metres by which a configuration may miss a path's start and still speak for it
 HOLDER_RANGE: Final = 0.7  # share of each joint range that configurations of the holder are drawn from: room to move
 GIVEN_BASE: Final = 0.5  # share of the draws with the holder's base where it is given
-DRAWS: Final = 1500  # [-] bases of an operator
-CONFIGURATIONS: Final = 6  # [-] per base that are drawn; the best matching ones are taken
-TEMPLATES: Final = 100  # [-] of these with tools, tilts and heights of their own; places and yaws follow from the path
-MOST_BASES: Final = 40  # [-] bases of an operator that are kept
 LOOKED_AT: Final = 0.0, 0.34, 0.67  # shares of a path at which contacts are asked
 CONTACTS_AT_ONCE: Final = 32
 FAR_AWAY: Final = 0.1  # [m] from the start of a path, where it is worth saying
@@ -77,7 +71,7 @@ def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tup
     usable = np.flatnonzero(usable)
     short = problem.contacts[cell.carrier].shortfalls(X_WB[usable], start[usable])
     drops.update(f"{pair[0]} too near {pair[1]}" for pair in short.pair if pair is not None)
-    usable = usable[short.worst <= 0.0][:MATCHED]
+    usable = usable[short.worst <= 0.0][: EFFORT.matched]
     if not len(usable):
         return [], drops
     x = problem.with_starts(
@@ -92,7 +86,7 @@ def _part_settings(problem: StartProblem, rng: np.random.Generator, count: int) 
     """Places for a part that no robot holds: the given one, where it may lie elsewhere drawn ones."""
     variables, places = problem.variables, problem.freedom.part
     layouts = variables.layouts(variables.given[None], problem.start[None])
-    x = random_within(variables, places, MATCHED if len(places) else 1, rng)
+    x = random_within(variables, places, EFFORT.matched if len(places) else 1, rng)
     x[0] = variables.given
     settings = [
         Setting(x=row, start=problem.start, X_WB=layouts.X_WB[0], X_WP=variables.placed(row).part.X_CP) for row in x
@@ -106,13 +100,15 @@ def _random_settings(problem: StartProblem, rng: np.random.Generator) -> Array:
     """Variables with those of the holder, and those that place several robots, drawn, the given ones first."""
     cell, variables = problem.cell, problem.variables
     holder = 0 if cell.carrier is None else cell.carrier
-    x = random_within(variables, np.append(problem.freedom.by_robot[holder], problem.freedom.shared), SETTINGS, rng)
+    x = random_within(
+        variables, np.append(problem.freedom.by_robot[holder], problem.freedom.shared), EFFORT.settings, rng
+    )
     places = problem.freedom.columns[cell.columns(cell.robots[holder].name)]
     joints = places[places != FIXED]
     middle = 0.5 * (np.maximum(variables.lower, -np.pi) + np.minimum(variables.upper, np.pi))[joints]
     x[:, joints] = middle + HOLDER_RANGE * (x[:, joints] - middle)
     base = np.append(problem.sampled_columns(holder), problem.freedom.shared)
-    stays = rng.uniform(size=SETTINGS) < GIVEN_BASE
+    stays = rng.uniform(size=EFFORT.settings) < GIVEN_BASE
     x[np.ix_(stays, base)] = variables.given[base]
     x[0] = variables.given
     return x
@@ -125,7 +121,7 @@ def _abilities(problem: StartProblem, settings: list[Setting], rng: np.random.Ge
         if problem.freedom.leaders[robot] != robot:
             continue  # where it may stand depends on the one that it follows
         arm, bounds = problem.arms[robot], problem.bounds(robot)
-        draws = _draws(problem, robot, settings[0], MATCHES, rng)[1]
+        draws = _draws(problem, robot, settings[0], EFFORT.matches, rng)[1]
         X_BT, is_tied = arm.flanges(draws.q) @ draws.X_FT, bool(len(problem.freedom.shared))
         for place, setting in enumerate(settings):
             goal = problem.goal(robot, setting.X_WP)
@@ -142,10 +138,10 @@ def _draws(
     """Variables, shape (count, n), and configurations, bases and tools of an operator drawn within their bounds."""
     arm, model = problem.arms[robot], problem.cell.robots[robot]
     columns = problem.sampled_columns(robot)
-    x = np.tile(setting.x, (TEMPLATES, 1))
-    x[:, columns] = random_within(problem.variables, columns, TEMPLATES, rng)[:, columns]
-    layouts = problem.placed_layouts(x, np.tile(setting.start, (TEMPLATES, 1)))
-    row = np.arange(count) % TEMPLATES
+    x = np.tile(setting.x, (EFFORT.templates, 1))
+    x[:, columns] = random_within(problem.variables, columns, EFFORT.templates, rng)[:, columns]
+    layouts = problem.placed_layouts(x, np.tile(setting.start, (EFFORT.templates, 1)))
+    row = np.arange(count) % EFFORT.templates
     margin = problem.margin[problem.cell.columns(model.name)]
     lower, upper = np.minimum(arm.lower + margin, arm.upper), np.maximum(arm.upper - margin, arm.lower)
     q = rng.uniform(np.minimum(lower, upper), np.maximum(lower, upper), (count, len(lower)))
@@ -157,9 +153,9 @@ def pool(problem: StartProblem, robot: int, setting: Setting, rng: np.random.Gen
     goal, arm, bounds = problem.goal(robot, setting.X_WP), problem.arms[robot], problem.bounds(robot)
     if goal is None:
         raise ValueError(f"pool: robot {robot} has no path")
-    x, draws = _draws(problem, robot, setting, DRAWS * CONFIGURATIONS, rng)
+    x, draws = _draws(problem, robot, setting, EFFORT.bases * EFFORT.per_base, rng)
     X_WB, miss = matched(goal, bounds, arm.flanges(draws.q) @ draws.X_FT, draws.X_WB)
-    best = np.argsort(miss, kind="stable")[:DRAWS]
+    best = np.argsort(miss, kind="stable")[: EFFORT.bases]
     drops = Counter[str]()
     x, initial = x[best], draws.X_WB[best]
     at, has_arrived = reached(arm, goal, bounds, replace(draws, X_WB=X_WB).of_places(best))
@@ -217,7 +213,7 @@ def _costs(problem: StartProblem, robot: int, q: Array, margins: Array) -> Array
 
 
 def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: Array, drops: Counter[str]) -> Indices:
-    """The first ``MOST_BASES`` of some draws that keep their distance from all but other operators."""
+    """The first ``StartEffort.pool`` of some draws that keep their distance from all but other operators."""
     indices, columns = list[int](), problem.cell.columns(problem.cell.robots[robot].name)
     nodes = np.unique([round(share * (q.shape[1] - 1)) for share in LOOKED_AT])
     for first in range(0, len(q), CONTACTS_AT_ONCE):
@@ -235,9 +231,9 @@ def _free(problem: StartProblem, robot: int, setting: Setting, X_WB: Array, q: A
                 indices.append(index)
             else:
                 drops[f"{pair[0]} too near {pair[1]}"] += 1
-        if len(indices) >= MOST_BASES:
+        if len(indices) >= EFFORT.pool:
             break
-    return np.array(indices[:MOST_BASES], dtype=np.intp)
+    return np.array(indices[: EFFORT.pool], dtype=np.intp)
 
 
 def _with_bases(problem: StartProblem, robot: int, x: Array, X_WB: Array, initial: Array) -> Array:

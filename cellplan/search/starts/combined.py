@@ -12,14 +12,10 @@ from cellplan.search.kernel.figures import MotionFigures, Peaks
 from cellplan.search.kernel.job import Layouts
 from cellplan.search.kernel.run import Motions, run
 from cellplan.search.starts.at_rest import Pool, Setting
+from cellplan.search.starts.effort import EFFORT
 from cellplan.search.starts.problem import StartProblem
 
-COMBINATIONS: Final = 256  # [-] of operators that are judged together
 EAGER: Final = 2.0  # the larger, the rather combinations are made of the best
-KEYS: Final = 9  # [-] nodes at which distances are asked
-MORE_KEYS: Final = 33  # [-] of the ones that are handed out
-JUDGED: Final = 24  # [-] combinations of which distances are asked
-HANDED_OUT: Final = 3  # [-] of them that are asked once more, exactly and at more nodes
 ANGLE: Final = 0.1  # [rad, m] beyond a margin that counts as much as
 SPEED: Final = 0.1  # of a speed above its limit, or
 LENGTH: Final = 0.01  # [m] of a distance too short
@@ -43,7 +39,7 @@ def combined(
     """Variables, shape (C, n), and start postures, (C, nq), of combinations, and their picks, (C, pools)."""
     sizes = [len(pool.q) for pool in pools]
     picks = np.stack([_picked(pool.cost, rng) for pool in pools], axis=1)
-    if np.prod(sizes) <= COMBINATIONS:
+    if np.prod(sizes) <= EFFORT.combinations:
         picks = np.stack([part.ravel() for part in np.meshgrid(*(np.arange(size) for size in sizes))], axis=1)
     picks = np.unique(picks, axis=0)
     x, start = np.tile(setting.x, (len(picks), 1)), np.tile(setting.start, (len(picks), 1))
@@ -54,9 +50,9 @@ def combined(
 
 
 def _picked(cost: Array, rng: np.random.Generator) -> Indices:
-    """Picks of one pool, better ones more often, shape (COMBINATIONS,)."""
+    """Picks of one pool, better ones more often, shape (combinations,)."""
     weights = np.exp(-EAGER * (cost - cost.min()))
-    return rng.choice(len(cost), COMBINATIONS, p=weights / weights.sum())
+    return rng.choice(len(cost), EFFORT.combinations, p=weights / weights.sum())
 
 
 def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None = None) -> Judged:
@@ -76,15 +72,15 @@ def judged(problem: StartProblem, x: Array, start: Array, picks: Indices | None 
     alive = np.flatnonzero(np.isfinite(violation))
     order = alive[np.lexsort((alive, cycle[alive], violation[alive]))]
     violation = violation.copy()
-    chosen = order[:JUDGED]
+    chosen = order[: EFFORT.judged]
     placed = problem.placed_layouts(x, start) if problem.is_part_placed else layouts
     short = _shortfalls(problem, placed.of_places(chosen), motions.q[chosen], drops)
     violation[chosen] += short / LENGTH
-    violation[order[JUDGED:]] = np.inf
+    violation[order[EFFORT.judged :]] = np.inf
     chosen = chosen[np.lexsort((chosen, cycle[chosen], violation[chosen]))]
     handed_out = 0
     for candidate in chosen.tolist():
-        if handed_out == HANDED_OUT or violation[candidate] > 0.0:
+        if handed_out == EFFORT.handed_out or violation[candidate] > 0.0:
             break
         violation[candidate] += _exact_shortfall(problem, x[candidate], motions.q[candidate], drops) / LENGTH
         handed_out += violation[candidate] == 0.0
@@ -118,7 +114,7 @@ def _by_joints(problem: StartProblem, motions: Motions) -> tuple[Array, Array, C
 
 def _shortfalls(problem: StartProblem, layouts: Layouts, q: Array, drops: Counter[str]) -> Array:
     """By how much in [m] candidates fall short of distances at a few nodes, 0 where they do not, shape (C,)."""
-    keys = _keys(q.shape[1], KEYS)
+    keys = _keys(q.shape[1], EFFORT.keys)
     short = problem.all_contacts.shortfalls(
         np.repeat(layouts.X_WB, len(keys), axis=0), q[:, keys].reshape(-1, q.shape[2])
     )
@@ -132,7 +128,7 @@ def _shortfalls(problem: StartProblem, layouts: Layouts, q: Array, drops: Counte
 
 def _exact_shortfall(problem: StartProblem, x: Array, q: Array, drops: Counter[str]) -> float:
     """The same of one candidate at more nodes, its columns and tools as they are."""
-    keys = q[_keys(len(q), MORE_KEYS)]
+    keys = q[_keys(len(q), EFFORT.more_keys)]
     near = problem.distances.near(x, keys, problem.distances.most_demanded)
     short = problem.distances.demands[near.rows] - near.distances
     if not short.max(initial=0.0) > 0.0:

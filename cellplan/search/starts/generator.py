@@ -16,18 +16,14 @@ from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.seeds import generator
 from cellplan.planning.start.inverse_kinematics import SAME_POSTURE
 from cellplan.search.kernel.run import run
-from cellplan.search.starts.at_rest import MOST_BASES, Pool, Setting, pool, settings
+from cellplan.search.starts.at_rest import Pool, Setting, pool, settings
 from cellplan.search.starts.combined import Judged, combined, judged
+from cellplan.search.starts.effort import EFFORT
 from cellplan.search.starts.freedom import random_within
 from cellplan.search.starts.postures import branch_starts
 from cellplan.search.starts.problem import StartProblem
 
-SETTINGS_TRIED: Final = 4  # [-] places of the part at rest, one after the other until a combination follows all paths
-RANDOM: Final = 16  # [-] random layouts that are drawn for one start
-EVERY_RANDOM: Final = 8  # of the sampled starts every so manieth is drawn at random
-LEADING: Final = 12  # [-] bases of an operator beside which those that follow it are sought
 SHOWN: Final = 3  # [-] reasons that are named for one robot
-FOLLOWING: Final = 4  # [-] of the ones that follow for each
 
 
 class StartOrigin(StrEnum):
@@ -93,7 +89,7 @@ class StartGenerator:
             return self._of_layout(StartOrigin.TRY, f"layout of {name}", x, start)
         number = index - len(self._tries) - 1
         rng = generator(f"starts/{index}", self._seed)
-        if number % EVERY_RANDOM == EVERY_RANDOM - 1:
+        if number % EFFORT.every_random == EFFORT.every_random - 1:
             return self._random(rng, number)
         return self._sampled(rng, number)
 
@@ -130,7 +126,7 @@ class StartGenerator:
     def _sampled(self, rng: np.random.Generator, number: int) -> Starts:
         """Starts with the part at rest first, put together afterwards."""
         problem, reasons = self._problem, list[str]()
-        places, drops = settings(problem, rng, SETTINGS_TRIED)
+        places, drops = settings(problem, rng, EFFORT.settings_tried)
         if not places:
             return Starts(starts=(), reason=f"no configuration of the holder can be used: {words(drops)}")
         for setting in places:
@@ -150,7 +146,7 @@ class StartGenerator:
         """Layouts drawn within the bounds, with all branches of inverse kinematics."""
         problem = self._problem
         everything = np.arange(len(problem.variables.names))
-        samples = random_within(problem.variables, everything, RANDOM, rng)
+        samples = random_within(problem.variables, everything, EFFORT.random, rng)
         parts = [branch_starts(problem, x, problem.start, rng) for x in samples]
         x, start = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
         if not len(x):
@@ -222,19 +218,19 @@ def _with_follower(problem: StartProblem, led: Pool, robot: int, setting: Settin
     """A pool with one operator more, whose base follows from those of the pool."""
     x, q, cost, drops = list(led.x[:0]), list(led.q[:0]), list[float](), Counter[str]()
     follower = led
-    for row in range(min(len(led.q), LEADING)):
+    for row in range(min(len(led.q), EFFORT.leading)):
         there, start = setting.x.copy(), setting.start.copy()
         there[led.columns], start[led.joints] = led.x[row, led.columns], led.q[row]
         X_WB = problem.placed_layouts(there[None], start[None]).X_WB[0]
         follower = pool(problem, robot, replace(setting, x=there, start=start, X_WB=X_WB), rng)
         drops += follower.drops
-        first = slice(0, FOLLOWING)
+        first = slice(0, EFFORT.following)
         x += list(follower.x[first])
         q += [np.append(led.q[row], start) for start in follower.q[first]]
         cost += (led.cost[row] + follower.cost[first]).tolist()
-        if len(x) >= MOST_BASES:
+        if len(x) >= EFFORT.pool:
             break
-    order = np.argsort(cost, kind="stable")[:MOST_BASES].astype(np.intp)
+    order = np.argsort(cost, kind="stable")[: EFFORT.pool].astype(np.intp)
     return Pool(
         x=np.array(x).reshape(-1, led.x.shape[1])[order],
         columns=np.append(led.columns, follower.columns),

@@ -2,18 +2,14 @@
 
 from collections.abc import Collection
 from itertools import product
-from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.planning.start.inverse_kinematics import SAME_POSTURE, joint_margin_shares, on_nearest_turns
+from cellplan.search.starts.effort import EFFORT
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.starts.reaching import BaseBounds, PlacedDraws, followed, reached
-
-SEEDS: Final = 48  # [-] random configurations of each operator; finds all eight branches of an arm with six joints
-BRANCHES: Final = 8  # [-] of an operator that are combined at most
-COMBINATIONS: Final = 64  # [-] of branches of all operators at most
 
 
 def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.random.Generator) -> Array:
@@ -28,7 +24,7 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
     cell, arm = problem.cell, problem.arms[robot]
     layouts = problem.variables.layouts(x[None], start[None])
     model, columns = cell.robots[robot].model, cell.columns(cell.robots[robot].name)
-    q = np.vstack([start[columns], rng.uniform(arm.lower, arm.upper, (SEEDS - 1, len(arm.lower)))])
+    q = np.vstack([start[columns], rng.uniform(arm.lower, arm.upper, (EFFORT.postures - 1, len(arm.lower)))])
     goal = problem.goal(robot, problem.part_pose(layouts))
     if goal is None:
         return start[None, columns]
@@ -41,7 +37,7 @@ def branches(problem: StartProblem, robot: int, x: Array, start: Array, rng: np.
     path, has_followed = followed(arm, goal, PlacedDraws(q=q, X_WB=X_WB[: len(q)], X_FT=X_FT[: len(q)]))
     margin = joint_margin_shares(model, path[has_followed]).min(axis=(1, 2), initial=np.inf)
     order = np.argsort(-margin, kind="stable")
-    return q[has_followed][order[margin[order] >= 0.0]][:BRANCHES]
+    return q[has_followed][order[margin[order] >= 0.0]][: EFFORT.branches]
 
 
 def branch_starts(
@@ -70,7 +66,7 @@ def branch_starts(
             name = problem.cell.robots[robot].name
             return *nothing, f"'{name}' follows its path from no configuration with the part at rest"
         choices.append(configurations)
-    while np.prod([len(choice) for choice in choices]) > COMBINATIONS:
+    while np.prod([len(choice) for choice in choices]) > EFFORT.branch_combinations:
         longest = max(range(len(choices)), key=lambda place: len(choices[place]))
         choices[longest] = choices[longest][:-1]
     rows = []

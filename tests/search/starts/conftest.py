@@ -6,6 +6,7 @@ import pytest
 
 from cellplan import load_cell
 from cellplan.search.starts import at_rest, combined
+from cellplan.search.starts.effort import StartEffort
 from cellplan.search.starts.problem import StartProblem
 from cellplan.search.variables.variables import Variables
 
@@ -17,9 +18,8 @@ DRAWS = 200
 def fewer_draws(request, monkeypatch):
     """A tenth of the draws of a search: small cells need no more."""
     if request.node.get_closest_marker("slow") is None:
-        monkeypatch.setattr(at_rest, "DRAWS", DRAWS)
-        monkeypatch.setattr(at_rest, "SETTINGS", 40)
-        monkeypatch.setattr(combined, "COMBINATIONS", 32)
+        for module in (at_rest, combined):
+            monkeypatch.setattr(module, "EFFORT", StartEffort(bases=DRAWS, settings=40, combinations=32))
 
 
 def prepared(cell):

@@ -12,6 +12,7 @@ from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.starts import generator as pools
 from cellplan.search.starts.combined import judged
+from cellplan.search.starts.effort import StartEffort
 from cellplan.search.starts.generator import StartGenerator, StartOrigin
 from cellplan.search.starts.problem import Contacts, StartProblem
 from cellplan.search.variables.variables import Variables
@@ -101,7 +102,7 @@ def test_what_reaches_nothing_is_named_with_the_reason():
 
 
 def test_mirrored_operators_are_sampled_together(monkeypatch):
-    monkeypatch.setattr(pools, "LEADING", 3)
+    monkeypatch.setattr(pools, "EFFORT", StartEffort(leading=3))
     cell = load_cell(CELLS / "planar_pair.yaml").with_values(SHORT | MIRRORED)
     problem = prepared(cell)
     assert problem.freedom.groups(problem.operators) == [(1, 2)]
