@@ -30,7 +30,7 @@ from cellplan.scene.collision.hull_cache import keep_hulls, without_hull
 from cellplan.scene.collision_pairs import cut_tools
 from cellplan.search.programs.improve import improve
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.programs.objective import Demands, Effort, Objective, Reserve
+from cellplan.search.programs.objective import Demands, Effort, Objective
 from cellplan.search.variables.variables import Variables
 from cellplan.study.trial import StudyTrial
 from cellplan.study.workers import Workers
@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     from cellplan.search.misplacement.robust import Robust, RobustSearch
 
 NODES: Final = 129  # [-] of the finish
-KEYS: Final = 25  # [-] configurations at which distances are asked there
-ITERATIONS: Final = 25
+FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is nearly at its best
 REFINED: Final = 3  # [-] times that nodes are added for a shorter cycle before it is certified
 GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
@@ -97,29 +96,18 @@ class CandidateResult:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Reserves:
-    """What is asked for beyond the demands, as verified motions have shown to be needed."""
+class _Refinement:
+    """Effort, reserves and nodes, as verified motions have shown to be needed."""
 
-    angle: float = Reserve().margin
-    length: float = Reserve().distance
-    within_robot: float = Reserve().within_robot
-    time: float = Reserve().time
+    effort: Effort = FINISH  # of the local optimisation
     nodes: int = NODES
-    keys: int = KEYS
-    denser: tuple[float, ...] = ()
-    also_at: tuple[float, ...] = ()
+    denser: tuple[float, ...] = ()  # times in [s] about which there are more
 
-    def denser_at(self, times: Sequence[float], span: float) -> "_Reserves | None":
+    def denser_at(self, times: Sequence[float], span: float) -> "_Refinement | None":
         """With more nodes about times in [s] of a motion of so many seconds; None where there are more already."""
         step = span / (self.nodes - 1)
         new = [time for time in times if all(abs(time - other) > step for other in self.denser)]
         return replace(self, denser=(*self.denser, *new)) if new else None
-
-    @property
-    def effort(self) -> Effort:
-        """As the local optimisation is asked."""
-        reserve = Reserve(margin=self.angle, distance=self.length, within_robot=self.within_robot, time=self.time)
-        return Effort(iterations=ITERATIONS, keys=self.keys, also_at=self.also_at, reserve=reserve, trust=0.2)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +118,7 @@ class _Timed:
     start: Array
     standing: Standing
     demands: Demands
-    reserves: _Reserves
+    refinement: _Refinement
     early: EarlyClearance
     program: TimedProgram | None = None
     reason: str = ""
@@ -168,9 +156,9 @@ class Finish:
 
     def _certified(self, trial: StudyTrial) -> CandidateResult:
         """See ``certified``; the cell is made ready with the choices of the trial."""
-        (x, start), reserves = layout_of(trial), _Reserves()
+        (x, start), refinement = layout_of(trial), _Refinement()
         for solves in count(1):
-            timed = self._refined(x, start, reserves, is_first=solves == 1)
+            timed = self._refined(x, start, refinement, is_first=solves == 1)
             x, start, program, reason = timed.x, timed.start, timed.program, timed.reason
             if program is not None:
                 program = program.certified(self.progress, timed.early)
@@ -189,34 +177,34 @@ class Finish:
             more = None if result.passed or program is None or solves >= ROUNDS else _enlarged(timed, program)
             if more is None:
                 break
-            reserves = more
+            refinement = more
         return result
 
-    def _refined(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
+    def _refined(self, x: Array, start: Array, refinement: _Refinement, *, is_first: bool) -> _Timed:
         """The layout and its motion, improved again with more nodes where it asks for more time than the others do."""
-        best = self._drafted(x, start, reserves, is_first=is_first)
+        best = self._drafted(x, start, refinement, is_first=is_first)
         for _ in range(REFINED if is_scaled(self.ready) else 0):
             if best.program is None:
                 return best
             problem, measures = best.standing.problem, best.standing.measures
             peaks = exceeded_at(best.program, measures.cycle, measures.span)
-            denser = reserves.denser_at(peaks, measures.span)
+            denser = refinement.denser_at(peaks, measures.span)
             if not isinstance(problem, LayoutProblem) or denser is None:
                 break
-            reserves = denser
-            refined = self._drafted(best.x, best.start, reserves, is_first=False)
+            refinement = denser
+            refined = self._drafted(best.x, best.start, refinement, is_first=False)
             if refined.program is None or time_of(refined.program) > (1.0 - GAIN) * time_of(best.program):
                 break
             best = refined
-        return self._shortest(replace(best, reserves=reserves))
+        return self._shortest(replace(best, refinement=refinement))
 
-    def _drafted(self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool) -> _Timed:
+    def _drafted(self, x: Array, start: Array, refinement: _Refinement, *, is_first: bool) -> _Timed:
         """The layout improved at more nodes, with its motion in the cycle that it has there."""
-        x, start, standing, demands = self._improved(x, start, reserves, is_first=is_first)
+        x, start, standing, demands = self._improved(x, start, refinement, is_first=is_first)
         is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
         helping = self.workers if isinstance(self.workers, Workers) else None
         early = EarlyClearance(helping.begin if is_once and helping is not None else None)
-        timed = _Timed(x=x, start=start, standing=standing, demands=demands, reserves=reserves, early=early)
+        timed = _Timed(x=x, start=start, standing=standing, demands=demands, refinement=refinement, early=early)
         try:
             cell = self._cell(x, start)
             program = draft(self.ready, cell, standing.measures.cycle, self.progress, early)
@@ -242,23 +230,23 @@ class Finish:
         return cell
 
     def _improved(
-        self, x: Array, start: Array, reserves: _Reserves, *, is_first: bool
+        self, x: Array, start: Array, refinement: _Refinement, *, is_first: bool
     ) -> tuple[Array, Array, Standing, Demands]:
         """The layout improved at more nodes; one that only has to conform is taken as it is at first."""
-        demands, problem = self._demands(x, start), problem_of(self.ready, reserves.nodes, reserves.denser)
+        demands, problem = self._demands(x, start), problem_of(self.ready, refinement.nodes, refinement.denser)
         if is_first and demands.objective is Objective.CONFORMING:
             problem, effort = self.ready.coarse, Effort()
             point = problem.evaluate(x, start)
             if point is not None:
                 return x, start, standing_of(problem, point, demands, effort), demands
-        improved = improve(problem, x, start, demands, reserves.effort)
+        improved = improve(problem, x, start, demands, refinement.effort)
         if improved is None:
             problem = self.ready.coarse
             point = problem.evaluate(x, start)
             if point is None:
                 raise NoSolutionError(NOT_FOLLOWED)
-            return x, start, standing_of(problem, point, demands, reserves.effort), demands
-        return improved.x, improved.start, standing_of(problem, improved.point, demands, reserves.effort), demands
+            return x, start, standing_of(problem, point, demands, refinement.effort), demands
+        return improved.x, improved.start, standing_of(problem, improved.point, demands, refinement.effort), demands
 
     def _demands(self, x: Array, start: Array) -> Demands:
         """What is demanded of a layout of the search."""
@@ -316,34 +304,36 @@ def certified_cell(result: CandidateResult) -> Cell:
     return result.program.solution.cell
 
 
-def _enlarged(timed: _Timed, program: TimedProgram) -> _Reserves | None:
+def _enlarged(timed: _Timed, program: TimedProgram) -> _Refinement | None:
     """Reserves for what the verified motion missed, nodes and keys there; None where it missed nothing of the kind."""
     problem, span, times = timed.standing.problem, timed.standing.measures.span, list[float]()
-    demanded, reserves = float(timed.demands.margin.max(initial=0.0)), timed.reserves
-    margin, load = margin_of(program), load_of(program)
+    demanded, effort = float(timed.demands.margin.max(initial=0.0)), timed.refinement.effort
+    margin, load, reserve = margin_of(program), load_of(program), effort.reserve
     missed_margin = margin is not None and margin < DEG * demanded
     if margin is not None and missed_margin:
-        reserves = replace(reserves, angle=reserves.angle + (demanded - np.radians(margin) + MORE_ANGLE))
+        reserve = replace(reserve, margin=reserve.margin + (demanded - np.radians(margin) + MORE_ANGLE))
         times += margins_missed_at(program, demanded, span)
     required = program.solution.cell.checks.clearance_mm
     others, inner = (clearance_of(program, within_robot=within_robot) for within_robot in (False, True))
     keys = list[float]()
     if others is not None and others < required:
-        reserves = replace(reserves, length=reserves.length + ((required - others) / MM + MORE_LENGTH))
+        reserve = replace(reserve, distance=reserve.distance + ((required - others) / MM + MORE_LENGTH))
         keys += distances_missed_at(program, span, within_robot=False)
     if inner is not None and inner < required:
-        reserves = replace(reserves, within_robot=reserves.within_robot + ((required - inner) / MM + MORE_WITHIN))
+        reserve = replace(reserve, within_robot=reserve.within_robot + ((required - inner) / MM + MORE_WITHIN))
         keys += distances_missed_at(program, span, within_robot=True)
     if load > 1.0:
-        reserves = replace(reserves, time=reserves.time + (load - 1.0 + MORE_TIME))
+        reserve = replace(reserve, time=reserve.time + (load - 1.0 + MORE_TIME))
         times += exceeded_at(program, program.cycle, span)
     if not (missed_margin or keys or load > 1.0):
         return None
-    reserves = replace(reserves, also_at=(*reserves.also_at, *keys))
-    denser = reserves.denser_at([*times, *keys], span) if isinstance(problem, LayoutProblem) else None
+    effort = replace(effort, reserve=reserve, also_at=(*effort.also_at, *keys))
+    refined = replace(timed.refinement, effort=effort)
+    denser = refined.denser_at([*times, *keys], span) if isinstance(problem, LayoutProblem) else None
     if denser is not None:
         return denser
-    return replace(reserves, nodes=2 * reserves.nodes - 1, keys=2 * reserves.keys - 1 if keys else reserves.keys)
+    more_keys = replace(effort, keys=2 * effort.keys - 1) if keys else effort
+    return replace(refined, nodes=2 * refined.nodes - 1, effort=more_keys)
 
 
 def margin_of(program: TimedProgram) -> float | None:

@@ -15,7 +15,7 @@ from cellplan.jobs.fastest.timed_program import Law, TimedProgram, whole_steps
 from cellplan.jobs.layout.finish.cycles import load_of, required_time, scaled
 from cellplan.jobs.layout.finish.displaced import DisplacedLayout, verified
 from cellplan.jobs.layout.finish.finish import (
-    KEYS,
+    FINISH,
     MORE_ANGLE,
     NODES,
     CandidateResult,
@@ -52,7 +52,7 @@ from cellplan.study.workers import Limits
 FINALISTS: Final = 3  # [-] layouts that differ, of which the one is finished that is the best with displaced bases
 FEW_ROUNDS: Final = 2  # [-] of programs for each of them
 FEW: Final = Effort(iterations=12, keys=9, trust=0.2)
-MANY: Final = Effort(iterations=8, keys=KEYS, trust=0.1)
+MANY: Final = Effort(iterations=8, keys=FINISH.keys, trust=0.1)
 ATTEMPTS: Final = 3  # [-] times that a layout is improved and verified before it is given up
 DURATIONS: Final = 4  # [-] durations tried until the limits hold
 MORE_TIME: Final = 0.003  # [-] that a cycle of the nodes is lengthened by: peaks between them
