@@ -1,5 +1,6 @@
 """The recipes of ``docs/developing.md``: their places exist and suffice, and five of them are carried out."""
 
+import ast
 import json
 import os
 import re
@@ -11,6 +12,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from cellplan.cli.main import COMMANDS
+from cellplan.model.solver import METHODS
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGE = ROOT / "cellplan"
@@ -217,6 +221,17 @@ def test_every_package_has_its_line_and_every_line_its_package() -> None:
     packages = {path.parent.relative_to(PACKAGE).as_posix() for path in PACKAGE.rglob("__init__.py")}
 
     assert sorted("." if name == "cellplan" else name for name in listed) == sorted(packages)
+
+
+def test_what_the_lines_of_packages_say_holds() -> None:
+    said = dict(re.findall(r"^\| `([^`]+)` \| ([^|]+) \|$", PAGE, re.MULTILINE))
+    commands = {f"cli/{group.lower().replace(' ', '_')}": list(named) for group, named in COMMANDS.items()}
+    classes = [node for path in (PACKAGE / "model").rglob("*.py") for node in ast.walk(ast.parse(path.read_text()))]
+    made = [ast.unparse(word) for node in classes if isinstance(node, ast.ClassDef) for word in node.decorator_list]
+
+    assert {package: re.findall(r"`(\w+)`", said[package]) for package in commands} == commands
+    assert all("frozen=True" in words for words in made if words.startswith("dataclass"))  # model: frozen data
+    assert {path.stem for path in (PACKAGE / "planning" / "methods").glob("[a-z]*.py")} == set(METHODS)  # one file each
 
 
 def test_the_layers_are_those_of_the_import_contracts() -> None:
