@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies, program
-from builders.scene_builders import displaced, make_cell, placed, slide_model, thing
+from builders.scene_builders import body, displaced, joint, make_cell, placed, slide_model, thing
 
 from cellplan.certify.bound import Bound, PairBound
 from cellplan.certify.certify import certify
@@ -13,6 +13,7 @@ from cellplan.certify.pair_state import PairState
 from cellplan.geometry.shapes import Box, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.model.report.report import ClearanceClass
+from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
@@ -110,3 +111,23 @@ def test_a_demand_is_met_by_what_is_proved_alone(
 
     assert (bound.is_met, bound.is_open) == (is_met, is_open)
     assert bound.proved <= min(bound.lowest, bound.nearest)
+
+
+@pytest.mark.parametrize("place", [np.eye(4), X])
+def test_an_arm_that_stretches_out_and_draws_back_within_one_step_is_as_near_as_when_it_is_stretched(
+    place: Array,
+) -> None:
+    """Its ball is at one place in both rows, and in between 79 mm farther out, where it all but reaches the post."""
+    joints = (joint("shoulder", -1), joint("elbow", 0, point=(0.5, 0.0, 0.0)))
+    ball = body("ball", 1, shape=Sphere(0.05), at=(1.0, 0.0, 0.0))
+    model = RobotModel(name="arm", source="test", joints=joints, flange_link=1, X_BF=np.eye(4), bodies=(ball,))
+    gap, checks = 0.02, ChecksEntry(clearance_mm=10.0, contact_zone_mm=0.0)
+    post = thing("post", Sphere(0.05), pose((1.1 + gap, 0.0, 0.0)))
+    scene = Scene.from_cell(displaced(make_cell(placed("arm", model), things=(post,), checks=checks), place))
+    q = np.array([[-0.4, 0.8], [0.4, -0.8]])
+
+    bound = certify(scene, q)
+
+    assert gap - EXACT <= bound.minimum <= gap
+    for demand, is_met in ((gap - EXACT, True), (gap + 0.01, False)):
+        assert certify(scene, q, demand, with_minimum=False).is_met is is_met

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from builders.moving_cells import cell_with_bodies
-from builders.scene_builders import body, displaced, joint, make_cell, no_tool, placed
+from builders.scene_builders import body, displaced, joint, make_cell, placed
 
 from cellplan.certify.lever_arms import Chain, LeverArms
 from cellplan.geometry.shapes import Sphere
 from cellplan.geometry.transforms import Array, pose
+from cellplan.model.cell.cell import Tool
 from cellplan.model.robot.robot import RobotModel
 from cellplan.scene.scene import Scene
 
@@ -25,10 +26,10 @@ def stretched_arm() -> Scene:
         source="test",
         joints=tuple(joint(f"q{k}", k - 1, point=(float(places[k]), 0.0, 0.0)) for k in range(3)),
         flange_link=2,
-        X_BF=pose((1.0, 0.0, 0.0)),
+        X_BF=pose((1.0, 0.0, 0.0), (0.0, 0.0, 0.5 * np.pi)),
         bodies=(body("ball", 2, shape=Sphere(RADIUS), at=(1.0, 0.0, 0.0)),),
     )
-    return Scene.from_cell(make_cell(placed("arm", model, tool=no_tool())))
+    return Scene.from_cell(make_cell(placed("arm", model, tool=Tool(X_FT=pose((0.0, -0.1, 0.0)), bodies=()))))
 
 
 def seen_from_the_world(scene: Scene, q: Array) -> tuple[Chain, LeverArms]:
@@ -43,9 +44,10 @@ def farthest_point(q: Array) -> Array:
 
 
 def test_levers_of_a_planar_arm_are_the_lengths_of_the_links_beyond_each_joint() -> None:
-    chain, _ = seen_from_the_world(stretched_arm(), np.zeros((2, 3)))
+    chain, arms = seen_from_the_world(stretched_arm(), np.zeros((2, 3)))
 
     np.testing.assert_allclose(chain.levers, [1.0 + RADIUS, 0.5 + RADIUS, 0.2 + RADIUS], rtol=1e-12)
+    np.testing.assert_allclose(arms.tool("arm", seen_by=None).levers, [1.1, 0.6, 0.3], rtol=1e-12)  # 0.1 m beyond
 
 
 @pytest.mark.parametrize("turned", [(0.3, 0.0, 0.0), (0.2, 0.5, 0.0), (0.1, 0.2, 0.4)])

@@ -127,7 +127,10 @@ def test_retimed_rows_lie_on_the_path_keep_all_limits_and_use_one_up_nearly_alwa
     assert max(speeds.max(), rates.max()) <= 1.0 + 1e-6
     used = np.maximum(np.maximum(speeds[1:], speeds[:-1]), rates).max(axis=1)
     assert np.quantile(used, 0.1) > 0.9
-    assert transfer_retimer(scene).slower(sigma, q) == pytest.approx(1.0, abs=0.02)
+    row = RowLimits(scene, (), joint_bounds(scene.cell), SLOW)
+    needed = row.slower(sigma, q)
+    assert needed == pytest.approx(max(speeds.max(), rates.max() ** 0.5), abs=5e-3)
+    assert replace(row, step=0.4 * SLOW).slower(sigma, q) == pytest.approx(needed / 0.4, rel=0.02)
 
 
 @pytest.mark.parametrize(("checks", "limit"), [({"tool_speed_mm_s": 100.0}, 0.1), ({}, np.inf)])

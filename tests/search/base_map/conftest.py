@@ -8,7 +8,13 @@ from cellplan import BaseGrid, load_cell
 from cellplan.jobs.base_map.prepared import PreparedMap, prepared
 
 CELL = Path(__file__).resolve().parents[3] / "cells" / "planar_pair.yaml"
-SETTINGS = {"robots.left.start_deg": [50, -85, 35], "motion.duration_s": 2.0, "motion.step_s": 0.02}
+SETTINGS = {
+    "robots.left.start_deg": [50, -85, 35],
+    "motion.duration_s": 3.0,
+    "motion.step_s": 0.03,
+    "motion.time_law": "quintic",
+    "acceleration": {"full_speed_in_s": [1.2, 0.9, 0.6]},
+}
 
 
 @pytest.fixture(scope="package")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders.scene_builders import displaced
+from builders.scene_builders import displaced, no_tool
 
 from cellplan.certify.growth import signed_distances
 from cellplan.geometry.transforms import Array, pose
@@ -75,16 +75,17 @@ def test_contacts_move_with_the_cell(ready: PreparedMap, swings: tuple[Array, Ar
             assert contact.distance == pytest.approx(other.distance, abs=EXACT)
 
 
-def test_a_base_that_stands_too_deep_in_the_floor_is_a_contact_of_its_own(
-    ready: PreparedMap, swings: tuple[Array, Array]
-) -> None:
-    scene, (X_WB, q) = ready.job.scene, swings
-    free = next(k for k, contact in enumerate(contacts(scene, "right", X_WB, q)) if contact is None)
-    sunk = X_WB[free].copy()
-    sunk[2, 3] -= 0.51
+@pytest.mark.parametrize("depth", [0.004, 0.012])
+def test_a_base_that_stands_too_deep_in_the_floor_is_a_contact_of_its_own(ready: PreparedMap, depth: float) -> None:
+    """5 mm are allowed; the foot reaches 100 mm below its base, and nothing else of the arm as far without its tool."""
+    cell = ready.job.scene.cell
+    robots = tuple(replace(robot, tool=no_tool()) if robot.name == "right" else robot for robot in cell.robots)
+    scene = Scene.from_cell(replace(cell, robots=robots))
+    sunk = pose((1.9, 0.3, 0.1 - depth), (0.0, 0.0, np.pi))
 
-    (contact,) = contacts(scene, "right", sunk[None], q[free : free + 1])
+    (contact,) = contacts(scene, "right", sunk[None], np.zeros((1, 3, 6)))
 
-    assert contact is not None
-    assert contact.distance < 0.0
-    assert contact.pair[1] == "floor"
+    assert (contact is None) is (depth < 0.005)
+    if contact is not None:
+        assert contact.pair == ("right/base", "floor")
+        assert contact.distance == pytest.approx(-depth, abs=1e-9)

@@ -8,8 +8,10 @@ from cellplan.geometry.transforms import inverse
 from cellplan.jobs.base_map.prepared import PreparedMap, _goal
 from cellplan.model.robot.robot import RobotModel
 from cellplan.scene.kinematics.screw_chain import ScrewChain
+from cellplan.search.base_map.places import Places
 from cellplan.search.base_map.starts import starts_at
 
+FINE = (np.arange(1000.0, 2801.0, 150.0), np.arange(-300.0, 901.0, 150.0))  # [mm]: most places are reached from others
 LINKS = (0.5, 0.4)  # [m] of the first two links of the arm
 
 
@@ -29,8 +31,9 @@ def test_every_start_brings_the_tool_of_the_robot_that_stands_there_to_the_start
 
 
 def test_a_planar_arm_has_both_elbows_wherever_its_wrist_is_within_reach_and_none_elsewhere(ready: PreparedMap) -> None:
-    q, at = ready.starts()
-    goal, places = _goal(ready.job), ready.job.places
+    goal = _goal(ready.job)
+    places = Places.of(goal.robot.X_WB, *FINE)
+    q, at = starts_at(goal, places, goal.robot.model, goal.robot.X_WB, seed=ready.cell.solver.seed)
     X_WT = goal.X_WR @ goal.X_RT
     X_FT = goal.robot.tool.X_FT
     wrists = inverse(places.X_WB) @ X_WT @ inverse(X_FT) @ inverse(goal.robot.model.X_BF)

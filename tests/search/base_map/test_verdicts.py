@@ -48,7 +48,7 @@ def _start(verdict: PlaceVerdict) -> Array:
 def test_speeds_and_cycles_scale_with_the_time_of_the_motion(ready: PreparedMap) -> None:
     """Twice the time: half of the speeds, a quarter of the accelerations, and the same shortest cycle."""
     factor = 2.0
-    timed = ready.cell.with_values({"motion.duration_s": 2.0 * factor, "motion.step_s": 0.02 * factor})
+    timed = ready.cell.with_values({"motion.duration_s": 3.0 * factor, "motion.step_s": 0.03 * factor})
     other = prepared(timed, "right", BaseGrid(x=(1700, 1700), y=(300, 300)))
     place = next(k for k, X in enumerate(ready.job.places.X_WB) if np.allclose(MM * X[:2, 3], (1700.0, 300.0)))
 
@@ -56,6 +56,8 @@ def test_speeds_and_cycles_scale_with_the_time_of_the_motion(ready: PreparedMap)
 
     assert here.speed is not None
     assert here.acceleration is not None
+    assert np.sqrt(here.acceleration) > here.speed  # so that it is what the cycle follows from
+    assert here.cycle == pytest.approx(3.0 * np.sqrt(here.acceleration), rel=1e-9)
     assert there.speed == pytest.approx(here.speed / factor, rel=1e-6)
     assert there.acceleration == pytest.approx(here.acceleration / factor**2, rel=1e-6)
     assert there.cycle == pytest.approx(here.cycle, rel=1e-6)
@@ -80,3 +82,4 @@ def test_the_best_is_the_fastest_then_the_one_with_the_widest_margin() -> None:
     assert places[1].or_better(None) is places[1]
     assert places[1].or_better(plain) is plain
     assert plain.or_better(places[1]) is plain
+    assert plain.or_better(places[3]) is places[3]  # the earlier one of two alike

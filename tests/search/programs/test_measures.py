@@ -49,6 +49,8 @@ def test_the_shortest_cycle_does_not_depend_on_how_fast_the_nodes_are_passed(
     x, demands = np.array([1.4, 4.5]), demands_of(timing=timing)
     plain, other = (Measures.of(*at(x, slower=k), demands, EFFORT) for k in (1.0, slower))
 
+    load = max(float(plain.speeds.value.max()), float(np.sqrt(plain.accelerations.value.max())))
+    assert load == pytest.approx(plain.factor, rel=1e-9)
     assert other.cycle == pytest.approx(plain.cycle, rel=1e-9)
     assert other.factor * slower == pytest.approx(plain.factor, rel=1e-9)
     assert other.span == pytest.approx(slower * plain.span, rel=1e-9)
@@ -68,7 +70,10 @@ def test_limits_that_are_higher_shorten_the_cycle_by_their_power(timing: CycleTi
         cycles = []
         for factor in (1.0, 4.0):
             toy = Faster(acceleration=factor * acceleration, faster=factor)
-            cycles.append(Measures.of(*at(x, toy=toy), demands, EFFORT).cycle)
+            measures = Measures.of(*at(x, toy=toy), demands, EFFORT)
+            loads = {1.0: measures.speeds.value, 0.5: np.sqrt(measures.accelerations.value)}
+            assert loads[power].max() == pytest.approx(measures.factor, rel=1e-9)
+            cycles.append(measures.cycle)
         assert cycles[0] / cycles[1] == pytest.approx(4.0**power, rel=1e-6)
 
 
@@ -95,6 +100,10 @@ def test_a_duration_is_missed_by_its_share_whatever_the_nodes_last() -> None:
         expected = np.array([2.0, 8.0, 0.0, 0.0]) / 7.5 * (1.0 + EFFORT.reserve.time) - 1.0
         np.testing.assert_allclose(loads, expected / SHARE, rtol=1e-9)
         assert measures.objective(toy, short) == pytest.approx(0.5 * 2.0)  # cost of the change of x0
+        for share, is_kept in ((0.6, True), (0.4, False)):
+            almost = demands_of(Objective.CHANGE, duration=8.0 * (1.0 + share * EFFORT.reserve.time))
+            missed = Measures.of(toy, point, almost, EFFORT).missed(toy, almost, EFFORT.reserve)
+            assert (missed.violation == 0.0) is is_kept
 
 
 def test_distances_are_asked_at_even_times_and_at_those_that_are_named() -> None:
