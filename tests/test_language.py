@@ -21,30 +21,32 @@ KEYS = frozenset(  # of files, which their readers know, and errors
 )
 
 
+BINDS: dict[type[ast.AST], str] = {  # nodes that bind a name, and their attribute that holds it
+    ast.Name: "id",
+    ast.Attribute: "attr",
+    ast.arg: "arg",
+    ast.alias: "asname",
+    **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler), "name"),
+    ast.MatchAs: "name",
+    ast.MatchStar: "name",
+    ast.MatchMapping: "rest",
+}
+
+
 @cache
-def tree_of(path: Path) -> ast.Module:
-    """The syntax tree of a file."""
-    return ast.parse(path.read_text(encoding="utf-8"))
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of the syntax tree of a file."""
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
-def bound_names(tree: ast.AST) -> Iterator[tuple[int, str]]:
+def bound_names(nodes: Iterable[ast.AST]) -> Iterator[tuple[int, str]]:
     """Every name that a file binds: variables, parameters, fields, attributes of ``self``, functions and classes."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.Name(ctx=ast.Store()):
-                yield node.lineno, node.id
-            case ast.Attribute(ctx=ast.Store()):
-                yield node.lineno, node.attr
-            case ast.arg():
-                yield node.lineno, node.arg
-            case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-                yield node.lineno, node.name
-            case ast.alias(asname=str(name)):
-                yield node.lineno, name
-            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)) | ast.MatchStar(name=str(name)):
-                yield node.lineno, name
-            case ast.MatchMapping(rest=str(name)):
-                yield node.lineno, name
+    for node in nodes:
+        attribute = BINDS.get(type(node))
+        if attribute is not None and not isinstance(getattr(node, "ctx", None), ast.Load | ast.Del):
+            name = getattr(node, attribute)
+            if name is not None:
+                yield node.lineno, name  # type: ignore[attr-defined]
 
 
 def places_of(paths: Iterable[Path], is_vague: Callable[[str], bool]) -> list[str]:
@@ -52,11 +54,12 @@ def places_of(paths: Iterable[Path], is_vague: Callable[[str], bool]) -> list[st
     return [
         f"{path.relative_to(ROOT).as_posix()}:{line}: {name}"
         for path in paths
-        for line, name in bound_names(tree_of(path))
+        for line, name in bound_names(nodes_of(path))
         if is_vague(name)
     ]
 
 
+@cache
 def has_vague_word(name: str) -> bool:
     """Whether a word of a name fits anything."""
     words = {word.lower() for word in re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)}
@@ -96,7 +99,7 @@ def test_words_of_a_name_are_told_apart() -> None:
     ],
 )
 def test_every_way_to_bind_a_name_is_seen(source: str) -> None:
-    assert "found" in {name.lower() for _, name in bound_names(ast.parse(source))}
+    assert "found" in {name.lower() for _, name in bound_names(ast.walk(ast.parse(source)))}
 
 
 ENTRY = re.compile(r"^    \*{0,2}(\w+):", re.MULTILINE)
@@ -110,9 +113,7 @@ def described_without_a_parameter(node: ast.FunctionDef) -> list[str]:
 
 
 def test_docstrings_describe_parameters_by_their_names() -> None:
-    functions = [
-        (path.name, node) for path in SOURCES for node in ast.walk(tree_of(path)) if isinstance(node, ast.FunctionDef)
-    ]
+    functions = [(path.name, node) for path in SOURCES for node in nodes_of(path) if isinstance(node, ast.FunctionDef)]
     wrong = {f"{file}: {node.name}": described_without_a_parameter(node) for file, node in functions}
 
     assert {place: names for place, names in wrong.items() if names} == {}

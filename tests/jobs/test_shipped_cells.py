@@ -18,6 +18,7 @@ LONG_TO_CHECK = {
     "fixed_part",
     "gripper",
     "load_sharing",
+    "load_sharing_planar",
     "mesh_part_csv",
     "multimove",
     "own_urdf",
@@ -25,6 +26,7 @@ LONG_TO_CHECK = {
     "rail",
     "three_tasks_each",
     "tilted_mount",
+    "turntable",
     "two_robots",
 }
 MEANT_TO_FAIL = {"four_robots_initial", "find_a_layout"}  # the starts of layout searches
@@ -41,6 +43,7 @@ LONG = {
     "own_urdf",
     "pedestal",
     "tilted_mount",
+    "turntable",
     "two_robots",
 }
 MEANT_TO_PASS = [

@@ -14,7 +14,7 @@ from cellplan.errors import InputError, NotVerifiedError
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 
-QUICK_ROUNDS, ALL_ROUNDS = 2, 6  # of every kind: 82 and 246 defects
+QUICK_ROUNDS, ALL_ROUNDS = 1, 7  # of every kind: 52 and 364 defects
 
 
 @pytest.fixture(scope="module")

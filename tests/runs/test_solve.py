@@ -16,7 +16,9 @@ CELLS = Path(__file__).resolve().parents[2] / "cells"
 VALUES = {"motion.duration_s": 2.0, "motion.step_s": 0.02}
 
 
-@pytest.fixture(scope="module", params=["planar_pair.yaml", "load_sharing_planar.yaml"])
+@pytest.fixture(
+    scope="module", params=[pytest.param("planar_pair.yaml", marks=pytest.mark.slow), "load_sharing_planar.yaml"]
+)
 def cell(request: Any) -> Cell:
     return load_cell(CELLS / request.param).with_values(VALUES)
 

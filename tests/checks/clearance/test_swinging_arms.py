@@ -72,7 +72,7 @@ def distance_of(scene: Scene, pair: ScenePair, poses: BodyPoses, k: int = 0) -> 
     return 0.0 if is_hit else reading.bound
 
 
-@pytest.mark.parametrize("seed", [0, 1, *MORE[1:]])
+@pytest.mark.parametrize("seed", [0, *MORE])
 def test_every_class_agrees_with_a_brute_force_search(seed: int) -> None:
     """No sample is nearer than the minimum; at its instant the pair is as near as it says, to 0.1 mm."""
     scene, q = Scene.from_cell(two_arms()), swinging(seed, 80)

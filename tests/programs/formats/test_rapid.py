@@ -255,18 +255,24 @@ VARIANTS = {
 }
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_harmless_variants_are_read(variant: str) -> None:
+@pytest.fixture(scope="module")
+def multimove() -> tuple[ExportJob, dict[str, str], ProgramRows]:
+    """A job, its files and what is read from them; not to be changed."""
     job = multimove_job(rows=5, blend=0.25)
     files = RAPID.render(job)
+    return job, files, RAPID.read(job.frame, files)[0]
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_harmless_variants_are_read(variant: str, multimove: tuple[ExportJob, dict[str, str], ProgramRows]) -> None:
+    job, files, expected = multimove
 
     changed = {path: VARIANTS[variant](text) if path.endswith("mod") else text for path, text in files.items()}
     read = RAPID.read(job.frame, changed)
 
     assert changed != files
-    expected = RAPID.read(job.frame, files)
     for name in NAMES[:3]:
-        np.testing.assert_allclose(read[0].robots[name].q, expected[0].robots[name].q, rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(read[0].robots[name].q, expected.robots[name].q, rtol=0.0, atol=1e-12)
 
 
 # What cannot be written

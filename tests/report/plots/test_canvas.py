@@ -25,7 +25,7 @@ print(matplotlib.rcParams._get("backend"))
         ("module://matplotlib_inline.backend_inline", None),
         pytest.param("nonsense", None, marks=pytest.mark.slow),
         pytest.param("", None, marks=pytest.mark.slow),
-        ("svg", "svg"),
+        pytest.param("svg", "svg", marks=pytest.mark.slow),
     ],
 )
 def test_plots_are_painted_whatever_display_is_desired(desired: str, left: str | None) -> None:

@@ -182,9 +182,10 @@ def test_what_was_set_when_the_cell_was_solved_is_reported(sound: Path, tmp_path
 @pytest.mark.parametrize(
     ("choices", "remarks"),
     [
-        (
+        pytest.param(
             {"integrator": "euler"},
             ["solver.integrator was set to 'euler' when the cell was solved"],
+            marks=pytest.mark.slow,  # the last one says so too
         ),
         (
             {"method": "damped_least_squares"},  # brings its integrator along, which nobody chose

@@ -62,7 +62,7 @@ def read_by_pieces(engine: Engine, pair: tuple[int, int], X: tuple[Array, Array]
 def test_the_nearest_piece_is_as_near_as_the_body(order: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
     engine = Engine((prepare("bowl", bowl()), prepare("stick", Capsule(0.02, 0.2))))
-    for _ in range(20):
+    for _ in range(10):
         X = pose(), random_pose(rng, reach=0.4)
         truth = measure(engine, (0, 1), checked_poses([X[0][None], X[1][None]]), sample=0)
 
