@@ -103,7 +103,8 @@ class _RetractSearch:
         held = next((str(body.robot) for body in bodies if body.kind is Kind.PART and body.robot), None)
         others = tuple(sorted(robots - {held}))
         able = [name for name in others if name in may_move] or [name for name in sorted(robots) if name in may_move]
-        if not able or len(robots) == 0 or (len(robots) == 1 and held is None and _is_within_robot(bodies)):
+        is_within_robot = bodies[0].robot == bodies[1].robot
+        if not able or not robots or (len(robots) == 1 and held is None and is_within_robot):
             first, second = scene.names(pair)
             distance = float(signed_distances(scene, pair, self._q[None])[0])
             raise TransferNotFoundError(
@@ -178,11 +179,6 @@ class _RetractSearch:
             for length in lengths:
                 if line is not None and length > 0.0:
                     yield line.up_to(float(length))
-
-
-def _is_within_robot(bodies: Sequence[object]) -> bool:
-    """Whether both bodies belong to one robot."""
-    return len({getattr(body, "robot", None) for body in bodies}) == 1
 
 
 def _fault(growth: Growth, scene: Scene, q: Array, near: Sequence[int]) -> str:

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
-from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.progress import Progress
 from cellplan.model.seeds import generator
 from cellplan.planning.transfer.blended_lines import BlendedLine
@@ -125,7 +125,7 @@ class InTime:
 
     def _rounded(self, check: MoveCheck, path: SpaceTimePath, times: Array) -> BlendedLine | None:
         """A way with its corners rounded off as far as that is free; None where even the least rounding is not."""
-        moving = np.flatnonzero(moves_at(path))
+        moving = np.flatnonzero(np.any(np.diff(path.q, axis=0) != 0.0, axis=1))  # edges on which the robot moves
         first, last = int(moving[0]), int(moving[-1]) + 1  # it stands before and after
         columns = self._query.scene.cell.columns(check.robot)
         at, via, share = times[path.ticks[first : last + 1]], path.q[first : last + 1], 1.0
@@ -282,8 +282,3 @@ def _joined(
     q = np.array([trees[0].x[k] for k in there] + [trees[1].x[k] for k in home]) * velocity
     q[0], q[-1] = ends[0][0], ends[1][0]
     return SpaceTimePath(ticks=ticks, q=q)
-
-
-def moves_at(path: SpaceTimePath) -> Flags:
-    """Whether the robot moves on each edge of a way, shape (K - 1,)."""
-    return np.any(np.diff(path.q, axis=0) != 0.0, axis=1)

@@ -16,7 +16,6 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.model.motion.motion import Schedule
-from cellplan.model.progress import Progress, silent
 from cellplan.planning.layout_screening import Candidates, screen_layouts
 from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
@@ -146,13 +145,13 @@ class PreparedSearch:
         except NoSolutionError as error:
             return error
 
-    def start_of(self, cell: Cell, progress: Progress = silent) -> Array:
+    def start_of(self, cell: Cell) -> Array:
         """The start posture of a cell with this job; see ``given_start``."""
         if all(robot.start is not None for robot in cell.robots):
             return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
         scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)
         paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
-        return chosen_start(scene, paths, progress=progress).start
+        return chosen_start(scene, paths).start
 
     @cached_property
     def starts(self) -> StartGenerator:
