@@ -59,7 +59,7 @@ def check(cell: Cell, *, scene: Scene | None = None, progress: Progress = silent
         InputError: A path misses the part, or a given start is out of limits or off its task.
         NoSolutionError: No start posture was found.
     """
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         return _check_program(cell, progress)
     return _check_together(scene or Scene.from_cell(cell), progress)
 

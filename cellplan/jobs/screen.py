@@ -27,7 +27,7 @@ def screen(cell: Cell, candidates: Candidates, *, task: str | None = None, accur
         InputError: The cell cannot be worked with, or there is no such task.
         ValueError: The candidates are not cells of these robots.
     """
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         raise InputError(f"{cell.origin.at('program')}: expected a cell without a program from home to home")
     paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
     runs = [

@@ -10,8 +10,8 @@ import numpy as np
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.programs.promises.orders import Orders, certified_orders
+from cellplan.programs.promises.run_programs import scenes_of_motions
 from cellplan.programs.rows.played import ExecutedProgram
-from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.scene.scene import Scene
 
 Result = TypeVar("Result")
@@ -36,9 +36,7 @@ class Shared:
     @cached_property
     def scenes(self) -> Sequence[Scene]:
         """The scene of each motion of the run."""
-        if self.run.cell.program is None:
-            return [self.scene] * len(self.run.motions)
-        return DemandedProgram.of(self.run.cell).scenes(self.run.cell)
+        return scenes_of_motions(self.run)
 
     def orders(self, progress: Progress = silent) -> tuple[Orders, ...]:
         """Marks of every program, between which every order of the robots is certified."""

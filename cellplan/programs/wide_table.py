@@ -37,15 +37,14 @@ def read_wide_tables(run: VerifiedRun, files: Mapping[str, str]) -> tuple[dict[s
 
 def _programs(run: VerifiedRun) -> Iterator[tuple[str | None, WideRows]]:
     """The rows of every program of a run, by its name."""
-    if run.cell.program is not None:
-        yield None, verified_rows(run)
-        return
-    for phase, motion in zip(run.motion.plan.program, run.motions, strict=True):
-        rows = run.motion.rows(phase)
-        times, sigma = motion.schedule.times, run.motion.sigma[rows]
-        process = run.motion.plan.process
-        phase_rows = _phase_rows(phase.name, slice(0, len(times)), _checked(motion))
-        yield motion.name, WideRows(cell=run.cell, times=times, sigma=sigma, phases=[phase_rows], process=process)
+    sigma, process = run.motion.sigma, run.motion.plan.process
+    for piece, tables in zip(run.motion.pieces, run.programs.values(), strict=True):
+        times = next(iter(tables.values())).times
+        phases = [
+            _phase_rows(phase.name, rows, _checked(run.motions[place % len(run.motions)]))
+            for place, phase, rows in piece.phases
+        ]
+        yield piece.name, WideRows(cell=run.cell, times=times, sigma=sigma[piece.rows], phases=phases, process=process)
 
 
 def _program_rows(cell: Cell, motion: Motion, checked: Sequence[Checked]) -> WideRows:

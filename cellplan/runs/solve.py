@@ -79,7 +79,7 @@ def solve_motion(
     refuse_clock_name(cell)
     branches = None if near is None else read_branches(near, cell)
     cell = with_run_named(cell, branches)
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         return _solve_program(cell, task=task, near=branches, early=early, progress=progress)
     scene = Scene.from_cell(cell)
     toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
@@ -115,7 +115,7 @@ def _solve_program(
     from cellplan.runs.plan.sequence import plan_program  # with all transfer moves, which few cells have
 
     planned = plan_program(cell if task is None else with_only_task(cell, task), near=near, progress=progress)
-    stages, cycles = planned.stages, planned.cycles
+    stages, cycles = planned.stages, planned.cell.program.cycles
     plan = Plan(phases=tuple(stage.stage.phase for stage in stages) * cycles)
     clock = ProgramClock.of(planned.cell, plan, [stage.schedule for stage in stages] * cycles)
     motions, scenes = [stage.motion for stage in stages] * cycles, [stage.scene for stage in stages] * cycles
@@ -186,7 +186,7 @@ def _runs(
     program = replace(program, clock=text)
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
-    for place in range(len(motions) // (1 if cell.program is None else cell.program.cycles)):
+    for place in range(len(motions) // cell.program.cycles):
         schedule, phase_motion = clock.schedules[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         if early is not None:

@@ -39,7 +39,7 @@ def verify(
             holds still in this phase.
     """
     parsed = [parse_table(text, f"tables/{name}.csv") for name, text in tables.items()]
-    is_whole = cell.program is not None or any(table.gaps for table in parsed)
+    is_whole = cell.program.is_home_to_home or any(table.gaps for table in parsed)
     demanded = DemandedProgram.of(cell, only=None if is_whole else task)
     place = _place(demanded, task)
     program = _on_clock(cell, demanded, clock)

@@ -10,7 +10,7 @@ def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> 
     """Refuse jobs for ``what`` but one synchronous pseudo-inverse motion; some robots may have a given joint path."""
     motion, solver = cell.motion, cell.solver
     at = cell.origin.at
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         raise InputError(f"{at('program')}: expected a cell without a program from home to home for {what}")
     if motion.mode not in {Mode.SIMULTANEOUS, Mode.PART_AT_REST}:
         raise InputError(f"{at('motion.mode')}: expected simultaneous or part_at_rest for {what}, got '{motion.mode}'")

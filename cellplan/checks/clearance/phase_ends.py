@@ -98,7 +98,7 @@ def with_phase_ends(cell: Cell, phases: Sequence[JudgedPhase]) -> list[Report]:
         phases: Phases of one cycle in their order.
     """
     reports = [phase.report for phase in phases]
-    if cell.program is None or any(report.skew is None for report in reports):
+    if not cell.program.is_home_to_home or any(report.skew is None for report in reports):
         return reports
     for end in _ends(cell, phases):
         report = reports[end.before.place]
@@ -111,7 +111,7 @@ def with_phase_ends(cell: Cell, phases: Sequence[JudgedPhase]) -> list[Report]:
 def _ends(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[_End]:
     """Ends of phases at which others begin; those of further cycles only if something else is played around them."""
     placed, rows = list[_Placed](), list[tuple[Array, Array]]()
-    begin, cycles = 0.0, 1 if cell.program is None else min(cell.program.cycles, 3)  # a third repeats the second
+    begin, cycles = 0.0, min(cell.program.cycles, 3)  # a third repeats the second
     for place, phase in list(enumerate(phases)) * cycles:
         report = phase.report
         if len(report.times) > 1:

@@ -62,7 +62,7 @@ def with_joins(cell: Cell, reports: Sequence[Report]) -> list[Report]:
         cell: The cell of the whole program; reports of any other program stay as they are.
         reports: Reports of the phases of one cycle in their order.
     """
-    if cell.program is None:
+    if not cell.program.is_home_to_home:
         return list(reports)
     first = reports[0]
     return [replace(first, checks=(*first.checks, check_joins(cell, reports))), *reports[1:]]

@@ -45,6 +45,7 @@ from cellplan.geometry.shapes import Mesh
 from cellplan.model.cell.cell import Cell
 from cellplan.model.origin import Origin
 from cellplan.model.robot.robot import RobotModel
+from cellplan.model.settings.program import NoTransfers
 from cellplan.model.task.task import TimedPath
 
 PART_EXTENT_MM: Final = (1.0, 20_000.0)  # smaller or larger parts are a wrong unit
@@ -266,7 +267,7 @@ def _cell(
         origin=origin,
         inputs=dict(sorted(sources.inputs.items())),
         remarks=tuple(sources.remarks),
-        program=whole.program,
+        program=whole.program or NoTransfers(),
         controllers=whole.controllers or {},
     )
 

@@ -50,7 +50,7 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
     }
     document["part"] = _part(document["part"], cell.part)
     document["tasks"] = {task.name: _task(tasks[task.name], task) for task in cell.tasks}
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         written = document["tasks"]
         document["tasks"] = {task.name: _in_sequence(written[task.name], task, cell) for task in cell.tasks}
     if len(cell.tasks) != len(tasks) or str(cell.motion.mode) != document["motion"]["mode"]:

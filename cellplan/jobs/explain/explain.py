@@ -80,7 +80,7 @@ def explain(cell: Cell) -> Structure:
 
 def _worked_on(cell: Cell) -> list[tuple[Cell, Phase]]:
     """The phases in which tasks of the cell are worked on, each with the cell as it is then."""
-    if cell.program is None:
+    if not cell.program.is_home_to_home:
         return [(cell, phase) for phase in plan_phases(cell).program]
     return [(stage.cell, stage.phase) for stage in program_stages(cell) if stage.phase.tasks and stage.move is None]
 

@@ -130,7 +130,7 @@ class TimedProgram:
     def phases(self) -> list[float]:
         """Times in [s] that a demanded ``cycle_s`` stands for: of its phases, or of its cycles from home to home."""
         program = self.solution.cell.program
-        if program is not None:
+        if program.is_home_to_home:
             return [self.cycle / program.cycles] * program.cycles
         return [run.report.cycle_time for run in self.solution.runs]
 

@@ -44,15 +44,11 @@ class RunPlaces:
     def of(cls, run: VerifiedRun) -> "RunPlaces":
         """Those of a verified run."""
         cell = replace(run.cell, motion=replace(run.cell.motion, cyclic=False))
-        stages = program_stages(run.cell) if run.cell.program is not None else ()
-        phases = run.motion.plan.program
-        if not stages:
-            phases = phases[: len(run.motions)]
         return cls(
             cell=cell,
             motion=run.motion,
-            phases=phases,
-            stages=stages,
+            phases=run.motion.plan.program,
+            stages=program_stages(run.cell),
             scenes=StageScenes.of(cell),
             tipped=StageScenes.of(with_tips(cell)),
         )

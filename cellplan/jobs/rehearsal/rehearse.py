@@ -77,7 +77,7 @@ def rehearse(
             f"{cell.origin.at('part.held_by')}: expected one robot that holds the part, got {len(cell.part.held_by)}: "
             "the pose of a part between several holders depends on their stiffness, which a cell does not state"
         )
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         raise InputError(
             f"{cell.origin.at('program')}: expected a cell without a program from home to home, as rehearsals have no "
             "measured errors of transfer moves; rehearse its tasks without this key"

@@ -106,7 +106,7 @@ def _moving(standing: Record, scene: Scene) -> Record:
     """The scene with the motion that the layout has at the duration of the cell; as it stands where there is none."""
     cell = scene.cell
     phases = plan_phases(cell).program
-    if cell.program is not None or len(phases) > 1 or any(robot.start is None for robot in cell.robots):
+    if cell.program.is_home_to_home or len(phases) > 1 or any(robot.start is None for robot in cell.robots):
         return standing
     try:
         paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])

@@ -21,7 +21,7 @@ from cellplan.model.robot.robot import Body, JointLimits, RobotModel
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.motion import LockedJointEntry
-from cellplan.model.settings.program import ProgramEntry
+from cellplan.model.settings.program import NoTransfers, ProgramEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.model.task.task import Frame, Task
 
@@ -253,7 +253,7 @@ class Cell(Presented):
         origin: The document that the cell was read from.
         inputs: SHA-256 of every file that was read, by the path as written.
         remarks: Key of the cell file, and what was not read of the file that it names.
-        program: What is done from home to home; None for tasks that begin and end where they are worked on.
+        program: Cycles, marks and places of the part; ``NoTransfers`` where it does not go from home to home.
         layout: What a layout search may change; None for a cell that was built in Python.
         controllers: Its controllers by name; empty when none are stated.
     """
@@ -269,7 +269,7 @@ class Cell(Presented):
     origin: Origin
     inputs: Mapping[str, str]
     remarks: tuple[tuple[str, str], ...] = ()
-    program: ProgramEntry | None = None
+    program: ProgramEntry = NoTransfers()  # noqa: RUF009 - frozen
     layout: LayoutSettings | None = None
     controllers: Mapping[str, ControllerEntry] = field(default_factory=dict)
 

@@ -17,7 +17,7 @@ def not_in_program(cell: Cell, tasks: Collection[str]) -> str:
     Empty when there are none; a robot without work in the whole cell never leaves its home, and a program from home to
     home has all moves.
     """
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         return ""
     workers = {task.robot for task in cell.tasks}
     idle = [name for name in idle_robots(cell, tasks) if name in workers]

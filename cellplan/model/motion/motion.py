@@ -1,9 +1,10 @@
 """Schedule, motion and program: desired tool poses, joint positions of all robots, and the tables as text."""
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,6 +217,27 @@ class Resolution:
                 raise ValueError(f"resolution: expected a finite number of at least 0, got {figure}")
 
 
+class PiecePhase(NamedTuple):
+    """A phase of a piece of a program."""
+
+    place: int  # its number among the phases of the program, those of all cycles
+    phase: Phase
+    rows: slice  # its rows in the piece, both ends included
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Piece:
+    """Phases of a program that follow one another without a gap: they are played in one go."""
+
+    rows: slice  # its rows in the program, both ends included
+    phases: tuple[PiecePhase, ...]
+
+    @property
+    def name(self) -> str | None:
+        """Its name among several, that of its only phase; None for a program in one piece."""
+        return self.phases[0].phase.label if len(self.phases) == 1 else None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Motion:
     """Joint positions of all robots in the rows of a program, or of one phase of it.
@@ -260,6 +282,18 @@ class Motion:
     def rows(self, phase: Phase) -> slice:
         """The rows of a phase, both ends included."""
         return rows_of(phase, self.sigma)
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        """The program in pieces: one for each phase, or one of all phases that lead from home to home."""
+        numbers, pieces = itertools.count(), list[Piece]()
+        for in_program, group in itertools.groupby(self.plan.phases, key=lambda phase: phase.in_program):
+            if in_program:
+                phases = [(next(numbers), phase, self.rows(phase)) for phase in group]
+                first, end = phases[0][2].start, phases[-1][2].stop
+                placed = (PiecePhase(k, p, slice(rows.start - first, rows.stop - first)) for k, p, rows in phases)
+                pieces.append(Piece(rows=slice(first, end), phases=tuple(placed)))
+        return tuple(pieces)
 
     def __repr__(self) -> str:
         """One line without arrays."""

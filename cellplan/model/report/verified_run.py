@@ -91,7 +91,7 @@ class VerifiedRun(Presented):
     @property
     def programs(self) -> Mapping[str | None, Mapping[str, JointTable]]:
         """What is played from begin to end, by name: every phase, or all of a program from home to home as None."""
-        if self.cell.program is None:
+        if len(self.motion.pieces) == len(self.motions):
             return {motion.name: motion.tables for motion in self.motions}
         times, q = self.motion.times, self.motion.q
         tables = self.motions[0].tables
@@ -110,7 +110,7 @@ class VerifiedRun(Presented):
         Args:
             programs: Tables by robot of each of the ``programs``, as they were read back.
         """
-        if self.cell.program is None:
+        if len(programs) == len(self.motions):
             return tuple(map(dict, programs))
         places = [self.motion.rows(phase) for phase in self.motion.plan.program[: len(self.motions)]]
         return tuple(

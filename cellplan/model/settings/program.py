@@ -1,6 +1,6 @@
 """Programs from home to home: cycles, marks, and where the part lies before and after."""
 
-from typing import Annotated, Final
+from typing import Annotated, ClassVar, Final
 
 from pydantic import Field, Tag
 
@@ -84,6 +84,8 @@ class PartPlaceEntry(Entry):
 class ProgramEntry(Entry):
     """A program from home to home: transfer moves lead from the homes to the tasks, between them, and back."""
 
+    is_home_to_home: ClassVar[bool] = True
+
     cycles: Annotated[int, Field(ge=1, le=MOST_CYCLES)] = Field(
         default=1, description="How often all of the program is done."
     )
@@ -105,3 +107,9 @@ class ProgramEntry(Entry):
     def all_marks(self) -> tuple[MarkEntry, ...]:
         """The marks, those given by name only with their defaults."""
         return tuple(mark if isinstance(mark, MarkEntry) else MarkEntry(name=mark) for mark in self.marks)
+
+
+class NoTransfers(ProgramEntry):
+    """A program whose tasks begin and end where they are worked on: one cycle, without marks and transfer moves."""
+
+    is_home_to_home: ClassVar[bool] = False

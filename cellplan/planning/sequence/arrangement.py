@@ -97,7 +97,7 @@ def _holder_configuration(cell: Cell, task: Task) -> Array | None:
 def _require_names(cell: Cell) -> None:
     """Refuse orders and ``after`` with names that the cell does not have."""
     operators = {task.name: task.robot for task in cell.tasks}
-    marks = [mark.name for mark in cell.program.all_marks] if cell.program is not None else []
+    marks = [mark.name for mark in cell.program.all_marks]
     for robot in cell.robots:
         for index, text in order_faults(robot.name, robot.order, operators, marks) if robot.order else ():
             place = f"robots.{robot.name}.order" if index is None else f"robots.{robot.name}.order[{index}]"
@@ -116,7 +116,7 @@ class SequenceProgress:
         self.cell = cell
         self._sequences = {robot.name: sequence_of(cell, robot.name) for robot in cell.robots}
         self._places = dict.fromkeys(self._sequences, 0)
-        self._dwells = {mark.name: mark.dwell_s for mark in cell.program.all_marks} if cell.program is not None else {}
+        self._dwells = {mark.name: mark.dwell_s for mark in cell.program.all_marks}
         self._robots_of = {
             mark: [robot for robot, sequence in self._sequences.items() if mark in sequence] for mark in self._dwells
         }

@@ -32,9 +32,9 @@ class Stage:
 
 
 def program_stages(cell: Cell) -> tuple[Stage, ...]:
-    """The stages of one cycle from home to home; starts and homes that are not known yet are None in them too."""
-    if cell.program is None:
-        raise ValueError(f"cell '{cell.name}' has no program from home to home")
+    """The stages of one cycle from home to home, none of other programs; starts and homes may be None in them too."""
+    if not cell.program.is_home_to_home:
+        return ()
     between = [*_picked_up(cell, cell.program), *_worked_on(cell), *_put_down(cell, cell.program)]
     return tuple(_with_transfers(cell, cell.program, between))
 

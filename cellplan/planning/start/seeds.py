@@ -100,7 +100,7 @@ def _nearer_goal(
     """Where a tool is desired at the start, or on the path behind an approach, and how far a start is from there."""
     begin = relation.X_PT if isinstance(relation, Grasp) else toolpaths[relation.name].X_PT_start
     goals = [begin]
-    if isinstance(relation, Task) and relation.approach is not None and cell.program is not None:
+    if isinstance(relation, Task) and relation.approach is not None and cell.program.is_home_to_home:
         on_path = begin.copy()
         on_path[:3, 3] += begin[:3, 2] * relation.approach.distance
         goals.append(on_path)

@@ -39,7 +39,7 @@ def skew_lines(prepared: PreparedExport) -> Iterator[str]:
     """What the start skew may be."""
     if prepared.skew is not None:
         least = prepared.skew.least
-        over = "" if prepared.job.frame.cell.program is None else " over all phases and their ends"
+        over = " over all phases and their ends" if prepared.job.frame.cell.program.is_home_to_home else ""
         yield f"allowed skew{over} {skew_text(least.allowed)}: '{least.first}' and '{least.second}', {least.reason}"
 
 

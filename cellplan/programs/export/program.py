@@ -25,7 +25,6 @@ from cellplan.programs.export.written import write
 from cellplan.programs.formats.csv import DECIMALS as CSV_DECIMALS
 from cellplan.programs.shared import Shared
 from cellplan.programs.wide_table import read_wide_tables, render_wide_tables
-from cellplan.runs.plan.demanded import DemandedProgram
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,15 +146,13 @@ def verify_rounded(
 ) -> None:
     """Make every check again on what the files hold, on the clock that they hold."""
     run = shared.run
-    demanded = None if run.cell.program is None else DemandedProgram.of(run.cell)
-    findings = []
-    for place, (motion, scene, tables) in enumerate(zip(run.motions, shared.scenes, read, strict=True)):
+    findings, phases = [], run.motion.plan.program[: len(run.motions)]
+    for phase, motion, scene, tables in zip(phases, run.motions, shared.scenes, read, strict=True):
         _refuse_other_clock(motion, tables, tolerance=0.5 * 10.0**-decimals)
         clock = next(iter(tables.values())).times
         schedule = replace(motion.schedule, times=clock)
-        idle = None if demanded is None else demanded.plan.program[place].idle
         rows = list(tables.values())
-        report = verify_motion(scene, schedule, rows, moving=motion.moving, idle=idle, progress=progress)
+        report = verify_motion(scene, schedule, rows, moving=motion.moving, idle=phase.idle, progress=progress)
         report = with_clearance(report, scene, schedule, is_reported=False, progress=progress)
         findings += [f"rounded to {decimals} decimals: {check.message}" for check in report.checks if not check.passed]
     if findings:

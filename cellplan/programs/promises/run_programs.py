@@ -1,6 +1,6 @@
 """Programs of a run: each with its phases, where tools are in process, and where holders move."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,9 +8,9 @@ import numpy as np
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.plan import rows_of
-from cellplan.model.report.verified_run import ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
+from cellplan.model.report.verified_run import ReadRun, VerifiedRun
 from cellplan.model.task.task import Frame
+from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.programs.elements.timed_rows import are_within
 from cellplan.runs.plan.demanded import DemandedProgram
 from cellplan.runs.plan.program import STILL_TOL
@@ -51,25 +51,20 @@ class RunProgram:
 
 def run_programs(run: VerifiedRun | ReadRun) -> tuple[RunProgram, ...]:
     """The programs of a run: one from home to home, or one for each of its phases."""
-    motion, plan = run.motion, run.motion.plan
-    motions: Sequence[ReadMotion | VerifiedMotion] = run.motions
-    process = {task: are_within(motion.sigma, stretches) for task, stretches in plan.process.items()}
-    rows = [rows_of(phase, motion.sigma) for phase in plan.program]
-    if run.cell.program is not None:
-        phases = tuple(
-            RunPhase(name=phase.name, place=place % len(run.motions), first=columns.start, last=columns.stop - 1)
-            for place, (phase, columns) in enumerate(zip(plan.program, rows, strict=True))
-        )
-        return (RunProgram(name=None, times=motion.times, q=motion.q, phases=phases, process=process),)
+    motion = run.motion
+    process = {task: are_within(motion.sigma, stretches) for task, stretches in motion.plan.process.items()}
     return tuple(
         RunProgram(
-            name=verified.name,
-            times=verified.schedule.times,
-            q=motion.q[columns],
-            phases=(RunPhase(name=phase.name, place=place, first=0, last=columns.stop - columns.start - 1),),
-            process={task: process[task][columns] for task in phase.tasks},
+            name=piece.name,
+            times=np.round(motion.times[piece.rows] - motion.times[piece.rows.start], TIME_DECIMALS),
+            q=motion.q[piece.rows],
+            phases=tuple(
+                RunPhase(name=phase.name, place=place % len(run.motions), first=rows.start, last=rows.stop - 1)
+                for place, phase, rows in piece.phases
+            ),
+            process={task: process[task][piece.rows] for _, phase, _ in piece.phases for task in phase.tasks},
         )
-        for place, (phase, columns, verified) in enumerate(zip(plan.program, rows, motions, strict=True))
+        for piece in motion.pieces
     )
 
 
@@ -95,15 +90,16 @@ def spoilt_by_another_order(cell: Cell, program: RunProgram) -> Iterator[str]:
             )
 
 
+def scenes_of_motions(run: VerifiedRun) -> list[Scene]:
+    """The scene of each motion of a run."""
+    return DemandedProgram.of(run.cell).scenes(run.cell)[: len(run.motions)]
+
+
 def scenes_of(run: VerifiedRun) -> list[Scene]:
     """The scene of each motion of a run, while its tasks are worked on."""
-    if run.cell.program is None:
-        made = [Scene.from_cell(run.cell)] * len(run.motions)
-    else:
-        made = DemandedProgram.of(run.cell).scenes(run.cell)
     return [
         scene_of_run(scene, [scheduled.task.name for scheduled in motion.schedule.tasks])
-        for scene, motion in zip(made, run.motions, strict=True)
+        for scene, motion in zip(scenes_of_motions(run), run.motions, strict=True)
     ]
 
 

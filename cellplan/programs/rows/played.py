@@ -128,13 +128,8 @@ class ExecutedProgram:
     def stretches(self) -> Iterator[ExecutedStretch]:
         """All phases in their order, those of all cycles."""
         run = self.run
-        if run.cell.program is None:
-            yield ExecutedStretch(
-                place=self.place, motion=run.motions[self.place], begin=self.lead, end=float(self.run_times[-1])
-            )
-            return
-        for number, phase in enumerate(run.motion.plan.program):
-            place, rows = number % len(run.motions), run.motion.rows(phase)
+        for number, _, rows in run.motion.pieces[self.place].phases:
+            place = number % len(run.motions)
             begin, end = self.run_times[rows.start], self.run_times[rows.stop - 1]
             if end > begin:
                 yield ExecutedStretch(place=place, motion=run.motions[place], begin=float(begin), end=float(end))

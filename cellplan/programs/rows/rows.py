@@ -7,7 +7,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.motion import JointTable
+from cellplan.model.motion.motion import JointTable, Piece
 from cellplan.model.motion.plan import Interval, Plan
 from cellplan.model.report.exported import ProgramRows, RobotRows
 from cellplan.model.report.verified_run import VerifiedRun
@@ -56,7 +56,7 @@ def essential_rows(run: VerifiedRun) -> tuple[EssentialRows, ...]:
     """What a thinned program keeps of each program of a run, in their order."""
     plan = run.motion.plan
     rows_of_programs = []
-    for place, nominal in enumerate(_programs(run)):
+    for piece, nominal in zip(run.motion.pieces, _programs(run), strict=True):
         times = [*nominal.begins, *(stop for stops in plan.stops.values() for stop in stops)]
         times += [end for dwell in plan.dwells for end in dwell]
         rows = {0, len(nominal.sigma) - 1}
@@ -65,7 +65,7 @@ def essential_rows(run: VerifiedRun) -> tuple[EssentialRows, ...]:
                 first = int(np.searchsorted(nominal.sigma, time - TIME_TOLERANCE))
                 last = int(np.searchsorted(nominal.sigma, time + TIME_TOLERANCE, side="right")) - 1
                 rows |= {min(first, len(nominal.sigma) - 1), max(last, 0)}
-        rows_of_programs.append(EssentialRows(tuple(sorted(rows)), tuple(_work(run, nominal, place))))
+        rows_of_programs.append(EssentialRows(tuple(sorted(rows)), tuple(_work(run, piece))))
     return tuple(rows_of_programs)
 
 
@@ -77,25 +77,16 @@ def times_of(rows: RobotRows) -> Array:
 
 
 def _programs(run: VerifiedRun) -> Iterator[NominalRows]:
-    """The programs of a run in their order; every phase is one where the cell has no program from home to home."""
-    motion, phases = run.motion, run.motion.plan.program
-    for place, (name, tables) in enumerate(run.programs.items()):
-        if run.cell.program is not None:
-            begins = (*(phase.begin for phase in phases), phases[-1].end)
-            yield NominalRows(name, dict(tables), motion.sigma, begins)
-        else:
-            phase = phases[place]
-            yield NominalRows(name, dict(tables), motion.sigma[motion.rows(phase)], (phase.begin, phase.end))
+    """The programs of a run in their order."""
+    for piece, tables in zip(run.motion.pieces, run.programs.values(), strict=True):
+        begins = (*(phase.begin for _, phase, _ in piece.phases), piece.phases[-1].phase.end)
+        yield NominalRows(piece.name, dict(tables), run.motion.sigma[piece.rows], begins)
 
 
-def _work(run: VerifiedRun, nominal: NominalRows, place: int) -> Iterator[WorkRows]:
+def _work(run: VerifiedRun, piece: Piece) -> Iterator[WorkRows]:
     """The phases of a program, those of all cycles."""
-    if run.cell.program is None:
-        phases = [(slice(0, len(nominal.sigma)), run.motions[place])]
-    else:
-        count = len(run.motions)
-        phases = [(run.motion.rows(phase), run.motions[k % count]) for k, phase in enumerate(run.motion.plan.program)]
-    for rows, motion in phases:
+    for place, _, rows in piece.phases:
+        motion = run.motions[place % len(run.motions)]
         yield WorkRows(rows, motion.cell, tuple(scheduled.task.name for scheduled in motion.schedule.tasks))
 
 

@@ -107,7 +107,7 @@ def summary_record(
         "caution": CAUTION,
         "solver": solver_record(cell.solver, transfers=transfers, moved=moved),
         "accelerations": merged["accelerations"],
-        "cycles": None if cell.program is None else cell.program.cycles,
+        "cycles": cell.program.cycles if cell.program.is_home_to_home else None,
     }
 
 

@@ -123,7 +123,7 @@ def _refuse_failed(stored: StoredRun) -> None:
 def _demanded(cell: Cell, stored: StoredRun) -> DemandedProgram:
     """The program that the stored phases must be: all tasks of the cell, or the one that was chosen."""
     file = stored.file("", "report.json")
-    only = None if cell.program is not None else _only_task(cell, stored, file)
+    only = None if cell.program.is_home_to_home else _only_task(cell, stored, file)
     demanded = DemandedProgram.of(cell, only=only)
     phases = demanded.plan.program
     unknown = sorted({name for phase in phases for name in homeless(cell, phase)})

@@ -67,7 +67,7 @@ class StoredRows:
             InputError: With file and line.
         """
         count, phases = len(self.program.cells), self.clock.plan.program
-        for place in range(count if self.program.cycles > 1 else 0):
+        for place in range(count if cell.program.cycles > 1 else 0):
             rows = [rows_of(phase, self.clock.sigma) for phase in phases[place::count]]
             for robot in cell.robots:
                 other = others_than_first_cycle([self.tables[robot.name].q[end_rows] for end_rows in rows])

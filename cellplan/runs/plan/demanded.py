@@ -36,7 +36,6 @@ class DemandedProgram:
     plan: Plan  # its phases, on no clock yet; those of all cycles
     cells: tuple[Cell, ...]  # the cell as it is in each phase of the first cycle
     stages: tuple[Stage, ...] = ()  # the stages of one cycle of a program from home to home; empty for any other
-    cycles: int = 1  # how often its phases follow one another
 
     @classmethod
     def of(cls, cell: Cell, *, only: str | None = None) -> "DemandedProgram":
@@ -46,12 +45,12 @@ class DemandedProgram:
             cell: The cell, its starts and homes filled in.
             only: Name of the only task of a program that is not from home to home; None for all.
         """
-        if cell.program is None:
+        stages = program_stages(cell)
+        if not stages:
             plan = plan_phases(cell, only=only)
             return cls(plan=plan, cells=(cell,) * len(plan.program))
-        stages, cycles = program_stages(cell), cell.program.cycles
-        plan = Plan(phases=tuple(stage.phase for stage in stages) * cycles)
-        return cls(plan=plan, cells=tuple(stage.cell for stage in stages), stages=stages, cycles=cycles)
+        plan = Plan(phases=tuple(stage.phase for stage in stages) * cell.program.cycles)
+        return cls(plan=plan, cells=tuple(stage.cell for stage in stages), stages=stages)
 
     @property
     def labels(self) -> list[str]:
@@ -162,13 +161,13 @@ def _refuse_other(written: ClockText, cell: Cell, phases: Sequence[Phase], *, fi
                 f"{file}:{written.line(place)}: sigma_s: expected more than in the row before, got {got!r}"
             )
         steps = None if cell.motion.cycle is None else round(cell.motion.cycle / cell.motion.step)
-        if cell.program is None and steps not in (None, last - row):
+        if not cell.program.is_home_to_home and steps not in (None, last - row):
             raise InputError(
                 f"{file}:{written.line(last)}: expected a phase of {cell.motion.cycle:g} s (motion.timing), got "
                 f"{(last - row) * cell.motion.step:g} s"
             )
         row = last + 1
-    whole = 0 if cell.program is None or cell.motion.cycle is None else cell.program.cycles * cell.motion.cycle
+    whole = cell.program.cycles * (cell.motion.cycle or 0.0) if cell.program.is_home_to_home else 0.0
     if whole and round(whole / cell.motion.step) != len(sigma) - 1:
         raise InputError(
             f"{file}:{written.line(len(sigma) - 1)}: expected a program of {whole:g} s (motion.timing), got "

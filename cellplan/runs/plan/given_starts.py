@@ -31,7 +31,7 @@ def with_placed_starts(
     filled = cell if near is None else with_branches(cell, near)
     of_run = {robot.name for robot in filled.robots if robot.start is not cell.robot(robot.name).start}
     placed, moved = with_seeds(filled, toolpaths, run="" if near is None else near.run, of_run=of_run)
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         placed = with_approach_starts(placed, chains, toolpaths)
     placed = with_rounded_starts(placed, filled)
     examine_given_starts(placed, toolpaths)
@@ -62,7 +62,7 @@ def with_branches(cell: Cell, near: Branches) -> Cell:
     robots = []
     for robot in cell.robots:
         known = begun.get(robot.name)
-        if known is None and (robot.name not in at_work or cell.program is None):
+        if known is None and (robot.name not in at_work or not cell.program.is_home_to_home):
             known = near.starts.get(robot.name)
         robots.append(robot if robot.start is not None or known is None else replace(robot, start=known))
     return replace(cell, robots=tuple(robots))

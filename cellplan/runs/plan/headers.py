@@ -40,7 +40,7 @@ def table_headers(
 
 def left_out_of_program(cell: Cell, phases: Sequence[Phase]) -> str:
     """One line on moves that a program leaves out, those of each phase after its name; empty when there are none."""
-    if cell.program is not None:
+    if cell.program.is_home_to_home:
         return ""
     if len(phases) == 1:
         return not_in_program(cell, phases[0].tasks)

@@ -36,7 +36,7 @@ def read_branches(folder: Path, cell: Cell) -> Branches:
     }
     starts = {robot.name: _configuration(robots[robot.name], "start", robot) for robot in cell.robots}
     homes = {robot.name: _configuration(robots[robot.name], "home", robot) for robot in cell.robots}
-    if cell.program is None:
+    if not cell.program.is_home_to_home:
         begun = {name: starts[cell.task(name).robot] for name in begun}
     known = {name: q for name, q in begun.items() if q is not None}
     return Branches(

@@ -79,7 +79,7 @@ def refuse_hanging_parts(scenes: StageScenes) -> None:
 def _places(scenes: StageScenes) -> Iterator[tuple[str, PartPlaceEntry, Scene]]:
     """Places at which the part lies, with their keys and the scene there."""
     program = scenes.cell.program
-    for key, place in {} if program is None else {"attach": program.attach, "detach": program.detach}.items():
+    for key, place in (("attach", program.attach), ("detach", program.detach)):
         if place is not None:
             yield key, place, scenes.with_part_at(place)
 

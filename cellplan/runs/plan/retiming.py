@@ -50,12 +50,10 @@ def retimed(
     phases = clock.plan.program
     paths = [joint_path(motion) if phase.tasks else None for phase, motion in zip(phases, motions, strict=True)]
     retimed_phases = _Retimed(scenes, clock, motions, paths)
-    if cell.program is None:
-        clocks = retimed_phases.nominal([cell.motion.cycle] * len(motions), progress)
-    else:
-        clocks = retimed_phases.nominal([None] * len(motions), progress)
-        if cell.motion.cycle is not None:
-            clocks = retimed_phases.nominal(retimed_phases.cycles(clocks), progress)
+    is_whole = cell.program.is_home_to_home  # the cycle is that of all phases together
+    clocks = retimed_phases.nominal([None if is_whole else cell.motion.cycle] * len(motions), progress)
+    if is_whole and cell.motion.cycle is not None:
+        clocks = retimed_phases.nominal(retimed_phases.cycles(clocks), progress)
     nominal = [phase.begin + sigma for phase, sigma in zip(phases, clocks, strict=True)]
     for phase, sigma in zip(phases, nominal, strict=True):
         np.round(sigma, TIME_DECIMALS, out=sigma)
@@ -87,7 +85,7 @@ class _Retimed:
     def cycles(self, fastest: Sequence[Array]) -> list[float | None]:
         """Times in [s] of the phases in the demanded cycle of a program from home to home, all slower alike."""
         cell = self.scenes[0].cell
-        motion, count = cell.motion, 1 if cell.program is None else cell.program.cycles
+        motion, count = cell.motion, cell.program.cycles
         of_one = len(fastest) // count
         steps = np.array([len(sigma) - 1 for sigma in fastest[:of_one]])
         is_open = np.array([path is not None for path in self.paths[:of_one]])

@@ -62,11 +62,6 @@ class PlannedProgram:
     remarks: tuple[str, ...]  # notes on starts that were found, where no trial was without fault
     moved: Mapping[str, tuple[MovedStart, ...]]  # how far starts were moved, by the name of the phase
 
-    @property
-    def cycles(self) -> int:
-        """How often the stages follow one another."""
-        return 1 if self.cell.program is None else self.cell.program.cycles
-
 
 def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
     """Plan all stages of one cycle.

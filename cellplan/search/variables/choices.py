@@ -57,7 +57,7 @@ class Choices:
     def _is_possible(self, picks: tuple[str, ...]) -> bool:
         """Whether every robot has one task at most, or there is a program."""
         robots = list(self._robots(picks).values())
-        return self.cell.program is not None or len(set(robots)) == len(robots)
+        return self.cell.program.is_home_to_home or len(set(robots)) == len(robots)
 
     def _values(self, picks: tuple[str, ...]) -> dict[str, object]:
         """One combination."""

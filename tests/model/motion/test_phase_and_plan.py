@@ -43,6 +43,25 @@ def test_the_rows_of_the_phases_and_their_gaps_follow_from_the_nominal_times() -
         PLAN.phase("grind")
 
 
+def test_a_piece_has_the_phases_that_follow_one_another_without_a_gap() -> None:
+    roles: dict[str, Role] = {"holder": Carry()}
+    ends = {"a": (0.0, 1.0), "b": (1.0, 2.0), "b to c": (2.0, 3.0), "c": (3.0, 4.0)}
+    phases = tuple(
+        Phase(name=name, roles=roles, begin=begin, end=end, in_program=name != "b to c")
+        for name, (begin, end) in ends.items()
+    )
+    motion = Motion(times=np.arange(5.0), q=np.zeros((5, 1)), plan=Plan(phases=phases))
+
+    pieces = motion.pieces
+
+    assert [piece.name for piece in pieces] == [None, "c"]
+    assert [piece.rows for piece in pieces] == [slice(0, 3), slice(3, 5)]
+    assert [[(place, phase.name, rows) for place, phase, rows in piece.phases] for piece in pieces] == [
+        [(0, "a", slice(0, 2)), (1, "b", slice(1, 3))],
+        [(2, "c", slice(0, 2))],
+    ]
+
+
 def test_phases_share_their_ends_and_do_not_end_before_they_begin() -> None:
     with pytest.raises(ValueError, match=r"plan: 'cut' ends at 0.2 s, 'weld' begins at 0.3 s"):
         Plan(phases=(FIRST, SECOND))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cellplan.errors import InputError
 from cellplan.model.cell.cell import Cell, Mode
 from cellplan.model.motion.plan import Hold
-from cellplan.model.settings.program import MarkEntry, ProgramEntry
+from cellplan.model.settings.program import MarkEntry, NoTransfers, ProgramEntry
 from cellplan.planning.sequence.arrangement import Block, arrange
 from cellplan.planning.sequence.stages import program_stages
 
@@ -219,7 +219,7 @@ def test_a_cell_that_cannot_be_arranged_is_refused(cell: Cell, message: str) -> 
 
 def test_tasks_without_orders_come_in_the_order_of_the_cell():
     cell = cell_of({"op0": "a b", "op1": "c"})
-    plain = replace(cell, robots=CELL.robots, program=None)
+    plain = replace(cell, robots=CELL.robots, program=NoTransfers())
 
     assert arrange(plain) == (Block(("a", "c")), Block(("b",)))
     assert arrange(replace(plain, motion=replace(plain.motion, mode=Mode.PAIRWISE))) == tuple(
