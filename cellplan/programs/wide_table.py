@@ -16,7 +16,7 @@ Checked = tuple[Cell, Schedule, Report]  # a phase: the cell as it is in it, its
 
 def solution_rows(solution: Solution) -> WideRows:
     """All rows of a solution, gaps between its phases included."""
-    checked = [(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
+    checked = [(run.cell, run.schedule, run.report) for run in solution.runs]
     return _program_rows(solution.cell, solution.motion, checked)
 
 

@@ -23,8 +23,8 @@ class Run:
         motion: Joint positions of all robots, as they were planned.
         program: The program as text, in which this phase has its rows.
         report: Result of the checks on these rows.
+        scene: The scene that it is judged in, with the cell as it is in this phase.
         rungs: How the transfer move of each robot was found, by robot; empty without transfer moves.
-        scene: The scene that it is judged in, with the cell as it is in this phase; None for that of the whole program.
         moved: How far its starts were moved.
     """
 
@@ -33,8 +33,8 @@ class Run:
     motion: Motion
     program: Program
     report: Report
+    scene: Scene
     rungs: Mapping[str, str] = field(default_factory=dict)
-    scene: Scene | None = None
     moved: tuple[MovedStart, ...] = ()
 
     def __repr__(self) -> str:
@@ -43,13 +43,10 @@ class Run:
             f"<Run of '{self.report.cell}', {self.phase.name}, {self.report.cycle_time:g} s, {verdict([self.report])}>"
         )
 
-    def cell_of(self, whole: Cell) -> Cell:
-        """The cell as it is in this phase.
-
-        Args:
-            whole: The cell of the whole program.
-        """
-        return whole if self.scene is None else self.scene.cell
+    @property
+    def cell(self) -> Cell:
+        """The cell as it is in this phase."""
+        return self.scene.cell
 
     @property
     def transfers(self) -> dict[str, str]:

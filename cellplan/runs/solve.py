@@ -56,8 +56,8 @@ def solve(
         InputError: The cell cannot be worked with: a path misses the part, a given start is off its task.
         NoSolutionError: No start posture or no home was found, or a tool lost its path.
     """
-    scene, solution = solve_motion(cell, task=task, near=near, progress=progress)
-    return certified(solution, scene, is_reported=is_reported, progress=progress)
+    _, solution = solve_motion(cell, task=task, near=near, progress=progress)
+    return certified(solution, is_reported=is_reported, progress=progress)
 
 
 def solve_motion(
@@ -121,7 +121,7 @@ def _solve_program(
     motions, scenes = [stage.motion for stage in stages] * cycles, [stage.scene for stage in stages] * cycles
     motion, runs = _runs(planned.cell, clock, motions, scenes, early=early, progress=progress)
     runs = tuple(
-        replace(run, rungs=stage.rungs, scene=stage.scene, moved=planned.moved.get(run.phase.name, ()))
+        replace(run, rungs=stage.rungs, moved=planned.moved.get(run.phase.name, ()))
         for run, stage in zip(runs, stages, strict=True)
     )
     remark = "; ".join(planned.remarks) or None
@@ -132,7 +132,6 @@ def _solve_program(
 
 def certified(
     solution: Solution,
-    scene: Scene,
     *,
     is_reported: bool = True,
     progress: Progress,
@@ -148,17 +147,16 @@ def certified(
     """
     phases = []
     for run in solution.runs:
-        run_scene = run.scene or scene
-        q = stacked_positions(run_scene.cell, run.report.q)
+        q = stacked_positions(run.cell, run.report.q)
         clearance = (
-            run_clearance(run_scene, run.schedule, q, progress=progress)
+            run_clearance(run.scene, run.schedule, q, progress=progress)
             if early is None
-            else (early.of(run_scene, run.schedule, q, progress))
+            else early.of(run.scene, run.schedule, q, progress)
         )
         with_figures = is_reported and (early is None or early.with_curves)
         report = completed(run.report, clearance)
-        report = with_clocks(report, run_scene, run.schedule, is_reported=with_figures, progress=progress)
-        phases.append(JudgedPhase(scene=run_scene, schedule=run.schedule, report=report))
+        report = with_clocks(report, run.scene, run.schedule, is_reported=with_figures, progress=progress)
+        phases.append(JudgedPhase(scene=run.scene, schedule=run.schedule, report=report))
     reports = with_joins(solution.cell, with_phase_ends(solution.cell, phases))
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
@@ -187,13 +185,13 @@ def _runs(
     tables = [parse_table(text, f"tables/{robot}.csv") for robot, text in program.tables.items()]
     runs = []
     for place in range(len(motions) // cell.program.cycles):
-        schedule, phase_motion = clock.schedules[place], motions[place]
+        schedule, scene, moves = clock.schedules[place], scenes[place], motions[place]
         phase, rows = clock.plan.program[place], clock.cut(tables, place)
         if early is not None:
-            early.begin(scenes[place], schedule, stacked_positions(cell, {table.robot: table.q for table in rows}))
-        report = verify_motion(scenes[place], schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
+            early.begin(scene, schedule, stacked_positions(cell, {table.robot: table.q for table in rows}))
+        report = verify_motion(scene, schedule, rows, moving=phase.moving, idle=phase.idle, progress=progress)
         report = replace(report, mode=str(cell.motion.mode), phases=clock.timed_phases, phase=phase.label)
-        runs.append(Run(phase=phase, schedule=schedule, motion=phase_motion, program=program, report=report))
+        runs.append(Run(phase=phase, schedule=schedule, motion=moves, program=program, report=report, scene=scene))
     return motion, tuple(runs)
 
 
@@ -254,5 +252,5 @@ def solve_in_parallel(
         if not work.is_possible:
             return solve(cell, task=task, near=near, progress=progress)
         early = EarlyClearance(work.begin, with_curves=True)
-        scene, solution = solve_motion(cell, task=task, near=near, progress=progress, early=early)
-        return certified(solution, scene, progress=progress, early=early)
+        _, solution = solve_motion(cell, task=task, near=near, progress=progress, early=early)
+        return certified(solution, progress=progress, early=early)

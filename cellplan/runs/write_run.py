@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Final
 
 import cellplan
@@ -11,18 +11,17 @@ from cellplan.files.run.folder import MANIFEST, RunFolder
 from cellplan.files.run.joint_tables import program_digest
 from cellplan.files.run.manifest import render_manifest, user_files
 from cellplan.files.run.stored import CLOCK
-from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Program
 from cellplan.model.progress import Progress, silent
-from cellplan.report.page.render import VIEW_PAGE, PageFiles, overview_page, report_page
+from cellplan.report.page.render import VIEW_PAGE, report_page
 from cellplan.report.page.view import unmade_view_page
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
-from cellplan.report.record.run import run_record
+from cellplan.report.record.run import ReportedPhase
 from cellplan.report.record.series import series_json
-from cellplan.report.record.summary import summary_record
-from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, DepictedPhase, phase_drawings, program_drawings
+from cellplan.report.record.summary import ProgramRecords, program_records
+from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, DepictedPhase, drawings_by_place
 from cellplan.runs.solution import Run, Solution
 
 ENGINES: Final = (
@@ -71,18 +70,13 @@ def write_run(
     has_tables = solution.passed or keep_rejected
     tables = [f"{released}/{name}.csv" for name in (*program.tables, CLOCK)] if has_tables else []
     with RunFolder(folder) as target:
+        plots = {}
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
-            record = _write_report(target, run.cell_of(cell), run, provenance, formats, PageFiles(files=tables))
-        reports = {run.name: run.report for run in solution.runs if run.name is not None}
-        if reports:
-            transfers = {name: text for run in solution.runs for name, text in run.transfers.items()}
-            moved = dict.fromkeys(start for run in solution.runs for start in run.moved)
-            record = summary_record(reports, cell=cell, provenance=provenance, transfers=transfers, moved=moved)
-            target.write_text("report.json", as_json(record))
-            phases = [DepictedPhase(run.cell_of(cell), run.schedule, run.report) for run in solution.runs]
-            extra = PageFiles(files=tables) | _write_drawings(target, "", program_drawings(cell, phases))
-            target.write_text("report.html", overview_page(record, cell=cell, **extra))
+            plots[run.name or ""] = _write_phase(target, run, formats)
+        phases = [ReportedPhase(run.report, run.cell, run.motion, run.transfers, run.moved) for run in solution.runs]
+        records = program_records(phases, cell=cell, provenance=provenance)
+        _write_pages(target, solution, records, plots, tables)
         target.write_text("cell.yaml", render_cell(cell))
         if has_tables:
             _write_tables(target, program, released)
@@ -92,7 +86,7 @@ def write_run(
         target.write_text(
             VIEW_PAGE, unmade_view_page(cell.name, cell_file=file if user_files(cell.inputs, file) else "")
         )
-    return record
+    return records.whole
 
 
 def versions() -> dict[str, str]:
@@ -106,30 +100,45 @@ def versions() -> dict[str, str]:
     return packages
 
 
-def _write_report(
-    target: RunFolder, cell: Cell, run: Run, provenance: Provenance, formats: Collection[str], extra: PageFiles
-) -> Record:
-    """Report, series and plots of one phase, in a subfolder if it has a name; returns its record."""
-    place = "" if run.name is None else f"{run.name}/"
-    record = run_record(
-        run.report, cell=cell, provenance=provenance, motion=run.motion, transfers=run.transfers, moved=run.moved
-    )
-    target.write_text(f"{place}report.json", as_json(record))
-    target.write_text(f"{place}series.json", series_json(run.report, run.motion))
-    plots = pictures(run_figures(run.report, cell=cell), formats)
+def _write_phase(target: RunFolder, run: Run, formats: Collection[str]) -> dict[str, bytes]:
+    """Series and plots of one phase, in a subfolder if it has a name; returns the plots by file name."""
+    place = PurePosixPath(run.name or "")
+    target.write_text(str(place / "series.json"), series_json(run.report, run.motion))
+    plots = pictures(run_figures(run.report, cell=run.cell), formats)
     for name, picture in plots.items():
-        target.write_bytes(f"{place}plots/{name}", picture)
-    extra |= _write_drawings(target, place, phase_drawings(DepictedPhase(cell, run.schedule, run.report)))
-    page = report_page(record, run.report.checks, cell=cell, plots=plots, **extra)
-    target.write_text(f"{place}report.html", page)
-    return record
+        target.write_bytes(str(place / "plots" / name), picture)
+    return plots
 
 
-def _write_drawings(target: RunFolder, place: str, drawings: Mapping[str, str]) -> PageFiles:
-    """Write the drawings of the cell; returns them by what a page calls them."""
-    for name, text in drawings.items():
-        target.write_text(f"{place}{name}", text)
-    return {"still": drawings[STILL], "floor_plan": drawings[FLOOR_PLAN]}
+def _write_pages(
+    target: RunFolder,
+    solution: Solution,
+    records: ProgramRecords,
+    plots: Mapping[str, Mapping[str, bytes]],
+    tables: Collection[str],
+) -> None:
+    """Report, drawings and page of each phase in its subfolder, and those of the program above them.
+
+    Args:
+        plots: Plots of each phase by its place.
+        tables: Names of the joint tables in the run folder.
+    """
+    cells = {run.name or "": run.cell for run in solution.runs}
+    phases = [DepictedPhase(run.cell, run.schedule, run.report) for run in solution.runs]
+    for name, drawings in drawings_by_place(solution.cell, phases).items():
+        place, record = PurePosixPath(name), records.by_place[name]
+        target.write_text(str(place / "report.json"), as_json(record))
+        for file, text in drawings.items():
+            target.write_text(str(place / file), text)
+        page = report_page(
+            record,
+            cell=cells.get(name, solution.cell),
+            plots=plots.get(name, {}),
+            still=drawings[STILL],
+            floor_plan=drawings[FLOOR_PLAN],
+            files=tables,
+        )
+        target.write_text(str(place / "report.html"), page)
 
 
 def _write_tables(target: RunFolder, program: Program, folder: str) -> None:

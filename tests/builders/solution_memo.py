@@ -60,6 +60,7 @@ class _State:
     folder: Path | None = None
     names: Names = field(default_factory=dict)
     making: _Entry | None = None
+    known: "Solved | None" = None
 
 
 _state = _State()
@@ -101,7 +102,7 @@ def _install() -> None:
 
 
 def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
-    """The first part of ``solve``; a known solution takes the place of the scene."""
+    """The first part of ``solve``, without a scene where the solution is known."""
 
     def solve_motion(
         cell: Cell, *, task: str | None, near: Path | None = None, progress: Progress, early: Any = None
@@ -113,9 +114,9 @@ def _motion(real: Callable[..., Any]) -> Callable[..., Any]:
         if entry is None:
             return real(cell, task=task, progress=progress)
         if entry.path.exists():
-            known = _Reader(entry).load()
+            _state.known = known = _Reader(entry).load()
             _say(known.motion_events, progress)
-            return known, known.motion
+            return None, known.motion
         scene, entry.motion = real(cell, task=task, progress=_recorder(progress, entry.events))
         return scene, entry.motion
 
@@ -126,18 +127,19 @@ def _clearance(real: Callable[..., Any]) -> Callable[..., Any]:
     """The second part of ``solve``."""
 
     def with_clearance(
-        solution: Solution, scene: Any, *, progress: Progress, early: Any = None, is_reported: bool = True
+        solution: Solution, *, progress: Progress, early: Any = None, is_reported: bool = True
     ) -> Solution:
-        if isinstance(scene, Solved):
-            _say(scene.clearance_events, progress)
-            return scene.whole
+        known, _state.known = _state.known, None
+        if known is not None and known.motion is solution:
+            _say(known.clearance_events, progress)
+            return known.whole
         if early is not None or not is_reported:  # without curves, or without figures that only a report states
-            return real(solution, scene, progress=progress, early=early, is_reported=is_reported)
+            return real(solution, progress=progress, early=early, is_reported=is_reported)
         entry = _state.making
         if entry is None or entry.motion is not solution:
-            return real(solution, scene, progress=progress)
+            return real(solution, progress=progress)
         events: Events = []
-        whole = real(solution, scene, progress=_recorder(progress, events))
+        whole = real(solution, progress=_recorder(progress, events))
         if not _is_patched():
             _write(entry, Solved(solution, entry.events, whole, events))
         return whole

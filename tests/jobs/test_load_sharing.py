@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.records import phase_record
 
 from cellplan import load_cell, solve, verify, write_run
 from cellplan.geometry.transforms import inverse, pose
@@ -12,7 +13,6 @@ from cellplan.jobs.explain.explain import explain
 from cellplan.jobs.explain.result import structure_lines, structure_record
 from cellplan.report.page.render import report_page
 from cellplan.report.record.common import Provenance
-from cellplan.report.record.run import run_record
 from cellplan.report.text.run import summary_lines
 from cellplan.runs.overrides import with_overrides
 from cellplan.runs.solve import render_program
@@ -78,7 +78,7 @@ def test_the_record_the_page_and_the_screen_tell_the_closure(planar, tmp_path):
     record = json.loads((tmp_path / "run" / "report.json").read_text(encoding="utf-8"))
     closure = record["closure"]["right"]
     report, none = planar.runs[0].report, Provenance(versions={}, digests={})
-    page = report_page(run_record(report, cell=planar.cell, provenance=none), report.checks, cell=planar.cell, plots={})
+    page = report_page(phase_record(report, cell=planar.cell, provenance=none), cell=planar.cell, plots={})
 
     assert {"max_position_error_mm", "max_orientation_error_deg", "at_s"} <= set(closure)
     assert 0.0 < closure["max_position_error_mm"] <= ALLOWED_MM

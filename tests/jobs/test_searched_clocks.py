@@ -44,9 +44,9 @@ def test_a_search_has_the_same_program_without_figures_of_clocks() -> None:
 @pytest.mark.parametrize("clearance_mm", [pytest.param(0.001, marks=pytest.mark.slow), 9000])
 def test_what_a_cell_demands_of_stops_counts_in_a_search_too(clearance_mm: float) -> None:
     cell = on_two_controllers(**{"checks.stop": {"clearance_mm": clearance_mm}})
-    scene, motion = solve_motion(cell, task=None, progress=silent)
+    _, motion = solve_motion(cell, task=None, progress=silent)
 
-    result = certified(motion, scene, progress=silent, early=EarlyClearance())
+    result = certified(motion, progress=silent, early=EarlyClearance())
 
     report = result.runs[0].report
     assert report.skew is None

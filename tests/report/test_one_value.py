@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from builders.records import phase_record
 
 from cellplan.jobs.compare.result import ROWS
 from cellplan.jobs.view.run_scene import _facts
@@ -13,7 +14,6 @@ from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.render import MODES, report_page
 from cellplan.report.record.figures import SHOWN, page_cells, terminal_table
 from cellplan.report.record.numbers import plain, seconds
-from cellplan.report.record.run import run_record
 from cellplan.report.text.run import figure_lines, motion_text
 from cellplan.runs.drawings.instant import heading, worst_instant
 
@@ -33,7 +33,7 @@ def odd(passed_run: Any) -> Any:
 
 
 def record_of(run: Any) -> Any:
-    return run_record(run.report, cell=run.cell, provenance=run.provenance)
+    return phase_record(run.report, cell=run.cell, provenance=run.provenance)
 
 
 def test_duration_clearance_margin_and_speed_are_the_same_on_terminal_and_pages(odd: Any) -> None:
@@ -79,7 +79,7 @@ def test_the_pairs_that_are_not_checked_in_full_have_one_number(odd: Any) -> Non
     gripped = {"pair": ["part", "abb/tool"], "reason": "holds the part"}
     record = {**record_of(odd), "left_out": [grip], "exclusions": [*links, gripped]}
 
-    page = report_page(record, odd.report.checks, cell=odd.cell, plots={})
+    page = report_page(record, cell=odd.cell, plots={})
     lines = figure_lines(record, "the report")
 
     assert any(line.strip().startswith("not checked in full: 1 pair (1 grip)") for line in lines)

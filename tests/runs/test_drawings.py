@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders.records import phase_record, whole_record
 from builders.two_phases import PAIR
 
 from cellplan import Solution, load_cell, solve
 from cellplan.model.report.report import Check, Report
 from cellplan.report.page.first_screen import worst_instant as worst_page_instant
 from cellplan.report.record.common import Provenance
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
 from cellplan.report.still.picture import StillPicture
 from cellplan.runs.drawings.instant import worst_instant
 from cellplan.runs.drawings.picture import (
@@ -49,12 +48,12 @@ def picture_of(solution: Solution, report: Report) -> StillPicture:
 
 
 def phases(solution: Solution) -> list[DepictedPhase]:
-    return [DepictedPhase(run.cell_of(solution.cell), run.schedule, run.report) for run in solution.runs]
+    return [DepictedPhase(run.cell, run.schedule, run.report) for run in solution.runs]
 
 
 def test_the_instant_of_a_sound_run_is_that_of_the_smallest_clearance_of_its_report(solved: Solution) -> None:
     for run in solved.runs:
-        record = run_record(run.report, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
+        record = phase_record(run.report, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
         whole = record["clearance"]["whole"]
 
         instant = worst_instant(run.report, solved.cell)
@@ -197,7 +196,7 @@ def test_the_picture_of_a_program_is_of_the_phase_that_its_report_names(solved: 
     second = replace(first, phase="second", clearance=replace(first.clearance, minima=minima))
     one, other = phases(solved)
     reports = {"first": first, "second": second}
-    record = summary_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
+    record = whole_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
 
     picture = program_drawings(solved.cell, [one._replace(report=first), other._replace(report=second)])[STILL]
 
@@ -213,7 +212,7 @@ def test_a_failure_without_a_time_does_not_choose_the_phase_of_the_picture(solve
     timed = replace(second, checks=(failed("joint_acceleration_assumed", "right/J1", at_s=0.5),))
     one, other = phases(solved)
     reports = {"first": timeless, "second": timed}
-    record = summary_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
+    record = whole_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
 
     picture = program_drawings(solved.cell, [one._replace(report=timeless), other._replace(report=timed)])[STILL]
 

@@ -27,7 +27,7 @@ def test_verdicts_and_smallest_distances_are_those_of_solve(is_begun: bool) -> N
 
     early = EarlyClearance(begin if is_begun else None)
     scene, solution = solve_motion(load_cell(CELL).with_values(VALUES), task=None, progress=silent, early=early)
-    run = certified(solution, scene, progress=silent, early=early).runs[0]
+    run = certified(solution, progress=silent, early=early).runs[0]
 
     q = np.concatenate([run.report.q[robot.name] for robot in scene.cell.robots], axis=1)
     clearance, checks = run_clearance(scene, run.schedule, q)

@@ -48,6 +48,10 @@ class StoredRun:
         """Content of a file of one run, which is still as it was written."""
         return _content(self.folder, _at(place, name), self.manifest)
 
+    def report(self, place: str) -> Record:
+        """The ``report.json`` of one phase, or of the program."""
+        return self.records.get(place, self.record)
+
     def series(self, place: str) -> Record:
         """The ``series.json`` of one run, unchanged and in JSON."""
         return parse_json(self.content(place, SERIES), self.file(place, SERIES))

@@ -26,9 +26,9 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Report
 from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.run import run_record
+from cellplan.report.record.run import ReportedPhase
 from cellplan.report.record.series import series
-from cellplan.report.record.summary import summary_record
+from cellplan.report.record.summary import program_records
 from cellplan.report.record.variant_figures import variant_curves, variant_figures
 from cellplan.runs.gate.open_gate import open_gate
 from cellplan.runs.outcome import solved_outcome
@@ -263,14 +263,11 @@ def _document(source: Cell | StoredRun) -> Mapping[str, Any]:
 def _solved_figures(solution: Solution) -> Record:
     """The figures of a program that was just solved."""
     origin = Provenance(versions={}, digests={})
-    reports = {run.name or "": run.report for run in solution.runs}
-    phases: dict[str, Record] = {
-        run.name or "": run_record(run.report, cell=run.cell_of(solution.cell), provenance=origin)
-        for run in solution.runs
-    }
-    record = phases.get("") or summary_record(reports, cell=solution.cell, provenance=origin)
-    curves = variant_curves(record, list(map(series, reports.values())), _clearance(list(reports.values())))
-    return {**variant_figures(record, phases, proof="solved"), "curves": curves}
+    reports = [run.report for run in solution.runs]
+    phases = [ReportedPhase(run.report, run.cell) for run in solution.runs]
+    whole, records = program_records(phases, cell=solution.cell, provenance=origin)
+    curves = variant_curves(whole, list(map(series, reports)), _clearance(reports))
+    return {**variant_figures(whole, records, proof="solved"), "curves": curves}
 
 
 def _stored_outcome(job: CompareJob, path: Path) -> TrialOutcome:

@@ -93,13 +93,13 @@ class TimedProgram:
         """
         scene, solution = solve_motion(cell.with_values(values), task=task, progress=progress, early=early)
         scaled = [run for run in solution.runs if _is_scaled(run, cell)]
-        rows = [_rows(run.scene or scene, run) for run in scaled]
+        rows = [_rows(run) for run in scaled]
         return cls(
             law=law,
             values=values,
             solution=solution,
             scene=scene,
-            bindings=tuple(_binding(run.scene or scene, run, is_retimed=law in RETIMED) for run in scaled),
+            bindings=tuple(_binding(run, is_retimed=law in RETIMED) for run in scaled),
             load=max(_slower(scene, limits, q) for limits, q in rows),
         )
 
@@ -107,14 +107,14 @@ class TimedProgram:
         """Share of the time of the program in which the joints of one robot would allow their motion."""
         loads, columns = [0.0], self.solution.cell.columns(robot)
         for run in self.solution.runs:
-            limits, q = _rows(run.scene or self.scene, run)
+            limits, q = _rows(run)
             shares = zip(limits.shares(run.schedule.times, q), ORDERS, strict=True)
             loads += [float(share[columns].max(initial=0.0)) ** order for share, order in shares if run.phase.tasks]
         return max(loads)
 
     def certified(self, progress: Progress, early: EarlyClearance | None = None) -> Self:
         """The same program with the clearance of every phase checked; ``early`` has it without curves."""
-        return replace(self, solution=certified(self.solution, self.scene, progress=progress, early=early))
+        return replace(self, solution=certified(self.solution, progress=progress, early=early))
 
     @property
     def figures(self) -> Figures:
@@ -144,10 +144,10 @@ def _is_scaled(run: Run, cell: Cell) -> bool:
     return bool(run.phase.tasks) and tasks.issuperset(run.phase.tasks)
 
 
-def _rows(scene: Scene, run: Run) -> tuple[RowLimits, Array]:
+def _rows(run: Run) -> tuple[RowLimits, Array]:
     """Limits and written joint positions of a phase."""
-    names = [robot.name for robot in scene.cell.robots]
-    return row_limits(scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
+    names = [robot.name for robot in run.cell.robots]
+    return row_limits(run.scene, run.schedule), np.concatenate([run.report.q[name] for name in names], axis=1)
 
 
 def _slower(scene: Scene, limits: RowLimits, q: Array) -> float:
@@ -155,20 +155,20 @@ def _slower(scene: Scene, limits: RowLimits, q: Array) -> float:
     return replace(limits, scene=scene, paths=()).slower(np.zeros(len(q)), q)
 
 
-def _binding(scene: Scene, run: Run, *, is_retimed: bool) -> Binding:
+def _binding(run: Run, *, is_retimed: bool) -> Binding:
     """The limit that asks for most time in one phase; those of a task are limits of retimed programs."""
-    limits, q = _rows(scene, run)
+    limits, q = _rows(run)
     shares = limits.shares(run.schedule.times, q)
     required = np.array([share**order for share, order in zip(shares, ORDERS, strict=True)])
     kind, column = np.unravel_index(int(required.argmax()), required.shape)
-    robot, joint = joint_at(scene.cell, int(column))
+    robot, joint = joint_at(run.cell, int(column))
     candidates = [(float(required.max()), robot, joint, KINDS[kind], float(shares[kind][column]))]
     for name, feed in limits.feeds(run.motion.sigma, run.motion.times).items() if is_retimed else ():
-        candidates.append((feed, scene.cell.task(name).robot, name, "feed", feed))
+        candidates.append((feed, run.cell.task(name).robot, name, "feed", feed))
     for errors in run.report.accuracy if is_retimed else ():
-        share = _share_between(errors, scene.cell)
+        share = _share_between(errors, run.cell)
         candidates.append((share**0.5, errors.robot, errors.task, "tolerance between rows", share))
-    limit = scene.cell.checks.tool_speed_mm_s
+    limit = run.cell.checks.tool_speed_mm_s
     if limit is not None:
         for name, speed in run.report.speeds.items():
             share = speed.tool_peak / limit.si

@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.errors import InputError
 from cellplan.jobs.present.kinds import KINDS, RUN, TASK_COLUMNS, record_of
-from cellplan.jobs.present.result_tables import NOWHERE, record_at, run_records, tables_of
+from cellplan.jobs.present.result_tables import NOWHERE, record_at, tables_of
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import VerifiedRun
@@ -23,7 +23,8 @@ from cellplan.report.plots.svg import svg_text
 from cellplan.report.record.common import Record
 from cellplan.report.record.numbers import seconds, small
 from cellplan.report.record.rows import format_of, run_tables
-from cellplan.report.record.summary import summary_record
+from cellplan.report.record.run import ReportedPhase
+from cellplan.report.record.summary import program_records
 from cellplan.runs.solution import Solution
 
 Pictures = dict[str, str]  # SVG by what it shows
@@ -72,13 +73,13 @@ def _(result: Path) -> Card:
 
 @card_of.register
 def _(result: Solution) -> Card:
-    return _program_card("Solution", result.cell, [(run.report, run.cell_of(result.cell)) for run in result.runs])
+    return _program_card("Solution", result.cell, [ReportedPhase(run.report, run.cell) for run in result.runs])
 
 
 @card_of.register
 def _(result: VerifiedRun) -> Card:
-    card = _program_card("Verified run", result.cell, [(motion.report, motion.cell) for motion in result.motions])
-    return replace(card, findings=result.remarks)
+    phases = [ReportedPhase(motion.report, motion.cell) for motion in result.motions]
+    return replace(_program_card("Verified run", result.cell, phases), findings=result.remarks)
 
 
 @card_of.register
@@ -150,15 +151,11 @@ def _part_text(cell: Cell) -> str:
     return f"{type(cell.part.shape).__name__}, {f'held by {holders}' if holders else 'fixed in the world'}"
 
 
-def _program_card(kind: str, cell: Cell, phases: Sequence[tuple[Report, Cell]]) -> Card:
+def _program_card(kind: str, cell: Cell, phases: Sequence[ReportedPhase]) -> Card:
     """A program, with the pictures of its phase that leaves the smallest clearance."""
-    records = run_records(phases)
-    reports = [report for report, _ in phases]
-    failed = [check.message for report in reports for check in report.checks if not check.passed]
-    count = sum(len(report.checks) for report in reports)
-    whole: Record = records[0]
-    if len(records) > 1:
-        whole = summary_record({str(report.phase): report for report in reports}, cell=cell, provenance=NOWHERE)
+    whole = program_records(phases, cell=cell, provenance=NOWHERE).whole
+    failed = [check["message"] for check in whole["checks"] if not check["passed"]]
+    count, nearest = len(whole["checks"]), min(phases, key=_smallest_clearance)
     tables = run_tables([whole])
     return Card(
         kind=kind,
@@ -167,14 +164,14 @@ def _program_card(kind: str, cell: Cell, phases: Sequence[tuple[Report, Cell]]) 
         passed=not failed,
         findings=failed,
         figures=key_figures(whole),
-        pictures=run_pictures(*min(phases, key=_smallest_clearance)),
+        pictures=run_pictures(nearest.report, nearest.cell),
         grids=[_grid("Tasks", tables["tasks"](), TASK_COLUMNS, "tasks")],
     )
 
 
-def _smallest_clearance(phase: tuple[Report, Cell]) -> float:
+def _smallest_clearance(phase: ReportedPhase) -> float:
     """Smallest distance of a phase in [m]; infinite without pairs."""
-    distances = [minimum.minimum for minimum in phase[0].clearance.minima.values() if minimum.minimum is not None]
+    distances = [minimum.minimum for minimum in phase.report.clearance.minima.values() if minimum.minimum is not None]
     return min(distances, default=np.inf)
 
 

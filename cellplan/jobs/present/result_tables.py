@@ -1,6 +1,6 @@
 """The tables of results: of what was solved, verified, searched and screened, and of the files of all these."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import singledispatch
 from pathlib import Path
 from typing import Any, Final
@@ -26,7 +26,7 @@ from cellplan.programs.formats.wide import wide_columns
 from cellplan.programs.wide_table import solution_rows, verified_rows
 from cellplan.report.record.common import Provenance, Record, check_record, number
 from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables
-from cellplan.report.record.run import run_record
+from cellplan.report.record.run import ReportedPhase, run_record
 from cellplan.report.record.sections.clearance import (
     clearance_record,
     closest_pairs_record,
@@ -84,13 +84,13 @@ def _(result: Cell) -> Tables:
 
 @tables_of.register
 def _(result: Solution) -> Tables:
-    records = run_records([(run.report, run.cell_of(result.cell)) for run in result.runs])
+    records = [run_record(ReportedPhase(run.report, run.cell), provenance=NOWHERE) for run in result.runs]
     return {"motion": lambda: wide_columns(solution_rows(result)), **run_tables(records)}
 
 
 @tables_of.register
 def _(result: VerifiedRun) -> Tables:
-    records = run_records([(motion.report, motion.cell) for motion in result.motions])
+    records = [run_record(ReportedPhase(motion.report, motion.cell), provenance=NOWHERE) for motion in result.motions]
     return {"motion": lambda: wide_columns(verified_rows(result)), **run_tables(records)}
 
 
@@ -134,15 +134,6 @@ def record_at(path: Path) -> Record:
 def _is_run(path: Path) -> bool:
     """Whether a path is the folder of a run."""
     return all((path / name).is_file() for name in (MANIFEST, "report.json"))
-
-
-def run_records(phases: Sequence[tuple[Report, Cell]]) -> list[Record]:
-    """The record of each phase of a program, as ``report.json`` has it but for the origin of the result.
-
-    Args:
-        phases: The report of each phase, and the cell as it is in it.
-    """
-    return [run_record(report, cell=cell, provenance=NOWHERE) for report, cell in phases]
 
 
 def _joined(phases: Mapping[str | None, Mapping[str, Any]]) -> dict[str, Any]:

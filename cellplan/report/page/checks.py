@@ -1,23 +1,22 @@
 """Checks on a page: how many of each kind passed, and the failed ones, most severe first."""
 
-from collections.abc import Iterable
 from typing import Any, Final
 
 from cellplan.model.report.check_kinds import CHECK_KINDS, GRAVITY
-from cellplan.model.report.report import Check
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, floored, small, stated
 
 MAX_LISTED: Final = 3  # failed checks of one kind on the first screen; the others are folded
 
 
-def check_groups(checks: Iterable[Check]) -> Entries:
+def check_groups(record: Record) -> Entries:
     """Number of checks of each kind and of those that passed, in their order."""
     groups: dict[str, dict[str, Any]] = {}
-    for check in checks:
-        group = groups.setdefault(check.name, {"title": check.kind.holds, "count": 0, "passed": 0})
+    for check in record["checks"]:
+        name = check["name"]
+        group = groups.setdefault(name, {"title": CHECK_KINDS[name].holds, "count": 0, "passed": 0})
         group["count"] += 1
-        group["passed"] += check.passed
+        group["passed"] += check["passed"]
     return list(groups.values())
 
 

@@ -4,7 +4,7 @@ from typing import Any, Final
 
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, seconds, small, stated
-from cellplan.report.record.phases import has_phases, phase_key
+from cellplan.report.record.phases import is_of_phase, phase_key
 from cellplan.report.record.sections.clearance import other_classes
 from cellplan.report.text.notes import accuracy_note, clock_note
 
@@ -45,13 +45,10 @@ def _when(entry: Record, key: str) -> dict[str, Any]:
 
 def _cycle_figure(record: Record) -> dict[str, Any]:
     """Cycle time, and what determines it unless the cell file states it."""
-    note = (
-        f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another"
-        if has_phases(record)
-        else ""
-    )
-    if "samples" in record:
+    if is_of_phase(record):
         note = f"{record['samples']} samples, {small(1e3 * record['step_s'])} ms apart"
+    else:
+        note = f"{len(record['runs'])} {'phases' if record['cycles'] else 'runs'}, one after another"
     clock = clock_note(record)
     return figure("Cycle time", seconds(record["cycle_time_s"]), "s", note=f"{note}; {clock}" if clock else note)
 

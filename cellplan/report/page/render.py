@@ -18,7 +18,6 @@ from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, Stric
 from jinja2.bccache import Bucket
 
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.report import Check
 from cellplan.report.page.checks import check_groups, failure_groups
 from cellplan.report.page.figures import key_figures, phase_errors
 from cellplan.report.page.first_screen import MAX_SPEEDS, not_judged, process_speeds, worst_instant
@@ -28,7 +27,7 @@ from cellplan.report.plots.palette import ROBOTS, dark_rules, robot_colours
 from cellplan.report.plots.svg import inline_svg
 from cellplan.report.record.common import Entries, Record
 from cellplan.report.record.numbers import against, fixed, floored, percent, power, range_bar, small, stated, worst
-from cellplan.report.record.phases import has_phases
+from cellplan.report.record.phases import is_of_phase
 from cellplan.report.record.sections.clearance import CLASSES
 from cellplan.report.record.sections.tasks import direction_text
 from cellplan.report.text.method import method_lines
@@ -101,54 +100,22 @@ class PageFiles(TypedDict, total=False):
     files: Annotated[Collection[str], "names of the joint tables in the run folder, as `tables/kuka.csv`"]
 
 
-def report_page(
-    record: Record, checks: Iterable[Check], *, cell: Cell, plots: Mapping[str, bytes], **pictures: Unpack[PageFiles]
-) -> str:
-    """The page of one run.
+def report_page(record: Record, *, cell: Cell, plots: Mapping[str, bytes], **pictures: Unpack[PageFiles]) -> str:
+    """The page of a program, or of one of its phases; that of several phases leads to the page of each.
 
     Args:
-        record: Result of ``run_record``.
-        checks: The checks of the run.
+        record: Its ``report.json``.
         plots: SVG pictures by file name, which lie in ``plots/`` beside the page; others are ignored.
         **pictures: What lies beside it, and its pictures.
     """
-    drawings = [name for name in plots if name.endswith(".svg")]
-    parts = {
-        "check_groups": check_groups(checks),
-        "shares": _shares(record),
-        "of_links": _by_reason(_of_links(record)),
-        "method": list(method_lines(record["solver"], record["step_s"])),
-        "plots": inline_plots(plots),
-        "task_times": task_times(record, cell),
-        "links": _links(record, drawings, pictures),
-    }
-    return cell_page("report.html", record, cell, parts | _shared_parts(record, cell, pictures))
-
-
-def overview_page(record: Record, *, cell: Cell, **pictures: Unpack[PageFiles]) -> str:
-    """The page of several runs, with a link to the page of each.
-
-    Args:
-        record: Result of ``summary_record``.
-        **pictures: What lies beside it, and its pictures.
-    """
-    parts = {"links": _links(record, (), pictures), "errors": phase_errors(record)}
-    return cell_page("overview.html", record, cell, parts | _shared_parts(record, cell, pictures))
-
-
-def _links(record: Record, plots: Iterable[str], pictures: PageFiles) -> dict[str, Links]:
-    """Files that a page leads to."""
-    names = ["report.json"] if has_phases(record) else ["report.json", "series.json"]
-    names += [name for name, text in ((STILL, pictures.get("still")), (FLOOR_PLAN, pictures.get("floor_plan"))) if text]
-    return file_links(pictures.get("files", ()), plots, names, phase=record.get("phase"))
-
-
-def _shared_parts(record: Record, cell: Cell, pictures: PageFiles) -> dict[str, object]:
-    """What the pages of one run and of several have in common."""
+    several = not is_of_phase(record)
+    parts: dict[str, object] = {"errors": phase_errors(record)} if several else _phase_parts(record, cell)
     view, begins = view_link(record.get("phase")), phase_begins(record)
-    return {
+    parts |= {
+        "several": several,
         "figures": key_figures(record),
         "failures": failure_groups(record),
+        "check_groups": check_groups(record),
         "speeds": process_speeds(record, cell),
         "most_speeds": MAX_SPEEDS,
         "not_judged": not_judged(record),
@@ -162,7 +129,27 @@ def _shared_parts(record: Record, cell: Cell, pictures: PageFiles) -> dict[str, 
         "view": view,
         "still": svg_element(pictures.get("still", "")),
         "floor_plan_svg": svg_element(pictures.get("floor_plan", "")),
+        "plots": inline_plots(plots),
+        "links": _links(record, [name for name in plots if name.endswith(".svg")], pictures),
     }
+    return cell_page("report.html", record, cell, parts)
+
+
+def _phase_parts(record: Record, cell: Cell) -> dict[str, object]:
+    """What only the page of one phase shows."""
+    return {
+        "shares": _shares(record),
+        "of_links": _by_reason(_of_links(record)),
+        "method": list(method_lines(record["solver"], record["step_s"])),
+        "task_times": task_times(record, cell),
+    }
+
+
+def _links(record: Record, plots: Iterable[str], pictures: PageFiles) -> dict[str, Links]:
+    """Files that a page leads to."""
+    names = ["report.json", "series.json"] if is_of_phase(record) else ["report.json"]
+    names += [name for name, text in ((STILL, pictures.get("still")), (FLOOR_PLAN, pictures.get("floor_plan"))) if text]
+    return file_links(pictures.get("files", ()), plots, names, phase=record.get("phase"))
 
 
 def cell_page(name: str, record: Record, cell: Cell, parts: Mapping[str, object]) -> str:

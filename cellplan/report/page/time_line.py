@@ -9,7 +9,6 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.task.task import Task
 from cellplan.report.page.times import phase_begins
 from cellplan.report.record.common import Entries, Record
-from cellplan.report.record.phases import has_phases
 
 MAX_TICKS: Final = 6  # intervals of the axis
 STEPS: Final = (1.0, 2.0, 5.0, 10.0)  # [-] of a power of ten: round distances of ticks
@@ -64,12 +63,11 @@ def task_times(record: Record, cell: Cell) -> Entries:
 
 def _phases(record: Record) -> Entries:
     """The phases that the clock of a page spans: those of a first cycle, or the one of a run, from 0."""
-    begins = phase_begins(record)
-    first = [phase for phase in record["phases"] if phase["begin_s"] == begins[phase["name"]]]
-    if has_phases(record):
-        return [dict(phase) for phase in first]
-    phases = [phase for phase in first if record["phase"] in (None, phase["name"])]
-    return [{**phase, "begin_s": 0.0, "end_s": record["cycle_time_s"]} for phase in phases[:1]]
+    begins, name = phase_begins(record), record.get("phase")
+    first = [dict(phase) for phase in record["phases"] if phase["begin_s"] == begins[phase["name"]]]
+    if name is None:
+        return first
+    return [phase | {"begin_s": 0.0, "end_s": record["cycle_time_s"]} for phase in first if phase["name"] == name]
 
 
 def _spans(phase: Record, robot: str, records: Record, tasks: Mapping[str, Task]) -> Iterator[Span]:

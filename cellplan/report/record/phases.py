@@ -42,9 +42,9 @@ def phases_record(phases: Iterable[Phase]) -> list[PhaseRecord]:
     ]
 
 
-def has_phases(record: Record) -> bool:
-    """Whether a ``report.json`` is that of a program of several phases, each with a report in a folder of its name."""
-    return "runs" in record
+def is_of_phase(record: Record) -> bool:
+    """Whether a ``report.json`` is that of one phase, with its samples; else it has the worst values of several."""
+    return "samples" in record
 
 
 def phase_key(key: str) -> str:

@@ -1,7 +1,8 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
-from collections.abc import Iterable, Mapping
-from typing import Annotated, Final
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Annotated, Final, NamedTuple
 
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.branches import MovedStart
@@ -117,24 +118,19 @@ class RunRecord(HeadRecord, SkewKey, StopsKey):
     idle: Annotated[list[str], "idle robots of this run; their tables keep them at their homes"]
 
 
-def run_record(
-    report: Report,
-    *,
-    cell: Cell,
-    provenance: Provenance,
-    motion: Motion | None = None,
-    transfers: Mapping[str, str] | None = None,
-    moved: Iterable[MovedStart] = (),
-) -> RunRecord:
-    """The record of one run.
+class ReportedPhase(NamedTuple):
+    """A phase of a program with its report, and with what only its planner knows."""
 
-    Args:
-        report: The run.
-        provenance: Origin of the result.
-        motion: The planned motion, for the effort of its steps; None if it is not available.
-        transfers: How the transfer moves of its phase were found, by the name of the phase.
-        moved: How far its starts were moved.
-    """
+    report: Report
+    cell: Cell  # the cell as it is in the phase
+    motion: Motion | None = None  # the planned motion, for the effort of its steps; None if it is not available
+    transfers: Mapping[str, str] = MappingProxyType({})  # how its transfer moves were found, by the name of the phase
+    moved: Sequence[MovedStart] = ()  # how far its starts were moved
+
+
+def run_record(phase: ReportedPhase, *, provenance: Provenance) -> RunRecord:
+    """The record of one phase of a program, or of its only one."""
+    report, cell = phase.report, phase.cell
     return {
         "schema": SCHEMA,
         "cell": report.cell,
@@ -170,7 +166,7 @@ def run_record(
         "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
-        "solver": solver_record(cell.solver, motion, transfers, moved),
+        "solver": solver_record(cell.solver, phase.motion, phase.transfers, phase.moved),
         "accelerations": accelerations_record(report.accelerations),
         **skew_record(report),
         **stops_record(report),

@@ -1,34 +1,31 @@
-"""``report.json`` of a program whose tasks have a report each: the worst values of all of them."""
+"""``report.json`` of a program and of its phases; that of several phases has the worst values of all of them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import chain
 from typing import Annotated, Any, Final, NamedTuple, TypedDict
 
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.branches import MovedStart
-from cellplan.model.report.report import CAUTION, Report
+from cellplan.model.report.report import CAUTION
 from cellplan.report.record.common import (
     Number,
     Provenance,
     Record,
     RunCheckRecord,
-    check_record,
     number,
     origin_record,
-    status,
 )
 from cellplan.report.record.figures import Fold, figures_record
 from cellplan.report.record.phases import AT, clock_from, in_phase, missing_moves, phase_key, phases_record
-from cellplan.report.record.run import SCHEMA, HeadRecord
-from cellplan.report.record.sections.accelerations import AccelerationsRecord, NotJudgedRecord, accelerations_record
-from cellplan.report.record.sections.clearance import clearance_record, left_out_record
-from cellplan.report.record.sections.joints import joints_record, repeatability_record, with_worst_time
-from cellplan.report.record.sections.payload import hardest_loads, loads_record
+from cellplan.report.record.run import SCHEMA, HeadRecord, ReportedPhase, RunRecord, run_record
+from cellplan.report.record.sections.accelerations import NotJudgedRecord
+from cellplan.report.record.sections.clearance import left_out_record
+from cellplan.report.record.sections.joints import with_worst_time
+from cellplan.report.record.sections.payload import hardest_loads
 from cellplan.report.record.sections.rests_on import open_surfaces_record, rests_on_record
 from cellplan.report.record.sections.skew import SkewKey, least_skew_record
 from cellplan.report.record.sections.solver import solver_record
-from cellplan.report.record.sections.tasks import tasks_record
-from cellplan.report.record.sections.tool_errors import ClosureRecord, closures_record, without_means
+from cellplan.report.record.sections.tasks import TaskRecord
+from cellplan.report.record.sections.tool_errors import ClosureRecord, without_means
 
 
 class _RunEntry(TypedDict):
@@ -58,114 +55,103 @@ class SummaryRecord(HeadRecord, SkewKey):
     cycles: Annotated[int | None, "how often the phases follow one another; null unless from home to home"]
 
 
-def summary_record(
-    reports: Mapping[str, Report],
-    *,
-    cell: Cell,
-    provenance: Provenance,
-    transfers: Mapping[str, str] | None = None,
-    moved: Iterable[MovedStart] = (),
-) -> SummaryRecord:
-    """The record of several runs, one after another.
+class ProgramRecords(NamedTuple):
+    """The ``report.json`` of a program, and that of each phase."""
 
-    Tasks, joints, clearance and accelerations are the worst of all runs, each with the phase it is from; everything
-    else is in the report of each run.
+    whole: Record  # that of the only phase, or the worst values of several
+    phases: Mapping[str, Record]  # by the place of the phase in the folder of the run: its name, empty for the only one
+
+    @property
+    def by_place(self) -> dict[str, Record]:
+        """All of them by their places."""
+        return {**self.phases, "": self.whole}
+
+
+def program_records(phases: Sequence[ReportedPhase], *, cell: Cell, provenance: Provenance) -> ProgramRecords:
+    """The records of a program of one or several phases.
 
     Args:
-        reports: Report by the name of the run, which is its phase and its folder.
-        provenance: Origin of the result.
-        transfers: How the transfer moves of each phase were found, by the name of the phase.
-        moved: How far starts were moved.
+        cell: The cell of the whole program.
     """
-    runs, merged = list(reports.values()), _merged(reports, cell)
+    records = {phase.report.phase or "": run_record(phase, provenance=provenance) for phase in phases}
+    return ProgramRecords(records.get("") or _whole(phases, records, cell=cell, provenance=provenance), records)
+
+
+def _whole(
+    phases: Sequence[ReportedPhase], records: Mapping[str, RunRecord], *, cell: Cell, provenance: Provenance
+) -> SummaryRecord:
+    """The record of several phases, one after another.
+
+    Tasks, joints, clearance and accelerations are the worst of all phases, each with the phase it is from; everything
+    else is in the report of each phase.
+    """
+    reports = [phase.report for phase in phases]
+    transfers = {name: text for phase in phases for name, text in phase.transfers.items()}
+    moved = dict.fromkeys(start for phase in phases for start in phase.moved)
+    worst = worst_of([in_phase(_merged(record, cell), name) for name, record in records.items()])
+    rests_on = rests_on_record(cell, hardest_loads(reports), [tip for report in reports for tip in report.standoffs])
     return {
         "schema": SCHEMA,
         "cell": cell.name,
-        "status": "passed" if all(report.passed for report in runs) else "failed",
-        "mode": runs[0].mode,
-        "cycle_time_s": number(sum(report.cycle_time for report in runs)),
+        "status": "passed" if all(report.passed for report in reports) else "failed",
+        "mode": reports[0].mode,
+        "cycle_time_s": number(sum(report.cycle_time for report in reports)),
         "clock_from": clock_from(cell),
-        "phases": phases_record(runs[0].phases),
-        "runs": {name: in_phase(_run_entry(name, report, cell), name) for name, report in reports.items()},
+        "phases": phases_record(reports[0].phases),
+        "runs": {name: in_phase(_run_entry(record, cell, folder=name), name) for name, record in records.items()},
         **least_skew_record(reports),
-        "tasks": merged["tasks"],
+        "tasks": worst["tasks"],
         "open_surfaces": open_surfaces_record(cell),
         "remarks": [text for _, text in cell.remarks],
-        "closure": merged["closure"],
-        "joints": merged["joints"],
-        "repeatability": {name: drift for report in runs for name, drift in repeatability_record(report).items()},
-        "clearance": merged["clearance"],
-        "figures": figures_record(runs),
+        "closure": worst["closure"],
+        "joints": worst["joints"],
+        "repeatability": dict(chain.from_iterable(record["repeatability"].items() for record in records.values())),
+        "clearance": worst["clearance"],
+        "figures": figures_record(reports),
         "required_clearance_mm": number(cell.checks.clearance_mm),
-        "left_out": left_out_record(dict.fromkeys(entry for report in runs for entry in report.clearance.left_out)),
-        "checks": [
-            {"phase": name, **check_record(check)} for name, report in reports.items() for check in report.checks
-        ],
-        "not_in_program": missing_moves(cell, {name: report.tasks for name, report in reports.items()}),
-        "rests_on": merged["rests_on"],
+        "left_out": left_out_record(dict.fromkeys(entry for report in reports for entry in report.clearance.left_out)),
+        "checks": [{"phase": name, **check} for name, record in records.items() for check in record["checks"]],
+        "not_in_program": missing_moves(cell, {report.phase: report.tasks for report in reports}),
+        "rests_on": {**rests_on, "payload": worst["payload"]},
         **origin_record(cell, provenance),
         "caution": CAUTION,
         "solver": solver_record(cell.solver, transfers=transfers, moved=moved),
-        "accelerations": merged["accelerations"],
+        "accelerations": worst["accelerations"] | {"not_judged": _not_judged(records.values())},
         "cycles": cell.program.cycles if cell.program.is_home_to_home else None,
     }
 
 
-def _merged(reports: Mapping[str, Report], cell: Cell) -> Any:
-    """The tasks of all runs, and the worst of joints, tools, part, distances and loads; times name their phases."""
-    runs, known = list(reports.values()), {task.name for task in cell.tasks}
-    accelerations = [accelerations_record(report.accelerations) for report in runs]
-    merged = worst_of(
-        [
-            in_phase(
-                {
-                    # straight moves of holders have a report each
-                    "tasks": tasks_record(report, cell) if known.issuperset(report.tasks) else {},
-                    "joints": joints_record(report.joints, report.accelerations.joints),
-                    "closure": _closures(report, cell),
-                    "clearance": clearance_record(report.clearance.minima),
-                    "accelerations": accelerations_record(report.accelerations),
-                    "payload": loads_record(report.loads),
-                },
-                name,
-            )
-            for name, report in reports.items()
-        ]
-    )
-    merged["accelerations"]["not_judged"] = _all_left(accelerations)
-    rests_on = rests_on_record(cell, hardest_loads(runs), [tip for report in runs for tip in report.standoffs])
-    return merged | {"rests_on": {**rests_on, "payload": merged["payload"]}}
+def _merged(record: RunRecord, cell: Cell) -> Record:
+    """What of a phase is merged with that of others."""
+    return {
+        "tasks": _tasks(record, cell),
+        "joints": record["joints"],
+        "closure": {robot: without_means(closure) for robot, closure in record["closure"].items()},
+        "clearance": record["clearance"],
+        "accelerations": record["accelerations"],
+        "payload": record["rests_on"]["payload"],
+    }
 
 
-def _closures(report: Report, cell: Cell) -> dict[str, ClosureRecord]:
-    """Closure errors by robot, without what is a mean over one run."""
-    return {robot: without_means(record) for robot, record in closures_record(report, cell).items()}
+def _tasks(record: RunRecord, cell: Cell) -> dict[str, TaskRecord]:
+    """Tasks of a phase; none in a straight move of a holder."""
+    return record["tasks"] if {task.name for task in cell.tasks}.issuperset(record["tasks"]) else {}
 
 
-def _all_left(accelerations: Iterable[AccelerationsRecord]) -> list[NotJudgedRecord]:
-    """What was not judged in any of the runs, once each."""
+def _not_judged(records: Iterable[RunRecord]) -> list[NotJudgedRecord]:
+    """What was not judged in any of the phases, once each."""
     left: list[NotJudgedRecord] = []
-    for record in accelerations:
-        left += [entry for entry in record["not_judged"] if entry not in left]
+    for record in records:
+        left += [entry for entry in record["accelerations"]["not_judged"] if entry not in left]
     return left
 
 
-def _run_entry(name: str, report: Report, cell: Cell) -> RunEntry:
-    """What the summary holds of one run."""
-    entry: RunEntry = {"status": status(report), "folder": name, "cycle_time_s": number(report.cycle_time)}
-    if not {task.name for task in cell.tasks}.issuperset(report.tasks):
-        return entry
-    tasks = tasks_record(report, cell).values()
-    for task in sorted(tasks, key=lambda errors: errors["max_position_error_mm"] or 0.0)[-1:]:
-        entry["robot"] = task["robot"]
-        entry["max_position_error_mm"] = task["max_position_error_mm"]
-        entry["max_position_error_at_s"] = task["max_position_error_at_s"]
-        entry["max_orientation_error_deg"] = task["max_orientation_error_deg"]
-        entry["max_orientation_error_at_s"] = task["max_orientation_error_at_s"]
-        if "max_position_error_between_rows_mm" in task:
-            entry["max_position_error_between_rows_mm"] = task["max_position_error_between_rows_mm"]
-            entry["max_orientation_error_between_rows_deg"] = task["max_orientation_error_between_rows_deg"]
-    return entry
+def _run_entry(record: RunRecord, cell: Cell, *, folder: str) -> Record:
+    """What the record of a program holds of one phase."""
+    tasks: list[Record] = list(_tasks(record, cell).values())
+    worst = max(tasks[::-1], key=lambda errors: errors["max_position_error_mm"] or 0.0, default={})
+    errors = {key: worst[key] for key in RunEntry.__annotations__ if key in worst}
+    return {"status": record["status"], "folder": folder, "cycle_time_s": record["cycle_time_s"], **errors}
 
 
 class Figure(NamedTuple):

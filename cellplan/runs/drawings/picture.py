@@ -264,6 +264,12 @@ def phase_drawings(phase: DepictedPhase) -> dict[str, str]:
     return {STILL: run_still(*phase), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
 
 
+def drawings_by_place(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, dict[str, str]]:
+    """The drawings of a program and of its phases, by their places in the folder of the run and by file name."""
+    drawings = {phase.report.phase or "": phase_drawings(phase) for phase in phases}
+    return drawings if "" in drawings else {**drawings, "": program_drawings(cell, phases)}
+
+
 def program_drawings(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, str]:
     """The drawings of a program with several phases: the picture of the one that decides, and all of its motion."""
     worst = min(phases, key=lambda phase: graver(worst_instant(phase.report, phase.cell)))

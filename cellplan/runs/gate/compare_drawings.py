@@ -1,14 +1,11 @@
 """Whether the drawings of a run on disk are those of what was found: figures may differ by rounding, words may not."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from cellplan.files.input.findings import shown
 from cellplan.files.run.stored import StoredRun
-from cellplan.model.cell.cell import Cell
-from cellplan.model.report.verified_run import VerifiedMotion
-from cellplan.runs.drawings.picture import DepictedPhase, phase_drawings, program_drawings
 from cellplan.runs.gate.picture_text import PIECE, unbalanced
 
 CellDrawings = Mapping[str, Mapping[str, str]]
@@ -17,13 +14,6 @@ COURSE: Final = re.compile(r'(?<= d=")[MLHVlhvz\d. -]*(?=")')  # of a line
 LETTER: Final = re.compile("[A-Za-z]")  # of a course, which is set apart from its figures
 FIGURE: Final = re.compile(r"(?<![\w#-])-?\d+(?:\.\d+)?(?![\w])")  # no part of a name
 ROUNDING: Final = 3.0  # units of a sheet, each at most a tenth of a millimetre: what rounding to a whole one can do
-
-
-def drawings_again(cell: Cell, motions: Sequence[VerifiedMotion]) -> CellDrawings:
-    """The drawings of what was found, by the place of the run and by file name."""
-    phases = [DepictedPhase(motion.cell, motion.schedule, motion.report) for motion in motions]
-    drawings = {motion.name or "": phase_drawings(phase) for motion, phase in zip(motions, phases, strict=True)}
-    return drawings if "" in drawings else {**drawings, "": program_drawings(cell, phases)}
 
 
 def stored_drawings(stored: StoredRun, place: str, names: Iterable[str]) -> dict[str, str]:

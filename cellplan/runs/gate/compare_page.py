@@ -1,19 +1,17 @@
 """Whether the page of a run says what was found when its tables were computed again; its pictures are those on disk."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from cellplan.files.input.findings import listed, shown
 from cellplan.files.run.stored import StoredRun
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.verified_run import VerifiedMotion
-from cellplan.report.page.render import PageFiles, overview_page, report_page
+from cellplan.report.page.render import PageFiles, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
-from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.phases import has_phases
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
+from cellplan.report.record.common import Record
+from cellplan.report.record.summary import ProgramRecords
 from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL
 from cellplan.runs.gate.compare_drawings import CellDrawings, foreign_drawings, stored_drawings
 from cellplan.runs.gate.compare_report import PLANNER_KEYS
@@ -32,26 +30,19 @@ def redrawn(motions: Sequence[VerifiedMotion]) -> Drawings:
 
 
 def page_findings(
-    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], redrawn: Drawings, drawings: CellDrawings
+    stored: StoredRun, cells: Mapping[str, Cell], records: ProgramRecords, redrawn: Drawings, drawings: CellDrawings
 ) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
     Args:
         stored: The run; its reports are known to say what was found.
+        cells: The cell as it is in each phase, and in the whole program, by place.
     """
     yield from foreign_drawings(stored, drawings)
-    for motion in motions:
-        place = motion.name or ""
-        yield from _foreign_pieces(stored, place, redrawn[place])
-        record = _of_the_run(
-            stored, place, run_record(motion.report, cell=motion.cell, provenance=_provenance(stored, place))
-        )
-        yield from _page_finding(stored, place, cell=motion.cell, motion=motion, record=record)
-    if has_phases(stored.record):
-        reports = {str(motion.name): motion.report for motion in motions}
-        expected = summary_record(reports, cell=cell, provenance=_provenance(stored, ""))
-        record = _of_the_run(stored, "", expected)
-        yield from _difference(stored, "", overview_page(record, cell=cell, **_page_files(stored, "")))
+    for place, record in records.by_place.items():
+        expected = redrawn.get(place, {})  # a program of several phases has pictures in these only
+        yield from _foreign_pieces(stored, place, expected)
+        yield from _page_finding(stored, place, _of_the_run(stored, place, record), cell=cells[place], plots=expected)
 
 
 def other_pictures(stored: StoredRun, expected: Drawings) -> Iterator[str]:
@@ -76,17 +67,21 @@ def _foreign_pieces(stored: StoredRun, place: str, expected: Mapping[str, bytes]
 
 
 def _page_finding(
-    stored: StoredRun, place: str, *, cell: Cell, motion: VerifiedMotion, record: Record
+    stored: StoredRun, place: str, record: Record, *, cell: Cell, plots: Collection[str]
 ) -> Iterator[str]:
-    """What is wrong with the page of one run."""
-    desired, drawings = [f"{name}.svg" for name in run_figures(motion.report, cell=cell)], stored.drawings(place)
-    if sorted(drawings) != sorted(desired):
-        names = f"expected the pictures {listed(desired)}, got {listed(drawings)}"
+    """What is wrong with the page of one phase, or of the program.
+
+    Args:
+        plots: File names of its plots in their order.
+    """
+    drawings = stored.drawings(place)
+    if sorted(drawings) != sorted(plots):
+        names = f"expected the pictures {listed(plots)}, got {listed(drawings)}"
         yield f"{stored.file(place, 'plots')}: {names}; solve the cell again"
         return
-    in_order = {name: drawings[name] for name in desired}
+    in_order = {name: drawings[name] for name in plots}
     try:
-        page = report_page(record, motion.report.checks, cell=cell, plots=in_order, **_page_files(stored, place))
+        page = report_page(record, cell=cell, plots=in_order, **_page_files(stored, place))
     except (KeyError, TypeError, ValueError, AttributeError):  # of what only the planner knows, or of a picture
         file = stored.file(place, "report.json")
         yield f"{file}: solver: expected the form that cellplan writes; solve the cell again"
@@ -116,14 +111,10 @@ def _shown(text: str) -> str:
     return shown(" ".join(text[:EXCERPT_LENGTH].split()) or "nothing")
 
 
-def _provenance(stored: StoredRun, place: str) -> Provenance:
-    """Versions and digests as the run has them, which are compared elsewhere."""
-    record = stored.records.get(place, stored.record)
-    return Provenance(versions=stored.manifest.versions, digests=record.get("digests", {}))
-
-
 def _of_the_run(stored: StoredRun, place: str, expected: Record) -> Record:
-    """A record with the inputs of the run, and with what only its planner knew as its report has it."""
-    got: Any = stored.records.get(place, stored.record).get("solver", {})
+    """A record with inputs and digests of the run, and with what only its planner knew as its report has it."""
+    report: Any = stored.report(place)
+    got = report.get("solver", {})
     solver = {key: got.get(key) if key in PLANNER_KEYS else value for key, value in expected["solver"].items()}
-    return {**expected, "inputs": dict(stored.manifest.inputs), "solver": solver}
+    inputs, digests = dict(stored.manifest.inputs), report.get("digests", {})
+    return {**expected, "inputs": inputs, "digests": digests, "solver": solver}

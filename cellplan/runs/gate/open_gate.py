@@ -19,12 +19,13 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Report
 from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun, VerifiedMotion, VerifiedRun
 from cellplan.planning.modes import homeless
-from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.phases import has_phases, missing_moves
-from cellplan.report.record.run import run_record
+from cellplan.report.record.common import Provenance
+from cellplan.report.record.phases import missing_moves
+from cellplan.report.record.run import ReportedPhase
 from cellplan.report.record.series import series
-from cellplan.report.record.summary import summary_record
-from cellplan.runs.gate.compare_drawings import drawings_again, other_drawings
+from cellplan.report.record.summary import ProgramRecords, program_records
+from cellplan.runs.drawings.picture import DepictedPhase, drawings_by_place
+from cellplan.runs.gate.compare_drawings import other_drawings
 from cellplan.runs.gate.compare_page import other_pictures, page_findings, redrawn
 from cellplan.runs.gate.compare_report import differences, misshapen_series
 from cellplan.runs.gate.stored_cell import load_stored_cell
@@ -83,8 +84,11 @@ def open_gate(
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
     _refuse_other_headers(stored, source.cell, rows.clock, motions)
-    _refuse_other_report(stored, source.cell, motions)
-    of_pages = _refuse_other_pages(stored, source.cell, motions)
+    reported = [ReportedPhase(motion.report, motion.cell) for motion in motions]
+    provenance = Provenance(versions=stored.manifest.versions, digests={})
+    records = program_records(reported, cell=source.cell, provenance=provenance)
+    _refuse_other_report(stored, records, motions)
+    of_pages = _refuse_other_pages(stored, source.cell, motions, records)
     return VerifiedRun(
         folder=stored.folder,
         digest=stored.digest,
@@ -141,7 +145,7 @@ def _demanded(cell: Cell, stored: StoredRun) -> DemandedProgram:
 
 def _only_task(cell: Cell, stored: StoredRun, file: str) -> str | None:
     """Name of the only task that was chosen; None for all."""
-    tasks = list(stored.record["runs" if has_phases(stored.record) else "tasks"])
+    tasks = list(stored.record["tasks"])
     every = [task.name for task in cell.tasks]
     if tasks != every and (len(tasks) != 1 or tasks[0] not in every):
         raise InputError(f"{file}: tasks: expected {listed(every)} or one of them, got {listed(map(str, tasks))}")
@@ -203,23 +207,14 @@ def _unproved(report: Report) -> Iterator[str]:
             yield f"clearance {kind}"
 
 
-def _refuse_other_report(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> None:
+def _refuse_other_report(stored: StoredRun, records: ProgramRecords, motions: Sequence[VerifiedMotion]) -> None:
     """Refuse reports that say something else than was found."""
-    provenance = Provenance(versions=stored.manifest.versions, digests={})
-    expected: dict[str, Record] = {
-        motion.name or "": run_record(motion.report, cell=motion.cell, provenance=provenance) for motion in motions
-    }
-    got: dict[str, Record] = dict(stored.records)
-    if has_phases(stored.record):
-        got[""] = stored.record
-        reports = {str(motion.name): motion.report for motion in motions}
-        expected[""] = summary_record(reports, cell=cell, provenance=provenance)
     is_same = _is_of_this_version(stored)
     findings = []
-    for place, record in got.items():
+    for place, record in records.by_place.items():
         findings += [
             f"{stored.file(place, 'report.json')}: {key}: expected {shown(new)}, got {shown(old)}"
-            for key, old, new in differences(record, expected[place], same_program=is_same)
+            for key, old, new in differences(stored.report(place), record, same_program=is_same)
         ]
     for motion in motions:
         findings += _series_findings(stored, motion, is_same=is_same)
@@ -236,14 +231,19 @@ def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool
         yield f"{stored.file(place, SERIES)}: {key}: expected {shown(new)}, got {shown(old)}"
 
 
-def _refuse_other_pages(stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion]) -> tuple[str, ...]:
+def _refuse_other_pages(
+    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], records: ProgramRecords
+) -> tuple[str, ...]:
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
         return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
-    expected = redrawn(motions)
-    drawings = drawings_again(cell, motions)
-    _refuse_because(stored, list(page_findings(stored, cell, motions, expected, drawings)))
-    other = [*other_pictures(stored, expected), *other_drawings(stored, drawings)]
+    cells = {"": cell, **{motion.name or "": motion.cell for motion in motions}}
+    plots = redrawn(motions)
+    drawings = drawings_by_place(
+        cell, [DepictedPhase(motion.cell, motion.schedule, motion.report) for motion in motions]
+    )
+    _refuse_because(stored, list(page_findings(stored, cells, records, plots, drawings)))
+    other = [*other_pictures(stored, plots), *other_drawings(stored, drawings)]
     remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"
     return (remark,) if other else ()
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from builders.browser import Browser
+from builders.records import phase_record
 
 from cellplan.report.page.render import report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
-from cellplan.report.record.run import run_record
 
 pytestmark = pytest.mark.slow
 
@@ -45,9 +45,9 @@ MARGINS = "joint margins"
 @pytest.fixture(scope="module")
 def page(passed_run: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     run, path = passed_run, tmp_path_factory.mktemp("page") / "report.html"
-    record = run_record(run.report, cell=run.cell, provenance=run.provenance)
+    record = phase_record(run.report, cell=run.cell, provenance=run.provenance)
     plots = pictures(run_figures(run.report, cell=run.cell))
-    path.write_text(report_page(record, run.report.checks, cell=run.cell, plots=plots), encoding="utf-8")
+    path.write_text(report_page(record, cell=run.cell, plots=plots), encoding="utf-8")
     return path
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from builders.records import phase_record, whole_record
 
 from cellplan.model.report.check_kinds import CHECK_KINDS
 from cellplan.model.report.report import Check
@@ -12,8 +13,6 @@ from cellplan.report.page.checks import MAX_LISTED, failure_groups
 from cellplan.report.page.first_screen import not_judged, process_speeds, worst_instant
 from cellplan.report.page.render import report_page
 from cellplan.report.page.times import TimeLinks, page_begin
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
 
 
 def check(name: str, subject: str, value: float, limit: float = 0.0, at_s: float | None = 1.0) -> Check:
@@ -25,7 +24,7 @@ def check(name: str, subject: str, value: float, limit: float = 0.0, at_s: float
 
 def record_of(run: Any, *checks: Check) -> Any:
     report = replace(run.report, checks=(*run.report.checks, *checks))
-    return run_record(report, cell=run.cell, provenance=run.provenance)
+    return phase_record(report, cell=run.cell, provenance=run.provenance)
 
 
 def test_failures_are_grouped_most_severe_first_and_none_is_lost(passed_run: Any) -> None:
@@ -138,7 +137,7 @@ def test_a_time_of_a_page_leads_to_that_of_the_program(begin: float) -> None:
 def test_figures_of_a_program_know_from_which_phase_they_count(pairwise_runs: Any) -> None:
     first = pairwise_runs["circle"]
     reports = {name: run.report for name, run in pairwise_runs.items()}
-    record = summary_record(reports, cell=first.cell, provenance=first.provenance)
+    record = whole_record(reports, cell=first.cell, provenance=first.provenance)
 
     rows = [row for group in failure_groups(record) for row in group["rows"]]
 
@@ -155,14 +154,12 @@ def test_a_picture_is_shown_even_if_nothing_has_a_time(passed_run: Any) -> None:
     record = {**record, "clearance": nowhere}
     still = '<?xml version="1.0"?><svg viewBox="0 0 4 3"><title>picture</title></svg>'
 
-    page = report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}, still=still)
+    page = report_page(record, cell=passed_run.cell, plots={}, still=still)
 
     assert worst_instant(record) is None
     assert page.count("<title>picture</title>") == 1
     assert "<?xml" not in page
-    assert (
-        "picture" not in report_page(record, passed_run.report.checks, cell=passed_run.cell, plots={}).split("<main")[1]
-    )
+    assert "picture" not in report_page(record, cell=passed_run.cell, plots={}).split("<main")[1]
 
 
 def test_a_skew_that_is_more_than_allowed_and_a_touch_at_a_stop_stand_on_the_first_screen(passed_run: Any) -> None:

@@ -10,13 +10,13 @@ from xml.etree import ElementTree
 
 import pytest
 from builders.browser import Browser
+from builders.records import phase_record
 
 from cellplan import Cell, Report, Solution, load_cell, open_gate, solve, to_html
 from cellplan.errors import InputError
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.notebook import Card, Grid, card_html
 from cellplan.report.record.common import Provenance
-from cellplan.report.record.run import run_record
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 
@@ -96,7 +96,7 @@ def test_pictures_are_svg_that_say_what_they_show(pieces: dict[str, str]) -> Non
 def test_the_figures_are_those_of_the_report_page(solution: Solution, pieces: dict[str, str]) -> None:
     (run,) = solution.runs
     origin = Provenance(versions={}, digests={})
-    figures = key_figures(run_record(run.report, cell=solution.cell, provenance=origin))
+    figures = key_figures(phase_record(run.report, cell=solution.cell, provenance=origin))
     for name in ("solution", "verified", "folder"):
         text = Piece(pieces[name]).text
         for figure in figures:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.records import phase_record, whole_record
 from jinja2 import DictLoader, Environment, StrictUndefined
 
 from cellplan.model.motion.plan import Phase, Work
@@ -16,11 +17,9 @@ from cellplan.model.report.report import Check
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.report.page import render
-from cellplan.report.page.render import SCRIPTS, CompiledTemplates, overview_page, report_page
+from cellplan.report.page.render import SCRIPTS, CompiledTemplates, report_page
 from cellplan.report.plots.rendering import pictures
 from cellplan.report.plots.run import run_figures
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
 
 HOSTILE = "\"><img src=x onerror='alert(1)'><script>alert(2)</script>{{ 7*7 }}&amp;"
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -81,14 +80,14 @@ class Page(HTMLParser):
 
 def page_of(run: Any, plots: dict[str, bytes] | None = None) -> str:
     shown = pictures(run_figures(run.report, cell=run.cell)) if plots is None else plots
-    record = run_record(run.report, cell=run.cell, provenance=run.provenance)
-    return report_page(record, run.report.checks, cell=run.cell, plots=shown)
+    record = phase_record(run.report, cell=run.cell, provenance=run.provenance)
+    return report_page(record, cell=run.cell, plots=shown)
 
 
 def overview_of(runs: Any) -> str:
     first = runs["circle"]
     reports = {name: run.report for name, run in runs.items()}
-    return overview_page(summary_record(reports, cell=first.cell, provenance=first.provenance), cell=first.cell)
+    return report_page(whole_record(reports, cell=first.cell, provenance=first.provenance), cell=first.cell, plots={})
 
 
 @pytest.fixture(scope="module")
@@ -272,8 +271,8 @@ def test_a_failed_joint_is_reported_in_plain_words(passed_run: Any) -> None:
     locked = (LockedJointEntry(robot="kuka", joint="B2", from_s=2.0),)
     cell = replace(passed_run.cell, motion=replace(passed_run.cell.motion, locked=locked))
 
-    record = run_record(passed_run.report, cell=cell, provenance=passed_run.provenance)
-    page = Page(report_page(record, passed_run.report.checks, cell=cell, plots={})).text
+    record = phase_record(passed_run.report, cell=cell, provenance=passed_run.provenance)
+    page = Page(report_page(record, cell=cell, plots={})).text
 
     assert "Joint kuka/B2 fails at 2.000 s and stays at " in page
     assert "the other joints compensate, and every task stays within its tolerance." in page

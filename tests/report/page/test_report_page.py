@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.records import phase_record, whole_record
 
 from cellplan.model.motion.motion import Motion, Resolution
 from cellplan.model.solver import Integrator
 from cellplan.report.record.common import as_json
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record
 
 DECLARED_NAMES = {"inputs", "digests", "versions"}  # the keys below these are names of files and packages
 
@@ -34,9 +33,9 @@ def reports(rail_run: Any, pairwise_runs: Any) -> list[Any]:
     q = np.zeros((steps + 1, 1))
     made = Resolution(integrator=Integrator.ACCURATE, panels=2, nodes=18, sweeps=4, solves=72, error_between=1e-9)
     motion = Motion(times=rail_run.report.times, q=q, iterations=np.ones(steps), slack=np.zeros(steps), resolution=made)
-    one = as_json(run_record(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion))
+    one = as_json(phase_record(rail_run.report, cell=rail_run.cell, provenance=rail_run.provenance, motion=motion))
     runs = {name: run.report for name, run in pairwise_runs.items()}
-    several = as_json(summary_record(runs, cell=rail_run.cell, provenance=rail_run.provenance))
+    several = as_json(whole_record(runs, cell=rail_run.cell, provenance=rail_run.provenance))
     return [json.loads(one), json.loads(several)]
 
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from builders.records import phase_record
 
 from cellplan.model.motion.plan import Carry, Hold, Phase, Transfer, Work
 from cellplan.model.settings.task import ProcessEntry
 from cellplan.model.task.task import StraightMove
 from cellplan.report.page.time_line import task_times, time_line
-from cellplan.report.record.run import run_record
 
 OVER = {"process", "settle"}  # drawn over other spans
 
@@ -32,7 +32,7 @@ def busy(passed_run: Any) -> Any:
 
 
 def line_of(run: Any) -> Any:
-    record = run_record(run.report, cell=run.cell, provenance=run.provenance)
+    record = phase_record(run.report, cell=run.cell, provenance=run.provenance)
     return time_line(record, run.cell), task_times(record, run.cell)
 
 

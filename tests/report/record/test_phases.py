@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 from builders.random_cells import random_cell
+from builders.records import whole_record
 
 from cellplan.model.cell.acceleration import MotionAccelerations, PointAcceleration
 from cellplan.model.motion.plan import Phase
 from cellplan.model.report.report import Report
 from cellplan.report.page.figures import key_figures
 from cellplan.report.page.first_screen import worst_instant
-from cellplan.report.page.render import overview_page
+from cellplan.report.page.render import report_page
 from cellplan.report.record.common import as_json
 from cellplan.report.record.phases import clock_from, phase_key
-from cellplan.report.record.summary import summary_record
 from cellplan.report.text.notes import clock_note
 from cellplan.report.text.run import figure_lines
 
@@ -49,7 +49,7 @@ def alike(passed_run: Any) -> dict[str, Report]:
 
 
 def summary(run: Any, reports: dict[str, Report]) -> Any:
-    return json.loads(as_json(summary_record(reports, cell=run.cell, provenance=run.provenance)))
+    return json.loads(as_json(whole_record(reports, cell=run.cell, provenance=run.provenance)))
 
 
 def instants(record: Any, path: str = "") -> Iterator[tuple[str, Any, str]]:
@@ -90,7 +90,7 @@ def test_terminal_page_caption_and_link_name_the_same_phase(passed_run: Any, ali
     at = record["clearance"]["whole"]["at_s"]
 
     card = next(entry for entry in key_figures(record) if entry["label"] == "Smallest clearance")
-    caption, page = worst_instant(record), overview_page(record, cell=passed_run.cell)
+    caption, page = worst_instant(record), report_page(record, cell=passed_run.cell, plots={})
     (line,) = (line for line in figure_lines(record, "the report") if line.strip().startswith("smallest clearance"))
 
     assert caption is not None
@@ -103,7 +103,7 @@ def test_terminal_page_caption_and_link_name_the_same_phase(passed_run: Any, ali
 def test_a_page_of_a_program_says_the_phase_of_each_time_in_its_tables(
     passed_run: Any, alike: dict[str, Report]
 ) -> None:
-    page = overview_page(summary(passed_run, alike), cell=passed_run.cell)
+    page = report_page(summary(passed_run, alike), cell=passed_run.cell, plots={})
     joints = page[page.index('id="joints"') : page.index('id="clearance"')]
 
     times, phases = joints.count('class="at"'), joints.count('</a> <span class="soft">work-')
@@ -113,9 +113,9 @@ def test_a_page_of_a_program_says_the_phase_of_each_time_in_its_tables(
 
 
 def test_a_run_by_itself_needs_no_phases(passed_run: Any) -> None:
-    from cellplan.report.record.run import run_record
+    from builders.records import phase_record
 
-    record = run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+    record = phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
 
     assert "phase" not in record["clearance"]["whole"]
     assert not any("s of " in line for line in figure_lines(record, "the report") if " at " in line)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.records import phase_record, whole_record
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,8 +17,7 @@ from cellplan.model.report.report import ClearanceClass, ClosureAccuracy
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.report.record.common import as_json, number
-from cellplan.report.record.run import run_record
-from cellplan.report.record.summary import summary_record, worst_of
+from cellplan.report.record.summary import worst_of
 
 
 def refuse(constant: str) -> Any:
@@ -29,13 +29,13 @@ def read(text: str) -> Any:
 
 
 def record_of(run: Any) -> Any:
-    return read(as_json(run_record(run.report, cell=run.cell, provenance=run.provenance)))
+    return read(as_json(phase_record(run.report, cell=run.cell, provenance=run.provenance)))
 
 
 def summary_of(runs: Any) -> Any:
     first = runs["circle"]
     reports = {name: run.report for name, run in runs.items()}
-    return read(as_json(summary_record(reports, cell=first.cell, provenance=first.provenance)))
+    return read(as_json(whole_record(reports, cell=first.cell, provenance=first.provenance)))
 
 
 def test_names_that_scripts_rely_on_are_there(passed_run: Any) -> None:
@@ -203,15 +203,15 @@ def test_merging_one_run_changes_nothing(passed_run: Any) -> None:
 
 
 def test_same_run_gives_the_same_bytes(failed_run: Any) -> None:
-    first = as_json(run_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance))
-    assert as_json(run_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance)) == first
+    first = as_json(phase_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance))
+    assert as_json(phase_record(failed_run.report, cell=failed_run.cell, provenance=failed_run.provenance)) == first
     assert first.endswith("}\n")
 
 
 def test_run_folder_knows_the_report_as_its_own(tmp_path: Path, passed_run: Any, pairwise_runs: Any) -> None:
-    one = as_json(run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
+    one = as_json(phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
     reports = {name: run.report for name, run in pairwise_runs.items()}
-    several = as_json(summary_record(reports, cell=passed_run.cell, provenance=passed_run.provenance))
+    several = as_json(whole_record(reports, cell=passed_run.cell, provenance=passed_run.provenance))
     for text in (one, several, one):  # each replaces the one before, which must be recognised
         with RunFolder(tmp_path / "run") as folder:
             folder.write_text("report.json", text)
@@ -236,7 +236,7 @@ def test_failed_joints_are_reported_with_instant_and_place(passed_run: Any, fail
         locked = (LockedJointEntry(robot="kuka", joint="B2", from_s=2.0),)
         cell = replace(run.cell, motion=replace(run.cell.motion, locked=locked))
 
-        (record,) = read(as_json(run_record(run.report, cell=cell, provenance=run.provenance)))["locked_joints"]
+        (record,) = read(as_json(phase_record(run.report, cell=cell, provenance=run.provenance)))["locked_joints"]
 
         index = list(run.report.times).index(2.0)
         assert (record["robot"], record["joint"], record["from_s"], record["unit"]) == ("kuka", "B2", 2.0, "deg")
@@ -268,7 +268,7 @@ def closure(size: float, turn: float, times: Any) -> ClosureAccuracy:
 def test_closures_are_reported_by_robot_with_what_is_allowed(passed_run: Any) -> None:
     report = replace(passed_run.report, closures=(closure(2e-6, 1e-5, passed_run.report.times),))
 
-    record = read(as_json(run_record(report, cell=passed_run.cell, provenance=passed_run.provenance)))["closure"]
+    record = read(as_json(phase_record(report, cell=passed_run.cell, provenance=passed_run.provenance)))["closure"]
 
     assert list(record) == ["abb"]
     assert record["abb"]["max_position_error_mm"] == pytest.approx(2e-3)
@@ -287,7 +287,7 @@ def test_the_summary_states_the_worst_closure_of_all_runs(pairwise_runs: Any) ->
         for name, size in sizes.items()
     }
 
-    record = read(as_json(summary_record(reports, cell=first.cell, provenance=first.provenance)))["closure"]["abb"]
+    record = read(as_json(whole_record(reports, cell=first.cell, provenance=first.provenance)))["closure"]["abb"]
 
     assert record["max_position_error_mm"] == pytest.approx(2e-3)
     assert record["max_orientation_error_deg"] == pytest.approx(math.degrees(3e-5))

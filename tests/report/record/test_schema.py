@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.records import phase_record, whole_record
 from jsonschema import Draft202012Validator
 
 from cellplan.cli.main import run as run_cli
 from cellplan.model.motion.motion import Motion, NearestSingular, Resolution
 from cellplan.model.solver import Integrator
 from cellplan.report.record.common import as_json
-from cellplan.report.record.run import run_record
 from cellplan.report.record.schema import report_schema, series_schema
 from cellplan.report.record.series import series_json
-from cellplan.report.record.summary import summary_record
 
 pytestmark = pytest.mark.usefixtures("stored_solutions")
 
@@ -65,7 +64,7 @@ def test_the_report_of_a_run_conforms(
 ) -> None:
     run = request.getfixturevalue(kind)
     motion = planned(run) if has_motion else None
-    record = run_record(run.report, cell=run.cell, provenance=run.provenance, motion=motion)
+    record = phase_record(run.report, cell=run.cell, provenance=run.provenance, motion=motion)
 
     assert findings(validator, json.loads(as_json(record))) == []
 
@@ -73,7 +72,7 @@ def test_the_report_of_a_run_conforms(
 def test_the_report_of_several_runs_conforms(validator: Draft202012Validator, pairwise_runs: Any) -> None:
     first = pairwise_runs["circle"]
     reports = {name: run.report for name, run in pairwise_runs.items()}
-    record = summary_record(reports, cell=first.cell, provenance=first.provenance)
+    record = whole_record(reports, cell=first.cell, provenance=first.provenance)
 
     assert findings(validator, json.loads(as_json(record))) == []
 
@@ -97,7 +96,9 @@ def test_the_reports_of_a_pairwise_cell_conform(validator: Draft202012Validator,
 
 
 def test_a_damaged_report_does_not_conform(validator: Draft202012Validator, passed_run: Any) -> None:
-    record = json.loads(as_json(run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)))
+    record = json.loads(
+        as_json(phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
+    )
     for damage in (
         lambda it: it.pop("caution"),
         lambda it: it.update(surprise=1),
@@ -113,7 +114,7 @@ def test_a_damaged_report_does_not_conform(validator: Draft202012Validator, pass
 def test_the_published_schema_permits_keys_that_later_releases_add(passed_run: Any) -> None:
     schema = report_schema()
     Draft202012Validator.check_schema(schema)
-    record = run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
+    record = phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance)
     later = {**record, "runs_later": 1}
 
     assert Draft202012Validator({**schema, "oneOf": schema["oneOf"][:1]}).is_valid(json.loads(json.dumps(later)))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from builders.records import phase_record
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -14,7 +15,6 @@ from hypothesis.extra.numpy import arrays
 from cellplan.model.motion.motion import Motion
 from cellplan.report.record import series as module
 from cellplan.report.record.common import as_json
-from cellplan.report.record.run import run_record
 from cellplan.report.record.series import series, series_json, series_text
 
 RELATIVE = 1e-6  # seven digits are written, which may be wrong by 5e-7
@@ -31,7 +31,7 @@ def motion_of(run: Any) -> Motion:
 
 def written(run: Any, motion: Motion | None = None) -> Any:
     """The report with its series under a key of their own."""
-    record = json.loads(as_json(run_record(run.report, cell=run.cell, provenance=run.provenance, motion=motion)))
+    record = json.loads(as_json(phase_record(run.report, cell=run.cell, provenance=run.provenance, motion=motion)))
     return record | {"series": json.loads(series_json(run.report, motion))}
 
 
@@ -141,7 +141,7 @@ def test_each_array_is_one_line(passed_run: Any) -> None:
 
 
 def test_the_report_is_small_and_has_no_series(passed_run: Any) -> None:
-    text = as_json(run_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
+    text = as_json(phase_record(passed_run.report, cell=passed_run.cell, provenance=passed_run.provenance))
     assert "series" not in json.loads(text)
     assert len(text) < 100_000  # four robots, 4001 samples: the series have 4.5 MB
 

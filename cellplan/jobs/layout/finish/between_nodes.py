@@ -24,7 +24,7 @@ def exceeded_at(program: TimedProgram, cycle: float, span: float) -> tuple[float
     """
     times = list[float]()
     for run in program.solution.runs:
-        loads = program.cycle * _loads(program, run)
+        loads = program.cycle * _loads(run)
         beyond = np.flatnonzero(loads > (1.0 + EXCEEDS) * cycle)
         pieces = np.split(beyond, np.flatnonzero(np.diff(beyond) > 1) + 1) if len(beyond) else []
         peaks = [run.motion.times[piece[loads[piece].argmax()]] for piece in pieces]
@@ -57,9 +57,9 @@ def distances_missed_at(program: TimedProgram, span: float, *, within_robot: boo
     return tuple(times)
 
 
-def _loads(program: TimedProgram, run: Run) -> Array:
+def _loads(run: Run) -> Array:
     """Share of its time in which the joints would allow the motion as it is at each row, shape (N,)."""
-    scene, times = run.scene or program.scene, run.motion.times
+    scene, times = run.scene, run.motion.times
     bounds, loads = row_limits(scene, run.schedule).bounds, np.zeros(len(times))
     for robot in scene.cell.robots:
         positions, columns = run.report.q[robot.name], scene.cell.columns(robot.name)

@@ -1,6 +1,6 @@
 """Allowed skew of the clocks of controllers in printed units."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from typing import Annotated, Final, TypedDict
 
 from cellplan.model.report.report import Report
@@ -71,11 +71,11 @@ class SkewKey(TypedDict, total=False):
     ]
 
 
-def least_skew_record(reports: Mapping[str, Report]) -> SkewKey:
-    """The allowed skew of that run of several by name, one after another, that allows least; see ``skew_record``."""
-    known = {name: report.skew.allowed for name, report in reports.items() if report.skew is not None}
-    least = min(known, key=known.__getitem__, default=None)
-    record: SkewKey = {} if least is None else in_phase(skew_record(reports[least]), least)
+def least_skew_record(reports: Iterable[Report]) -> SkewKey:
+    """The allowed skew of that phase of several, one after another, that allows least; see ``skew_record``."""
+    known = [(report.skew.allowed, report) for report in reports if report.skew is not None]
+    _, least = min(known, key=lambda pair: pair[0], default=(None, None))
+    record: SkewKey = {} if least is None else in_phase(skew_record(least), str(least.phase))
     return record
 
 

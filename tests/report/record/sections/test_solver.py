@@ -5,12 +5,12 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from builders.records import phase_record
 
 from cellplan.model.motion.motion import Motion, Resolution
 from cellplan.model.settings.solver import SolverEntry, WeightingEntry
 from cellplan.model.solver import Integrator, MethodName
 from cellplan.report.page.render import report_page
-from cellplan.report.record.run import run_record
 from cellplan.report.record.sections.solver import solver_record
 from cellplan.report.text.method import method_lines
 
@@ -161,7 +161,7 @@ def searched(passed_run: Any) -> Any:
 
 
 def test_the_page_says_how_the_motion_was_found(searched: Any) -> None:
-    record = run_record(searched.report, cell=searched.cell, provenance=searched.provenance)
-    page = report_page(record, searched.report.checks, cell=searched.cell, plots={})
+    record = phase_record(searched.report, cell=searched.cell, provenance=searched.provenance)
+    page = report_page(record, cell=searched.cell, plots={})
     assert "<p>Method: recursive search, joint by joint.</p>" in page
     assert "manipulability at least 2.24 · 10^−7" in page  # 3e-7 + 1e-7 sin 4
