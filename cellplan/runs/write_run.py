@@ -18,10 +18,10 @@ from cellplan.report.page.view import unmade_view_page
 from cellplan.report.plots.rendering import pictures, require_formats
 from cellplan.report.plots.run import run_figures
 from cellplan.report.record.common import Provenance, Record, as_json
-from cellplan.report.record.run import ReportedPhase
+from cellplan.report.record.sections.solver import PlanningFacts
 from cellplan.report.record.series import series_json
 from cellplan.report.record.summary import ProgramRecords, program_records
-from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, DepictedPhase, drawings_by_place
+from cellplan.runs.drawings.picture import FLOOR_PLAN, STILL, drawings_by_place
 from cellplan.runs.solution import Run, Solution
 
 ENGINES: Final = (
@@ -74,8 +74,8 @@ def write_run(
         for index, run in enumerate(solution.runs):
             progress("writing the report", index / len(solution.runs))
             plots[run.name or ""] = _write_phase(target, run, formats)
-        phases = [ReportedPhase(run.report, run.cell, run.motion, run.transfers, run.moved) for run in solution.runs]
-        records = program_records(phases, cell=cell, provenance=provenance)
+        planning = [PlanningFacts(motion=run.motion, transfers=run.transfers, moved=run.moved) for run in solution.runs]
+        records = program_records(solution.runs, cell=cell, provenance=provenance, planning=planning)
         _write_pages(target, solution, records, plots, tables)
         target.write_text("cell.yaml", render_cell(cell))
         if has_tables:
@@ -123,16 +123,14 @@ def _write_pages(
         plots: Plots of each phase by its place.
         tables: Names of the joint tables in the run folder.
     """
-    cells = {run.name or "": run.cell for run in solution.runs}
-    phases = [DepictedPhase(run.cell, run.schedule, run.report) for run in solution.runs]
-    for name, drawings in drawings_by_place(solution.cell, phases).items():
+    for name, drawings in drawings_by_place(solution.cell, solution.runs).items():
         place, record = PurePosixPath(name), records.by_place[name]
         target.write_text(str(place / "report.json"), as_json(record))
         for file, text in drawings.items():
             target.write_text(str(place / file), text)
         page = report_page(
             record,
-            cell=cells.get(name, solution.cell),
+            cell=records.cells[name],
             plots=plots.get(name, {}),
             still=drawings[STILL],
             floor_plan=drawings[FLOOR_PLAN],

@@ -16,7 +16,6 @@ from cellplan.runs.drawings.instant import worst_instant
 from cellplan.runs.drawings.picture import (
     MARKED,
     STILL,
-    DepictedPhase,
     materials,
     phase_drawings,
     program_drawings,
@@ -45,10 +44,6 @@ def with_checks(solution: Solution, *checks: Check) -> Report:
 
 def picture_of(solution: Solution, report: Report) -> StillPicture:
     return still_picture(solution.cell, solution.runs[0].schedule, report)
-
-
-def phases(solution: Solution) -> list[DepictedPhase]:
-    return [DepictedPhase(run.cell, run.schedule, run.report) for run in solution.runs]
 
 
 def test_the_instant_of_a_sound_run_is_that_of_the_smallest_clearance_of_its_report(solved: Solution) -> None:
@@ -161,8 +156,8 @@ def test_a_tool_off_its_path_is_marked_at_its_tip(solved: Solution) -> None:
 
 
 def test_of_several_phases_the_worst_one_is_shown(solved: Solution) -> None:
-    first, second = phases(solved)
-    bad = second._replace(report=replace(second.report, checks=(failed("joint_position", "right/q1"),)))
+    first, second = solved.runs
+    bad = replace(second, report=replace(second.report, checks=(failed("joint_position", "right/q1"),)))
 
     whole = program_drawings(solved.cell, [first, bad])
 
@@ -176,9 +171,9 @@ def test_of_several_phases_the_worst_one_is_shown(solved: Solution) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_noise_of_the_arithmetic_does_not_change_a_drawing(solved: Solution, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    for phase in phases(solved):
+    for phase in solved.runs:
         noisy = {name: q + rng.uniform(-1e-12, 1e-12, q.shape) for name, q in phase.report.q.items()}
-        others = phase_drawings(phase._replace(report=replace(phase.report, q=noisy)))
+        others = phase_drawings(replace(phase, report=replace(phase.report, q=noisy)))
 
         for name, text in phase_drawings(phase).items():
             assert is_same_drawing(others[name], text)
@@ -194,11 +189,11 @@ def test_the_picture_of_a_program_is_of_the_phase_that_its_report_names(solved: 
         for kind, minimum in first.clearance.minima.items()
     }
     second = replace(first, phase="second", clearance=replace(first.clearance, minima=minima))
-    one, other = phases(solved)
+    one, other = solved.runs
     reports = {"first": first, "second": second}
     record = whole_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
 
-    picture = program_drawings(solved.cell, [one._replace(report=first), other._replace(report=second)])[STILL]
+    picture = program_drawings(solved.cell, [replace(one, report=first), replace(other, report=second)])[STILL]
 
     shown = worst_page_instant(record)
     assert shown is not None
@@ -210,11 +205,11 @@ def test_a_failure_without_a_time_does_not_choose_the_phase_of_the_picture(solve
     first, second = (run.report for run in solved.runs)
     timeless = replace(first, checks=(failed("payload", "left", at_s=None),))
     timed = replace(second, checks=(failed("joint_acceleration_assumed", "right/J1", at_s=0.5),))
-    one, other = phases(solved)
+    one, other = solved.runs
     reports = {"first": timeless, "second": timed}
     record = whole_record(reports, cell=solved.cell, provenance=Provenance(versions={}, digests={}))
 
-    picture = program_drawings(solved.cell, [one._replace(report=timeless), other._replace(report=timed)])[STILL]
+    picture = program_drawings(solved.cell, [replace(one, report=timeless), replace(other, report=timed)])[STILL]
 
     shown = worst_page_instant(record)
     assert shown is not None

@@ -26,7 +26,6 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import Report
 from cellplan.report.plots.rendering import require_formats
 from cellplan.report.record.common import Provenance, Record
-from cellplan.report.record.run import ReportedPhase
 from cellplan.report.record.series import series
 from cellplan.report.record.summary import program_records
 from cellplan.report.record.variant_figures import variant_curves, variant_figures
@@ -264,10 +263,9 @@ def _solved_figures(solution: Solution) -> Record:
     """The figures of a program that was just solved."""
     origin = Provenance(versions={}, digests={})
     reports = [run.report for run in solution.runs]
-    phases = [ReportedPhase(run.report, run.cell) for run in solution.runs]
-    whole, records = program_records(phases, cell=solution.cell, provenance=origin)
-    curves = variant_curves(whole, list(map(series, reports)), _clearance(reports))
-    return {**variant_figures(whole, records, proof="solved"), "curves": curves}
+    records = program_records(solution.runs, cell=solution.cell, provenance=origin)
+    curves = variant_curves(records.whole, list(map(series, reports)), _clearance(reports))
+    return {**variant_figures(records.whole, records.phases, proof="solved"), "curves": curves}
 
 
 def _stored_outcome(job: CompareJob, path: Path) -> TrialOutcome:

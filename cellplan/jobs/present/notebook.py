@@ -73,13 +73,12 @@ def _(result: Path) -> Card:
 
 @card_of.register
 def _(result: Solution) -> Card:
-    return _program_card("Solution", result.cell, [ReportedPhase(run.report, run.cell) for run in result.runs])
+    return _program_card("Solution", result.cell, result.runs)
 
 
 @card_of.register
 def _(result: VerifiedRun) -> Card:
-    phases = [ReportedPhase(motion.report, motion.cell) for motion in result.motions]
-    return replace(_program_card("Verified run", result.cell, phases), findings=result.remarks)
+    return replace(_program_card("Verified run", result.cell, result.motions), findings=result.remarks)
 
 
 @card_of.register

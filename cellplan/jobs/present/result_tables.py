@@ -26,7 +26,7 @@ from cellplan.programs.formats.wide import wide_columns
 from cellplan.programs.wide_table import solution_rows, verified_rows
 from cellplan.report.record.common import Provenance, Record, check_record, number
 from cellplan.report.record.rows import Row, Tables, columns_of, curve_columns, run_tables
-from cellplan.report.record.run import ReportedPhase, run_record
+from cellplan.report.record.run import run_record
 from cellplan.report.record.sections.clearance import (
     clearance_record,
     closest_pairs_record,
@@ -84,13 +84,13 @@ def _(result: Cell) -> Tables:
 
 @tables_of.register
 def _(result: Solution) -> Tables:
-    records = [run_record(ReportedPhase(run.report, run.cell), provenance=NOWHERE) for run in result.runs]
+    records = [run_record(run, provenance=NOWHERE) for run in result.runs]
     return {"motion": lambda: wide_columns(solution_rows(result)), **run_tables(records)}
 
 
 @tables_of.register
 def _(result: VerifiedRun) -> Tables:
-    records = [run_record(ReportedPhase(motion.report, motion.cell), provenance=NOWHERE) for motion in result.motions]
+    records = [run_record(motion, provenance=NOWHERE) for motion in result.motions]
     return {"motion": lambda: wide_columns(verified_rows(result)), **run_tables(records)}
 
 

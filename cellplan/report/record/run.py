@@ -1,12 +1,8 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Final, Protocol
 
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.branches import MovedStart
-from cellplan.model.motion.motion import Motion
 from cellplan.model.report.report import CAUTION, Report
 from cellplan.report.record.common import (
     CheckRecord,
@@ -50,7 +46,7 @@ from cellplan.report.record.sections.rests_on import (
     rests_on_record,
 )
 from cellplan.report.record.sections.skew import SkewKey, skew_record
-from cellplan.report.record.sections.solver import SolverRecord, solver_record
+from cellplan.report.record.sections.solver import NOT_PLANNED, PlanningFacts, SolverRecord, solver_record
 from cellplan.report.record.sections.stops import StopsKey, stops_record
 from cellplan.report.record.sections.tasks import TaskRecord, tasks_record
 from cellplan.report.record.sections.tool_errors import RunClosureRecord, closures_record
@@ -118,17 +114,19 @@ class RunRecord(HeadRecord, SkewKey, StopsKey):
     idle: Annotated[list[str], "idle robots of this run; their tables keep them at their homes"]
 
 
-class ReportedPhase(NamedTuple):
-    """A phase of a program with its report, and with what only its planner knows."""
+class ReportedPhase(Protocol):
+    """A phase of a program with its report, just planned or read back."""
 
-    report: Report
-    cell: Cell  # the cell as it is in the phase
-    motion: Motion | None = None  # the planned motion, for the effort of its steps; None if it is not available
-    transfers: Mapping[str, str] = MappingProxyType({})  # how its transfer moves were found, by the name of the phase
-    moved: Sequence[MovedStart] = ()  # how far its starts were moved
+    @property
+    def report(self) -> Report:
+        """What the checks found."""
+
+    @property
+    def cell(self) -> Cell:
+        """The cell as it is in the phase."""
 
 
-def run_record(phase: ReportedPhase, *, provenance: Provenance) -> RunRecord:
+def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: PlanningFacts = NOT_PLANNED) -> RunRecord:
     """The record of one phase of a program, or of its only one."""
     report, cell = phase.report, phase.cell
     return {
@@ -166,7 +164,7 @@ def run_record(phase: ReportedPhase, *, provenance: Provenance) -> RunRecord:
         "remarks": [text for _, text in cell.remarks],
         "left_out": left_out_record(report.clearance.left_out),
         "closure": closures_record(report, cell),
-        "solver": solver_record(cell.solver, phase.motion, phase.transfers, phase.moved),
+        "solver": solver_record(cell.solver, planning),
         "accelerations": accelerations_record(report.accelerations),
         **skew_record(report),
         **stops_record(report),

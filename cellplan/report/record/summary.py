@@ -5,7 +5,7 @@ from itertools import chain
 from typing import Annotated, Any, Final, NamedTuple, TypedDict
 
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.report import CAUTION
+from cellplan.model.report.report import CAUTION, Report
 from cellplan.report.record.common import (
     Number,
     Provenance,
@@ -23,7 +23,7 @@ from cellplan.report.record.sections.joints import with_worst_time
 from cellplan.report.record.sections.payload import hardest_loads
 from cellplan.report.record.sections.rests_on import open_surfaces_record, rests_on_record
 from cellplan.report.record.sections.skew import SkewKey, least_skew_record
-from cellplan.report.record.sections.solver import solver_record
+from cellplan.report.record.sections.solver import NOT_PLANNED, PlanningFacts, solver_record
 from cellplan.report.record.sections.tasks import TaskRecord
 from cellplan.report.record.sections.tool_errors import ClosureRecord, without_means
 
@@ -60,6 +60,7 @@ class ProgramRecords(NamedTuple):
 
     whole: Record  # that of the only phase, or the worst values of several
     phases: Mapping[str, Record]  # by the place of the phase in the folder of the run: its name, empty for the only one
+    cells: Mapping[str, Cell]  # the cell as it is in each phase, and in the whole program, by place
 
     @property
     def by_place(self) -> dict[str, Record]:
@@ -67,27 +68,37 @@ class ProgramRecords(NamedTuple):
         return {**self.phases, "": self.whole}
 
 
-def program_records(phases: Sequence[ReportedPhase], *, cell: Cell, provenance: Provenance) -> ProgramRecords:
+def program_records(
+    phases: Sequence[ReportedPhase], *, cell: Cell, provenance: Provenance, planning: Sequence[PlanningFacts] = ()
+) -> ProgramRecords:
     """The records of a program of one or several phases.
 
     Args:
         cell: The cell of the whole program.
+        planning: What only the planner of each phase knows; empty if it is not available.
     """
-    records = {phase.report.phase or "": run_record(phase, provenance=provenance) for phase in phases}
-    return ProgramRecords(records.get("") or _whole(phases, records, cell=cell, provenance=provenance), records)
+    records = {
+        phase.report.phase or "": run_record(phase, provenance=provenance, planning=facts)
+        for phase, facts in zip(phases, planning or [NOT_PLANNED] * len(phases), strict=True)
+    }
+    whole = records.get("") or _whole([phase.report for phase in phases], records, planning, cell, provenance)
+    return ProgramRecords(whole, records, {"": cell, **{phase.report.phase or "": phase.cell for phase in phases}})
 
 
 def _whole(
-    phases: Sequence[ReportedPhase], records: Mapping[str, RunRecord], *, cell: Cell, provenance: Provenance
+    reports: Sequence[Report],
+    records: Mapping[str, RunRecord],
+    planning: Sequence[PlanningFacts],
+    cell: Cell,
+    provenance: Provenance,
 ) -> SummaryRecord:
     """The record of several phases, one after another.
 
     Tasks, joints, clearance and accelerations are the worst of all phases, each with the phase it is from; everything
     else is in the report of each phase.
     """
-    reports = [phase.report for phase in phases]
-    transfers = {name: text for phase in phases for name, text in phase.transfers.items()}
-    moved = dict.fromkeys(start for phase in phases for start in phase.moved)
+    transfers = {name: text for facts in planning for name, text in facts.transfers.items()}
+    moved = tuple(dict.fromkeys(start for facts in planning for start in facts.moved))
     worst = worst_of([in_phase(_merged(record, cell), name) for name, record in records.items()])
     rests_on = rests_on_record(cell, hardest_loads(reports), [tip for report in reports for tip in report.standoffs])
     return {
@@ -115,7 +126,7 @@ def _whole(
         "rests_on": {**rests_on, "payload": worst["payload"]},
         **origin_record(cell, provenance),
         "caution": CAUTION,
-        "solver": solver_record(cell.solver, transfers=transfers, moved=moved),
+        "solver": solver_record(cell.solver, PlanningFacts(transfers=transfers, moved=moved)),
         "accelerations": worst["accelerations"] | {"not_judged": _not_judged(records.values())},
         "cycles": cell.program.cycles if cell.program.is_home_to_home else None,
     }

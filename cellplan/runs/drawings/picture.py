@@ -1,7 +1,7 @@
 """The picture of the instant that decides the verdict of a run: what stands where at it, and what matters."""
 
 from collections.abc import Mapping, Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from cellplan.geometry.transforms import transform_points
 from cellplan.model.cell.cell import Cell
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.report.report import Report
+from cellplan.model.report.verified_run import VerifiedMotion
 from cellplan.model.task.task import Frame
 from cellplan.model.units import MM
 from cellplan.report.floor_plan.sheet import floor_plan_svg
@@ -23,6 +24,7 @@ from cellplan.report.still.shading import mixed
 from cellplan.report.still.sheet import still_svg
 from cellplan.runs.drawings.floor_plan import floor_plan, schedule_paths, swept_state
 from cellplan.runs.drawings.instant import Instant, graver, heading, is_exact, worst_instant
+from cellplan.runs.solution import Run
 from cellplan.scene.bodies import Kind, SceneBody, body_poses, scene_bodies
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
@@ -251,17 +253,12 @@ def _floor(cell: Cell) -> float | None:
     return max(heights) if heights else None
 
 
-class DepictedPhase(NamedTuple):
-    """What is drawn of one phase: the cell as it is in it, its tasks and what was found."""
-
-    cell: Cell
-    schedule: Schedule
-    report: Report
+DepictedPhase = Run | VerifiedMotion
 
 
 def phase_drawings(phase: DepictedPhase) -> dict[str, str]:
     """The drawings of one phase, by file name."""
-    return {STILL: run_still(*phase), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
+    return {STILL: run_still(phase.cell, phase.schedule, phase.report), FLOOR_PLAN: _floor_plan(phase.cell, [phase])}
 
 
 def drawings_by_place(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, dict[str, str]]:
@@ -273,7 +270,7 @@ def drawings_by_place(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, 
 def program_drawings(cell: Cell, phases: Sequence[DepictedPhase]) -> dict[str, str]:
     """The drawings of a program with several phases: the picture of the one that decides, and all of its motion."""
     worst = min(phases, key=lambda phase: graver(worst_instant(phase.report, phase.cell)))
-    return {STILL: run_still(*worst), FLOOR_PLAN: _floor_plan(cell, phases)}
+    return {STILL: run_still(worst.cell, worst.schedule, worst.report), FLOOR_PLAN: _floor_plan(cell, phases)}
 
 
 def _floor_plan(cell: Cell, phases: Sequence[DepictedPhase]) -> str:

@@ -30,19 +30,19 @@ def redrawn(motions: Sequence[VerifiedMotion]) -> Drawings:
 
 
 def page_findings(
-    stored: StoredRun, cells: Mapping[str, Cell], records: ProgramRecords, redrawn: Drawings, drawings: CellDrawings
+    stored: StoredRun, records: ProgramRecords, redrawn: Drawings, drawings: CellDrawings
 ) -> Iterator[str]:
     """Every page of a run that is not the one its tables, its report's planner facts and its pictures give.
 
     Args:
         stored: The run; its reports are known to say what was found.
-        cells: The cell as it is in each phase, and in the whole program, by place.
     """
     yield from foreign_drawings(stored, drawings)
     for place, record in records.by_place.items():
         expected = redrawn.get(place, {})  # a program of several phases has pictures in these only
         yield from _foreign_pieces(stored, place, expected)
-        yield from _page_finding(stored, place, _of_the_run(stored, place, record), cell=cells[place], plots=expected)
+        given = _of_the_run(stored, place, record)
+        yield from _page_finding(stored, place, given, cell=records.cells[place], plots=expected)
 
 
 def other_pictures(stored: StoredRun, expected: Drawings) -> Iterator[str]:

@@ -21,10 +21,9 @@ from cellplan.model.report.verified_run import ACCESS_TOKEN, ReadMotion, ReadRun
 from cellplan.planning.modes import homeless
 from cellplan.report.record.common import Provenance
 from cellplan.report.record.phases import missing_moves
-from cellplan.report.record.run import ReportedPhase
 from cellplan.report.record.series import series
 from cellplan.report.record.summary import ProgramRecords, program_records
-from cellplan.runs.drawings.picture import DepictedPhase, drawings_by_place
+from cellplan.runs.drawings.picture import drawings_by_place
 from cellplan.runs.gate.compare_drawings import other_drawings
 from cellplan.runs.gate.compare_page import other_pictures, page_findings, redrawn
 from cellplan.runs.gate.compare_report import differences, misshapen_series
@@ -84,11 +83,10 @@ def open_gate(
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
     _refuse_other_headers(stored, source.cell, rows.clock, motions)
-    reported = [ReportedPhase(motion.report, motion.cell) for motion in motions]
     provenance = Provenance(versions=stored.manifest.versions, digests={})
-    records = program_records(reported, cell=source.cell, provenance=provenance)
+    records = program_records(motions, cell=source.cell, provenance=provenance)
     _refuse_other_report(stored, records, motions)
-    of_pages = _refuse_other_pages(stored, source.cell, motions, records)
+    of_pages = _refuse_other_pages(stored, records, motions)
     return VerifiedRun(
         folder=stored.folder,
         digest=stored.digest,
@@ -232,17 +230,14 @@ def _series_findings(stored: StoredRun, motion: VerifiedMotion, *, is_same: bool
 
 
 def _refuse_other_pages(
-    stored: StoredRun, cell: Cell, motions: Sequence[VerifiedMotion], records: ProgramRecords
+    stored: StoredRun, records: ProgramRecords, motions: Sequence[VerifiedMotion]
 ) -> tuple[str, ...]:
     """Refuse pages that say something else than was found; remarks about what may be rounding or another version."""
     if not _is_of_this_version(stored):
         return ("the page and the texts of the report were not compared: another version of cellplan wrote them",)
-    cells = {"": cell, **{motion.name or "": motion.cell for motion in motions}}
     plots = redrawn(motions)
-    drawings = drawings_by_place(
-        cell, [DepictedPhase(motion.cell, motion.schedule, motion.report) for motion in motions]
-    )
-    _refuse_because(stored, list(page_findings(stored, cells, records, plots, drawings)))
+    drawings = drawings_by_place(records.cells[""], motions)
+    _refuse_because(stored, list(page_findings(stored, records, plots, drawings)))
     other = [*other_pictures(stored, plots), *other_drawings(stored, drawings)]
     remark = f"some pictures differ from those rendered here, by rounding or by editing: {listed(other)}"
     return (remark,) if other else ()

@@ -1,6 +1,7 @@
 """Solver in the record of a run: the method, its settings, and the effort of its steps."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, Final, TypedDict
 
 import numpy as np
@@ -133,18 +134,21 @@ class SolverRecord(TypedDict):
     ]
 
 
-def solver_record(
-    solver: SolverEntry,
-    motion: Motion | None = None,
-    transfers: Mapping[str, str] | None = None,
-    moved: Iterable[MovedStart] = (),
-) -> SolverRecord:
-    """The method with its settings under the keys of the cell file, and the effort of its steps.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PlanningFacts:
+    """What of a program only its planner knows."""
 
-    Args:
-        motion: The planned motion; None if it is not available, or if there are several.
-        transfers: How the transfer moves of each phase were found; None or empty without such moves.
-    """
+    motion: Motion | None = None  # the planned motion; None if it is not available, or if there are several
+    transfers: Mapping[str, str] = field(default_factory=dict)  # how transfer moves were found, by phase
+    moved: Sequence[MovedStart] = ()  # how far starts were moved
+
+
+NOT_PLANNED: Final = PlanningFacts()
+
+
+def solver_record(solver: SolverEntry, planning: PlanningFacts = NOT_PLANNED) -> SolverRecord:
+    """The method with its settings under the keys of the cell file, and the effort of its steps."""
+    motion = planning.motion
     return {
         "method": solver.method,
         "integrator": str(Integrator.ACCURATE if solver.is_accurate else Integrator.EULER),
@@ -157,8 +161,8 @@ def solver_record(
         "iterations": None if motion is None else _iterations_record(motion),
         "slack": None if motion is None else _slack_record(motion),
         "resolution": None if motion is None else _resolution_record(motion),
-        "transfers": dict(transfers) if transfers else None,
-        "moved_starts": [moved_start_record(start) for start in moved],
+        "transfers": dict(planning.transfers) or None,
+        "moved_starts": [moved_start_record(start) for start in planning.moved],
     }
 
 

@@ -11,7 +11,7 @@ from cellplan.model.motion.motion import Motion, Resolution
 from cellplan.model.settings.solver import SolverEntry, WeightingEntry
 from cellplan.model.solver import Integrator, MethodName
 from cellplan.report.page.render import report_page
-from cellplan.report.record.sections.solver import solver_record
+from cellplan.report.record.sections.solver import PlanningFacts, solver_record
 from cellplan.report.text.method import method_lines
 
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
@@ -35,7 +35,7 @@ def motion(iterations: list[float], slack: list[float]) -> Motion:
 
 
 def said(solver: SolverEntry, of: Motion | None = None) -> list[str]:
-    return list(method_lines(solver_record(solver, of), 1e-3))
+    return list(method_lines(solver_record(solver, PlanningFacts(motion=of)), 1e-3))
 
 
 def resolved(**figures: Any) -> Motion:
@@ -102,7 +102,9 @@ def test_without_the_motion_the_accuracy_asked_for_is_reported() -> None:
 
 
 def test_the_record_says_what_the_accurate_mode_took() -> None:
-    record = solver_record(settings(accuracy_mm=0.01), resolved(error_between=2.5e-9, euler_from=0.5))
+    record = solver_record(
+        settings(accuracy_mm=0.01), PlanningFacts(motion=resolved(error_between=2.5e-9, euler_from=0.5))
+    )
 
     assert (record["integrator"], record["accuracy_mm"]) == ("accurate", 0.01)
     assert record["resolution"] == {
