@@ -57,8 +57,7 @@ def cases(path: Path) -> Iterator[Case]:
     bare = replace(cell, robots=tuple(replace(robot, control=None) for robot in cell.robots), controllers={})
     solution = solve(replace(bare, checks=cell.checks.changed(stop=None)))
     for run in solution.runs:
-        whole = run.scene or Scene.from_cell(solution.cell)
-        scene = scene_of_run(whole, [task.task.name for task in run.schedule.tasks])
+        scene = scene_of_run(run.scene, [task.task.name for task in run.schedule.tasks])
         scene = replace(scene, cell=stopping(scene.cell, cell))
         yield Case(scene.cell, scene, run.schedule, run.report.q)
 

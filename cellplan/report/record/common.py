@@ -10,7 +10,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Cell
-from cellplan.model.report.report import Check, Report
+from cellplan.model.report.report import Check
 from cellplan.model.settings.entry import Entry
 
 Number = float | None
@@ -85,11 +85,6 @@ def smallest(values: Array, times: Array) -> ExtremeRecord:
         return {"minimum": None, "at_s": None}
     index = int(np.argmin(values))
     return {"minimum": number(values[index]), "at_s": number(times[index])}
-
-
-def status(report: Report) -> str:
-    """``passed`` or ``failed``."""
-    return "passed" if report.passed else "failed"
 
 
 def origin_record(cell: Cell, provenance: Provenance) -> OriginRecord:

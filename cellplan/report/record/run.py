@@ -1,6 +1,7 @@
 """``report.json``: the record of a run in printed units (deg, mm, s), built from typed records."""
 
-from typing import Annotated, Final, Protocol
+from collections.abc import Sequence
+from typing import Annotated, Final, Protocol, TypedDict
 
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import CAUTION, Report
@@ -12,7 +13,6 @@ from cellplan.report.record.common import (
     check_record,
     number,
     origin_record,
-    status,
 )
 from cellplan.report.record.figures import FiguresRecord, figures_record
 from cellplan.report.record.phases import PhaseRecord, clock_from, idle_record, phases_record
@@ -62,8 +62,8 @@ from cellplan.report.record.sections.world_motion import (
 SCHEMA: Final = "cellplan.report/1"
 
 
-class HeadRecord(OriginRecord):
-    """What the record of a run and the record of several runs have in common."""
+class BeginRecord(TypedDict):
+    """Keys with which the record of a run and the record of several runs begin."""
 
     schema: Annotated[str, "`cellplan.report/1`, always the first key"]
     cell: Annotated[str, "name of the cell"]
@@ -75,6 +75,11 @@ class HeadRecord(OriginRecord):
         "what determines the duration: `motion.duration_s`; `step after motion.duration_s` if that is not a "
         "multiple of the step; `tasks` if the cell states no duration; `motion.timing` if the program is retimed",
     ]
+
+
+class HeadRecord(OriginRecord, BeginRecord):
+    """What the record of a run and the record of several runs have in common."""
+
     phases: Annotated[list[PhaseRecord], "phases of the whole program"]
     tasks: Annotated[dict[str, TaskRecord], "by task"]
     joints: Annotated[dict[str, dict[str, JointRecord]], "by robot and joint"]
@@ -126,16 +131,23 @@ class ReportedPhase(Protocol):
         """The cell as it is in the phase."""
 
 
+def begin_record(reports: Sequence[Report], cell: Cell) -> BeginRecord:
+    """The first keys of the record of one phase, or of several that follow one another."""
+    return {
+        "schema": SCHEMA,
+        "cell": cell.name,
+        "status": "passed" if all(report.passed for report in reports) else "failed",
+        "mode": reports[0].mode,
+        "cycle_time_s": number(sum(report.cycle_time for report in reports)),
+        "clock_from": clock_from(cell),
+    }
+
+
 def run_record(phase: ReportedPhase, *, provenance: Provenance, planning: PlanningFacts = NOT_PLANNED) -> RunRecord:
     """The record of one phase of a program, or of its only one."""
     report, cell = phase.report, phase.cell
     return {
-        "schema": SCHEMA,
-        "cell": report.cell,
-        "status": status(report),
-        "mode": report.mode,
-        "cycle_time_s": number(report.cycle_time),
-        "clock_from": clock_from(cell),
+        **begin_record([report], cell),
         "phase": report.phase,
         "samples": len(report.times),
         "step_s": number(report.cycle_time / (len(report.times) - 1)),

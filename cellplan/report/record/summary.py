@@ -15,8 +15,8 @@ from cellplan.report.record.common import (
     origin_record,
 )
 from cellplan.report.record.figures import Fold, figures_record
-from cellplan.report.record.phases import AT, clock_from, in_phase, missing_moves, phase_key, phases_record
-from cellplan.report.record.run import SCHEMA, HeadRecord, ReportedPhase, RunRecord, run_record
+from cellplan.report.record.phases import AT, in_phase, missing_moves, phase_key, phases_record
+from cellplan.report.record.run import HeadRecord, ReportedPhase, RunRecord, begin_record, run_record
 from cellplan.report.record.sections.accelerations import NotJudgedRecord
 from cellplan.report.record.sections.clearance import left_out_record
 from cellplan.report.record.sections.joints import with_worst_time
@@ -102,12 +102,7 @@ def _whole(
     worst = worst_of([in_phase(_merged(record, cell), name) for name, record in records.items()])
     rests_on = rests_on_record(cell, hardest_loads(reports), [tip for report in reports for tip in report.standoffs])
     return {
-        "schema": SCHEMA,
-        "cell": cell.name,
-        "status": "passed" if all(report.passed for report in reports) else "failed",
-        "mode": reports[0].mode,
-        "cycle_time_s": number(sum(report.cycle_time for report in reports)),
-        "clock_from": clock_from(cell),
+        **begin_record(reports, cell),
         "phases": phases_record(reports[0].phases),
         "runs": {name: in_phase(_run_entry(record, cell, folder=name), name) for name, record in records.items()},
         **least_skew_record(reports),

@@ -14,6 +14,7 @@ from jinja2 import DictLoader, Environment, StrictUndefined
 
 from cellplan.model.motion.plan import Phase, Work
 from cellplan.model.report.report import Check
+from cellplan.model.report.skew import AllowedSkew, PairSkew, SkewLimit, SkewReport
 from cellplan.model.robot.repeatability import JointDrift, Repeatability
 from cellplan.model.settings.motion import LockedJointEntry
 from cellplan.report.page import render
@@ -245,6 +246,18 @@ def test_overview_leads_to_the_report_of_every_run(pairwise_runs: Any) -> None:
     assert "3 of 82 checks failed" in page.text
     assert "rhombus : kuka/B5 and abb/A5 collide" in page.text
     assert "Cycle time 12 s 3 runs, one after another" in page.text
+
+
+def test_links_of_an_overview_lead_to_parts_of_it(pairwise_runs: Any) -> None:
+    limits = (AllowedSkew(limit=SkewLimit.CLEARANCE, skew=0.01, subject="kuka and abb", at_s=1.0),)
+    skew = SkewReport(pairs=(PairSkew(first="kuka", second="abb", limits=limits, stated=0.02),), tools=(), groups=())
+    runs = {name: replace(run, report=replace(run.report, skew=skew)) for name, run in pairwise_runs.items()}
+
+    page = Page(overview_of(runs))
+
+    assert page.wrong == []
+    assert "#skew" in page.links
+    assert {link[1:] for link in page.links if link.startswith("#")} <= set(page.ids)
 
 
 def test_same_run_gives_the_same_page(failed_run: Any, failed_page: str, pairwise_runs: Any) -> None:
