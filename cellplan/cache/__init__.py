@@ -1,6 +1,5 @@
 """Cache: results that take long to compute and depend on the bytes of their inputs alone."""
 
-from cellplan.cache.store import Key, keep, key_of, recall
-from cellplan.cache.use import as_here, without_cache
+from cellplan.cache.store import Key, as_here, keep, key_of, recall, without_cache
 
 __all__ = ["Key", "as_here", "keep", "key_of", "recall", "without_cache"]

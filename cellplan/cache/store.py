@@ -3,7 +3,7 @@
 An entry is never more than a saving of time. It is used only when it is a regular file of the user's own and whole, by
 a digest of its own; whatever is wrong with it, or with the folder, the work is done as if there were none. Nothing that
 was refused is kept, so a refused file is read and refused again. The digest detects accidents, not forgery: commands
-that prove something do without the folder (see ``use``).
+that prove something do without the folder (see ``without_cache``).
 """
 
 import hashlib
@@ -14,19 +14,19 @@ import stat
 import sys
 import tempfile
 from collections import OrderedDict
-from collections.abc import Sequence
-from contextlib import suppress
-from functools import cache
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cellplan.cache.use import is_cache_used
-
 Arrays = tuple[NDArray[np.generic], ...]
+Value = TypeVar("Value")
 FORMAT: Final = b"cellplan cache 1\n"
 DIGEST: Final = 32  # [bytes] of a SHA-256
 SUFFIX: Final = ".entry"
@@ -39,6 +39,8 @@ OPEN: Final = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", 
 VARIABLE: Final = "CELLPLAN_CACHE"  # a folder, or a word that turns the cache off
 OFF: Final = frozenset({"off", "0", "no", "false"})
 OTHERS_MAY_WRITE: Final = stat.S_IWGRP | stat.S_IWOTH
+
+_IS_USED: Final = ContextVar("_IS_USED", default=True)
 
 
 class Key(NamedTuple):
@@ -252,3 +254,34 @@ def _is_private(folder: Path) -> bool:
     if not hasattr(os, "getuid"):  # another system, with other rules
         return stat.S_ISDIR(status.st_mode)
     return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not status.st_mode & OTHERS_MAY_WRITE
+
+
+@contextmanager
+def without_cache() -> Iterator[None]:
+    """Neither read nor write the cache folder for as long as the ``with`` statement lasts.
+
+    What this process makes meanwhile, from the files themselves, is still made once only.
+    """
+    before = _IS_USED.set(False)
+    try:
+        yield
+    finally:
+        _IS_USED.reset(before)
+
+
+def is_cache_used() -> bool:
+    """Whether entries of the cache folder may be read and written."""
+    return _IS_USED.get()
+
+
+def as_here(function: Callable[..., Value]) -> Callable[..., Value]:
+    """The function as another process has to run it: with the cache used there as it is here."""
+    return partial(_run, is_cache_used(), function)
+
+
+def _run(is_used: bool, function: Callable[..., Value], *arguments: object) -> Value:
+    """Result of a function, with or without the cache folder."""
+    if is_used:
+        return function(*arguments)
+    with without_cache():
+        return function(*arguments)

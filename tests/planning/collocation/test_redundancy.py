@@ -169,7 +169,7 @@ def test_obstacles_are_kept_off_with_exact_tools() -> None:
 def test_robots_that_stand_and_joints_that_are_locked_are_not_moved() -> None:
     cell = replace(CELLS["plain"])
     name = cell.tasks[0].robot
-    locked = LockedJointEntry(robot=name, joint=cell.robot(name).model.joints[1].name, since=0.5)
+    locked = LockedJointEntry(robot=name, joint=cell.robot(name).model.joints[1].name, from_s=0.5)
     case = with_solver(triangles(replace(cell, motion=replace(cell.motion, locked=(locked,)))), *GOALS.values())
     path = case.path()
     later = path.at(np.linspace(0.5, path.end, 20))
