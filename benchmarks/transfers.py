@@ -28,6 +28,7 @@ from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.solver import SolverEntry
 from cellplan.planning.timing.retime import Retimer
 from cellplan.planning.transfer.plan import PlannedTransfer, plan_transfer
+from cellplan.planning.transfer.query import TransferQuery
 from cellplan.runs.plan.retiming import RowLimits, joint_bounds
 from cellplan.scene.scene import Scene
 
@@ -242,7 +243,9 @@ def outcome(case: Case, *, seed: int = 0) -> Outcome:
     """Plan a case and judge what is found by brute force."""
     begin, name = time.process_time(), case.scene.cell.robots[0].model.name
     try:
-        move = plan_transfer(case.scene, case.start, case.goal, retimer=retimer_of(case.scene), seed=seed)
+        move = plan_transfer(
+            TransferQuery.of(case.scene, case.start, case.goal, seed=seed), retimer=retimer_of(case.scene)
+        )
     except TransferNotFoundError as reason:
         return Outcome(model=name, seconds=time.process_time() - begin, move=None, reason=str(reason))
     seconds = time.process_time() - begin

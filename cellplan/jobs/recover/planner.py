@@ -16,6 +16,7 @@ from cellplan.model.progress import Progress
 from cellplan.planning.recovery.retract import find_retract
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows, timed_rows
 from cellplan.planning.transfer.plan import plan_transfer
+from cellplan.planning.transfer.query import TransferQuery
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.scene.scene import Scene
 
@@ -130,7 +131,8 @@ class RecoveryPlanner:
             columns = self._cell.columns(name)
             end[columns] = goal[columns]
         seed = self._cell.solver.seed
-        transfer = plan_transfer(self._scene, start, end, retimer=self._retimer, seed=seed, progress=self._progress)
+        query = TransferQuery.of(self._scene, start, end, seed=seed)
+        transfer = plan_transfer(query, retimer=self._retimer, progress=self._progress)
         how = {rung.words for rung in transfer.rungs.values()}
         words = f"{', '.join(robots)} to the end of the recovery ({', '.join(sorted(how))})"
         return [RecoveryPhase(kind=RecoveryKind.TRANSFER, robots=robots, words=words, q=transfer.q)]

@@ -18,19 +18,20 @@ ENDLESS: Final = np.pi  # [rad] by which a joint without limits may go beyond it
 class TransferQuery:
     """What is asked for."""
 
-    scene: Scene  # the scene of the phase
+    scene: Scene  # the scene of the phase: its pairs carry the demands that count in it
     start: Array  # stacked joint positions in [rad] or [m], shape (nq,)
     goal: Array  # likewise
     movers: tuple[str, ...]  # names of the robots that move, in the order of the cell
-    seed: int  # seed of what is drawn
+    seed: int  # seed of what is drawn; the same one gives the same rows
+    home: Array | None = None  # homes of all robots, shape (nq,); None where robots have none to back off to
 
     @classmethod
-    def of(cls, scene: Scene, start: Array, goal: Array, *, seed: int) -> "TransferQuery":
+    def of(cls, scene: Scene, start: Array, goal: Array, *, seed: int, home: Array | None = None) -> "TransferQuery":
         """Find out who moves."""
         cell = scene.cell
         differs = start != goal
         movers = tuple(robot.name for robot in cell.robots if np.any(differs[cell.columns(robot.name)]))
-        return cls(scene=scene, start=start, goal=goal, movers=movers, seed=seed)
+        return cls(scene=scene, start=start, goal=goal, movers=movers, seed=seed, home=home)
 
     def ends_of(self, robot: str) -> tuple[Array, Array]:
         """Start and goal of one robot in [rad] or [m], shape (n,) each."""

@@ -20,6 +20,7 @@ SHOWN: Final = 2  # pairs of bodies that are named
 class Tried:
     """What one way of planning tried in vain."""
 
+    legs: int = 0  # straight legs of several robots that were refused
     orders: int = 0  # orders of the robots
     searches: int = 0  # searches by trees that failed
     samples: int = 0  # configurations drawn in them

@@ -17,6 +17,19 @@ from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 
 NEAR: Final = 1.02  # [-] factor of time up to which the law is slowed as a whole; above, its top speed is lowered
 TRIES: Final = 60  # [-] until every limit holds in the rows
+LINE_ROWS: Final = 33  # rows of a straight move that is certified before it is retimed
+
+
+def straight_line(start: Array, goal: Array) -> Array:
+    """A straight move as it is certified before it is retimed, shape (LINE_ROWS, nq); both ends are exact.
+
+    Args:
+        start: Stacked joint positions in [rad] or [m], shape (nq,).
+        goal: Likewise.
+    """
+    line: Array = start + np.linspace(0.0, 1.0, LINE_ROWS)[:, None] * (goal - start)
+    line[-1] = goal
+    return line
 
 
 def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:

@@ -23,6 +23,7 @@ from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.planning.timing.schedule import TIME_DECIMALS, clock_paths
 from cellplan.planning.transfer.plan import plan_transfer
+from cellplan.planning.transfer.query import TransferQuery
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
 from cellplan.runs.plan.homes import depends_on_homes, find_homes, with_homes
 from cellplan.runs.plan.program_faults import (
@@ -222,7 +223,7 @@ def _joined(
             progress("planning transfer moves", number / len(stages))
             goal = standing(cell, stages[number + 1].phase, left[0].motion.q[0]) if left else home
             with named_transfer(stages, number):
-                made = _transferred(stage, scene, last, goal, progress)
+                made = _transferred(stage, scene, (last, goal), home, progress)
         yield made
         last = made.motion.q[-1]
 
@@ -242,14 +243,16 @@ def dwell_times(stage: Stage) -> Array:
     return times
 
 
-def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress: Progress) -> PlannedStage:
-    """The transfer moves of one stage.
+def _transferred(
+    stage: Stage, scene: Scene, ends: tuple[Array, Array], home: Array, progress: Progress
+) -> PlannedStage:
+    """The transfer moves of one stage, from one stacked configuration to another.
 
     Raises:
         InputError: Co-holders would have to move by themselves.
         BlockedTransferError: No way was found.
     """
-    cell = scene.cell
+    cell, (start, goal) = scene.cell, ends
     for name in cell.positioners if len(cell.positioners) > 1 else ():
         columns = cell.columns(name)
         if np.any(np.abs(goal[columns] - start[columns]) > CLOSED):
@@ -258,9 +261,8 @@ def _transferred(stage: Stage, scene: Scene, start: Array, goal: Array, progress
                 "the other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of "
                 "theirs"
             )
-    transfer = plan_transfer(
-        scene_of_run(scene, ()), start, goal, retimer=transfer_retimer(scene), seed=cell.solver.seed, progress=progress
-    )
+    query = TransferQuery.of(scene_of_run(scene, ()), start, goal, seed=cell.solver.seed, home=home)
+    transfer = plan_transfer(query, retimer=transfer_retimer(scene), progress=progress)
     return PlannedStage(
         stage=stage,
         scene=scene,

@@ -20,6 +20,7 @@ from cellplan.geometry.shapes import Box
 from cellplan.geometry.transforms import Array, pose
 from cellplan.planning.transfer.best_try import Try, best_try, blocked_try
 from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
+from cellplan.planning.transfer.query import TransferQuery
 from cellplan.scene.scene import Scene
 
 RADIUS, CLEARANCE = 0.1, 0.005  # [m]
@@ -36,7 +37,7 @@ def wall(name: str, size: tuple[float, float], at: tuple[float, float] = (0.0, 0
 
 
 def transfer(scene: Scene, start: list[float], goal: list[float], seed: int = 0) -> PlannedTransfer:
-    return plan_transfer(scene, np.array(start), np.array(goal), retimer=retimer_of(scene), seed=seed)
+    return plan_transfer(TransferQuery.of(scene, np.array(start), np.array(goal), seed=seed), retimer=retimer_of(scene))
 
 
 def densely(q: Array) -> Array:
@@ -88,12 +89,12 @@ def test_a_disc_goes_round_a_wall(rounded: tuple[Scene, PlannedTransfer]) -> Non
     assert_at_limits(scene, planned)
 
 
-def test_discs_whose_ways_cross_go_one_after_the_other() -> None:
+def test_discs_whose_ways_cross_go_in_two_legs() -> None:
     scene = scene_of(gantry("a"), gantry("b"), step=STEP)
 
     move = transfer(scene, [-0.5, 0.0, 0.0, -0.5], [0.5, 0.0, 0.0, 0.5])
 
-    assert move.rungs == {"a": Rung.IN_TURN, "b": Rung.IN_TURN}
+    assert move.rungs == {"a": Rung.IN_LEGS, "b": Rung.IN_LEGS}
     moves = np.diff(move.q, axis=0) != 0.0
     assert not np.any(moves[:, :2].any(axis=1) & moves[:, 2:].any(axis=1))
     q = densely(move.q)
@@ -107,7 +108,7 @@ def test_a_disc_that_blocks_the_goal_of_another_goes_first() -> None:
     move = transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, 0.4, 0.5])
 
     first = int(np.flatnonzero(move.q[:, 0] != -0.5)[0])
-    assert move.rungs["a"] in {Rung.STRAIGHT, Rung.IN_TURN}
+    assert move.rungs["a"] in {Rung.STRAIGHT, Rung.IN_LEGS}
     assert np.any(move.q[: first + 1, 2:] != [0.5, 0.0])
 
 
@@ -175,11 +176,8 @@ def test_a_search_is_left_by_ctrl_c() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         plan_transfer(
-            scene,
-            np.array([-0.5, 0.0]),
-            np.array([0.5, 0.0]),
+            TransferQuery.of(scene, np.array([-0.5, 0.0]), np.array([0.5, 0.0]), seed=0),
             retimer=retimer_of(scene),
-            seed=0,
             progress=interrupt,
         )
 

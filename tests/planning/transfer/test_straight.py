@@ -13,6 +13,7 @@ from cellplan.geometry.shapes import Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
+from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.straight_time import box_widths, shares
 from cellplan.scene.scene import Scene
 
@@ -28,7 +29,7 @@ def pair() -> tuple[Scene, PlannedTransfer]:
         arm("kuka", "kuka_kr6"), arm("abb", "abb_irb1600_8_145", pose((4.0, 0.0, 0.0))), things=(post,), step=0.001
     )
     start, goal = np.append(HOME, STAND), np.append(AWAY, STAND)
-    return scene, plan_transfer(scene, start, goal, retimer=retimer_of(scene), seed=0)
+    return scene, plan_transfer(TransferQuery.of(scene, start, goal, seed=0), retimer=retimer_of(scene))
 
 
 def differences(values: Array, step: float) -> Array:
@@ -97,7 +98,7 @@ def test_without_a_difference_nobody_moves(pair: tuple[Scene, PlannedTransfer]) 
     scene, _ = pair
     q = np.append(HOME, STAND)
 
-    move = plan_transfer(scene, q, q, retimer=retimer_of(scene), seed=0)
+    move = plan_transfer(TransferQuery.of(scene, q, q, seed=0), retimer=retimer_of(scene))
 
     assert move.rungs == {}
     assert np.array_equal(move.q, [q, q])
@@ -109,7 +110,7 @@ def test_the_limit_of_tool_speed_slows_a_straight_move(pair: tuple[Scene, Planne
     motion = replace(scene.cell.motion, step=0.01)
     slow = replace(scene, cell=replace(scene.cell, checks=checks, motion=motion))
 
-    move = plan_transfer(slow, fast.q[0], fast.q[-1], retimer=retimer_of(slow), seed=0)
+    move = plan_transfer(TransferQuery.of(slow, fast.q[0], fast.q[-1], seed=0), retimer=retimer_of(slow))
 
     tips = scene.chains["kuka"].tool_poses(move.q[:, :6])[:, :3, 3]
     speeds = np.linalg.norm(np.diff(tips, axis=0), axis=1) / motion.step
@@ -125,7 +126,7 @@ def test_an_end_that_is_too_close_is_refused_with_the_pair_and_the_distance() ->
     near = scene_of(arm("kuka", "kuka_kr6"), things=(replace(ball, X_WS=at),))
 
     with pytest.raises(TransferNotFoundError) as refused:
-        plan_transfer(near, HOME, AWAY, retimer=retimer_of(near), seed=0)
+        plan_transfer(TransferQuery.of(near, HOME, AWAY, seed=0), retimer=retimer_of(near))
 
     assert str(refused.value).endswith(
         "robots.kuka: the goal of the transfer move of 'kuka' comes too close: 'kuka/tool' is 3 mm from 'ball', "

@@ -1,0 +1,184 @@
+"""In legs: all robots straight in joint space, in up to three legs; only robots that are in each other's way wait.
+
+A leg is a straight move of some robots together, from rest to rest. A robot moves in one of the legs and stands in the
+others, or it backs off towards its home before the part turns and goes on afterwards. Of all such moves the fastest one
+that is free is taken.
+
+In a leg all joints share one law. Whether two bodies come too near in it therefore depends only on where the robots
+that carry them stand at its ends, not on how long it takes: a leg that is refused is refused in every move in which
+those robots go the same way.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.model.robot.robot import BASE
+from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
+from cellplan.planning.transfer.query import TransferQuery
+from cellplan.planning.transfer.reasons import Tried
+from cellplan.planning.transfer.straight_time import box_widths, straight_line
+from cellplan.scene.scene import Scene
+
+LEGS: Final = 3
+BACK: Final = (0.3, 0.6, 1.0)  # [-] shares of the way home that a robot backs off
+MOST_REFUSED: Final = 60  # legs that are refused before none is looked for any more
+MOST_COMBINATIONS: Final = 2_000_000  # of the ways of all robots that are compared
+START, GOAL = 0, 1  # places of a robot among those at which it may stand between two legs
+
+Ends = tuple[bytes, bytes]  # configurations of one robot at both ends of a leg
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RobotWays:
+    """Ways of one robot from its start to its goal."""
+
+    stops: Array  # configurations at which it may stand between legs in [rad] or [m], shape (P, n)
+    ways: Indices  # its place among them at both ends of every leg, shape (K, LEGS + 1)
+    steps: Indices  # whole steps that each leg takes it, zero where it stands, shape (K, LEGS)
+
+    @classmethod
+    def of(cls, stops: Array, bounds: JointLimitsInTime, step: float) -> "RobotWays":
+        """All ways over some stops.
+
+        Args:
+            stops: Start and goal, then pairs of places beside the start and beside the goal, shape (P, n).
+            bounds: Limits of its joints, shape (n,) each.
+            step: Time between two rows in [s].
+        """
+        direct = [[START] * (LEGS + 1 - moved) + [GOAL] * moved for moved in range(LEGS, 0, -1)]
+        back = [
+            way
+            for near_start, near_goal in zip(range(2, len(stops), 2), range(3, len(stops), 2), strict=True)
+            for way in (
+                [START, near_start, near_goal, GOAL],
+                [START, near_start, near_start, GOAL],
+                [START, near_start, GOAL, GOAL],
+                [START, START, near_goal, GOAL],
+            )
+        ]
+        ways = np.array(direct + back, dtype=np.intp)
+        between = np.array([[leg_steps(b - a, bounds, step) for b in stops] for a in stops], dtype=np.intp)
+        return cls(stops=stops, ways=ways, steps=between[ways[:, :-1], ways[:, 1:]])
+
+    def going(self, leg: int, ends: Ends) -> Flags:
+        """Which ways have given ends of a leg, shape (K,)."""
+        at = [stop.tobytes() for stop in self.stops]
+        return np.array([(at[way[leg]], at[way[leg + 1]]) == ends for way in self.ways.tolist()])
+
+
+def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]:
+    """Stacked configurations at the ends of the legs of the fastest free move, shape (nq,) each; none where none is.
+
+    Args:
+        query: Who moves from where to where.
+        retimer: The limits of all joints and the step of the rows.
+        tried: Receives the legs that were refused.
+    """
+    moved = sorted({row for name in query.movers for row in rows_moved_by(query.scene, name)})
+    scene, refused = scene_of_rows(query.scene, moved), list[Mapping[str, Ends]]()
+    blocked: set[str] = set()
+    free: set[bytes] = set()
+    while tried.legs < MOST_REFUSED:
+        ways = {name: _ways_of(query, name, retimer, backs_off=name in blocked) for name in query.movers}
+        if np.prod([float(len(it.ways)) for it in ways.values()]) > MOST_COMBINATIONS:
+            return []
+        ends = _fastest(query, ways, refused)
+        if ends is None:
+            return []
+        for a, b in pairwise(ends):
+            line = straight_line(a, b)
+            if (key := line[[0, -1]].tobytes()) in free:
+                continue
+            if (carriers := refusing_robots(scene, line, query.movers)) is not None:
+                tried.legs += 1
+                columns = {name: query.scene.cell.columns(name) for name in carriers}
+                refused.append({name: (a[at].tobytes(), b[at].tobytes()) for name, at in columns.items()})
+                blocked |= carriers
+                break
+            free.add(key)
+        else:
+            return ends
+    return []
+
+
+def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[str] | None:
+    """Robots that carry the bodies of a pair that comes too near along a line; None where none does.
+
+    Args:
+        line: Stacked joint positions in [rad] or [m], shape (N, nq).
+        movers: The robots that move, of which some are named.
+    """
+    bound = certify(scene, line, with_minimum=False)
+    if bound.is_met:
+        return None
+    at_fault = (pair.pair for pair in bound.pairs if pair.touches or pair.unproved or pair.distance < pair.demand)
+    carriers = [
+        {body.robot for body in (scene.bodies[pair.first], scene.bodies[pair.second]) if body.link != BASE}
+        for pair in at_fault
+    ]
+    named = [names for one in carriers if (names := {name for name in one if name in movers})]
+    return min(named, key=lambda names: (len(names), sorted(names)), default=set(movers))
+
+
+def leg_steps(move: Array, bounds: JointLimitsInTime, step: float) -> int:
+    """Whole steps of the fastest straight move from rest to rest of one robot; zero where it stands.
+
+    Args:
+        move: Changes of its joints in [rad] or [m], shape (n,).
+        bounds: Limits of its joints, shape (n,) each.
+        step: Time between two rows in [s].
+    """
+    return int(np.ceil(sum(box_widths(move, bounds, least=step)) / step)) if np.any(move) else 0
+
+
+def _ways_of(query: TransferQuery, name: str, retimer: Retimer, *, backs_off: bool) -> RobotWays:
+    """Ways of a robot; those that back off only where something was in its way, and no holder of the part."""
+    cell = query.scene.cell
+    columns, (start, goal) = cell.columns(name), query.ends_of(name)
+    stops = [start, goal]
+    if backs_off and query.home is not None and name not in cell.positioners:
+        home = query.home[columns]
+        stops += [end + share * (home - end) for share in BACK for end in (start, goal)]
+    limits = retimer.bounds
+    bounds = JointLimitsInTime(
+        velocity=limits.velocity[columns], acceleration=limits.acceleration[columns], jerk=limits.jerk[columns]
+    )
+    return RobotWays.of(np.array(stops), bounds, retimer.step)
+
+
+def _fastest(
+    query: TransferQuery, ways: Mapping[str, RobotWays], refused: list[Mapping[str, Ends]]
+) -> list[Array] | None:
+    """Stacked configurations at the ends of the legs of the fastest move that is not refused; None where all are."""
+    total = np.zeros([len(it.ways) for it in ways.values()])
+    for leg in range(LEGS):
+        longest = np.zeros(total.shape, dtype=np.intp)
+        for axis, robot in enumerate(ways.values()):
+            longest = np.maximum(longest, np.expand_dims(robot.steps[:, leg], _other_axes(axis, len(ways))))
+        total += longest
+    for ends in refused:
+        for leg in range(LEGS):
+            going = [ways[name].going(leg, ends[name]) if name in ends else np.array(True) for name in ways]
+            is_refused = np.array(True)
+            for axis, flags in enumerate(going):
+                is_refused = is_refused & (np.expand_dims(flags, _other_axes(axis, len(ways))) if flags.ndim else flags)
+            total[np.broadcast_to(is_refused, total.shape)] = np.inf
+    best = np.unravel_index(int(np.argmin(total)), total.shape)
+    if not np.isfinite(total[best]):
+        return None
+    stops = np.tile(query.start, (LEGS + 1, 1))
+    for (name, robot), choice in zip(ways.items(), best, strict=True):
+        stops[:, query.scene.cell.columns(name)] = robot.stops[robot.ways[choice]]
+    return [stops[0], *(q for before, q in pairwise(stops) if not np.array_equal(before, q))]
+
+
+def _other_axes(axis: int, count: int) -> tuple[int, ...]:
+    """All axes but one, to expand a vector along it."""
+    return tuple(other for other in range(count) if other != axis)
