@@ -19,7 +19,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array
 from cellplan.geometry.transforms import cross, rotation_about
-from cellplan.model.robot.robot import BASE, RobotModel
+from cellplan.model.robot.robot import RobotModel
 
 JOINTS: Final = 6
 BRANCHES: Final = 8
@@ -86,7 +86,7 @@ class SphericalWristArm:
         y = _across(p - o2, s2)
         u, t = _across(w - o3, s2), _across(o3 - o2, s2)
         q3 = _turns(t @ u, t @ cross(s3, u), 0.5 * ((y**2).sum(axis=-1) - t @ t - u @ u))
-        x = t + (rotation_about(s3, q3.ravel()).reshape(*q3.shape, 3, 3) @ u[:, None])[..., 0]
+        x = t + (_rotations(s3, q3) @ u[:, None])[..., 0]
         q2 = _turn(x, y[:, :, None], s2)
         return np.broadcast_to(q1[:, :, None, None], (*q3.shape, 1)), np.stack([q2, q3], axis=-1)
 
@@ -96,7 +96,7 @@ class SphericalWristArm:
         y = R @ s6
         along = (s6 @ s5) * s5
         q5 = _turns(s4 @ (s6 - along), s4 @ cross(s5, s6), y @ s4 - s4 @ along)
-        x = (rotation_about(s5, q5.ravel()).reshape(*q5.shape, 3, 3) @ s6[:, None])[..., 0]
+        x = (_rotations(s5, q5) @ s6[:, None])[..., 0]
         q4 = _turn(_across(x, s4), _across(y, s4)[..., None, :], s4)
         q45 = np.stack([q4, q5], axis=-1)
         R6 = np.swapaxes(self._rotation(q45, 3), -1, -2) @ R[..., None, :, :]
@@ -108,8 +108,13 @@ class SphericalWristArm:
         """Rotation by some joints from the first of them on, from q of shape (..., k) to shape (..., 3, 3)."""
         R = np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
         for k in range(q.shape[-1]):
-            R = R @ rotation_about(self.axes[first + k], q[..., k].ravel()).reshape(*q.shape[:-1], 3, 3)
+            R = R @ _rotations(self.axes[first + k], q[..., k])
         return R
+
+
+def _rotations(axis: Array, angles: Array) -> Array:
+    """Rotations about a unit axis, for angles of shape (...) in shape (..., 3, 3)."""
+    return rotation_about(axis, angles.ravel()).reshape(*angles.shape, 3, 3)
 
 
 def _turns(a: Array | float, b: Array | float, d: Array) -> Array:
