@@ -37,10 +37,8 @@ class SphericalWristArm:
     def of(cls, model: RobotModel) -> "SphericalWristArm | None":
         """The arm of a model; None where it is built otherwise."""
         joints = model.joints
-        is_chain = tuple(model.links_to_flange) == tuple(range(JOINTS)) and len(joints) == JOINTS
-        if not is_chain or not all(
-            joint.is_revolute and joint.parent in (k - 1, BASE) for k, joint in enumerate(joints)
-        ):
+        is_chain = list(model.links_to_flange) == list(range(JOINTS)) and len(joints) == JOINTS
+        if not is_chain or not all(joint.is_revolute for joint in joints):
             return None
         axes = np.array([joint.axis_B for joint in joints])
         points = np.array([joint.point_B for joint in joints])
