@@ -1,0 +1,1 @@
+"""Assignment: which robot does which task, in which block, at which pose of the part, and how."""

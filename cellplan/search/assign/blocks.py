@@ -1,0 +1,183 @@
+r"""The block model: which tasks begin together, by which robots and at which stations; for CP-SAT.
+
+Task i is done by robot r at station s where :math:`x_{irs} = 1`. A block is led by its longest task, and the others
+join it. The cycle is at least
+
+.. math:: \sum_{i \text{ leads}} (d_i + \tau) + \text{tour of the part}
+
+with the durations d and the least transfer :math:`\tau`. At each station the leaders last as long, and are as many, as
+the tasks of any clique, which makes the bound.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any, Final
+
+from cellplan.search.assign.cliques import cliques_at
+from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.schedule import BlockSchedule, Choice
+from cellplan.search.assign.solver import Solved, new_model
+
+HORIZON: Final = 10_000_000  # [steps] no cycle is longer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockAnswer:
+    """What the block model comes to."""
+
+    schedule: BlockSchedule | None  # None where none is found
+    bound: int  # [steps] no schedule of the instance has a shorter cycle, by the model
+    is_proved: bool  # whether none is better by the model
+
+
+def solve_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSchedule | None = None) -> BlockAnswer:
+    """The schedule with the shortest cycle by the model.
+
+    Args:
+        least: Steps that every transfer between two blocks takes at least.
+        effort: Work in units of deterministic time, about seconds of one processor.
+        hint: A schedule that is known.
+    """
+    model = _BlockModel(instance, least)
+    solved = Solved(model.model, effort, () if hint is None else model.hints(hint))
+    schedule = model.schedule(solved) if solved.is_solved else None
+    return BlockAnswer(schedule=schedule, bound=solved.bound, is_proved=solved.is_proved)
+
+
+class _BlockModel:
+    """The variables and rows of the model."""
+
+    def __init__(self, instance: Instance, least: int) -> None:
+        self.instance, self.model = instance, new_model()
+        tasks, options = instance.tasks, instance.options
+        self._order = {task: (instance.steps(task), task) for task in tasks}
+        self.does = {(task, *choice): self._flag() for task in tasks for choice in options[task]}
+        self._places: dict[tuple[str, int | str], list[Any]] = {}  # by task and station, and by task and robot
+        for (task, robot, at), it in self.does.items():
+            self._places.setdefault((task, at), []).append(it)
+            self._places.setdefault((task, robot), []).append(it)
+        self.leads = {(task, at): self._flag() for task in tasks for at in sorted({at for _, at in options[task]})}
+        self.joins = {
+            (task, leader): self._flag()
+            for task in tasks
+            for leader in tasks
+            if self._order[task] < self._order[leader] and self._stations(task) & self._stations(leader)
+        }
+        self._each_once()
+        self._together()
+        self._no_conflicts()
+        self._cliques()
+        cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
+        objective = self.model.new_int_var(0, HORIZON, "")
+        self.model.add(objective >= cost)
+        self.model.minimize(objective)
+
+    def schedule(self, solved: Solved) -> BlockSchedule:
+        """The blocks of an answer."""
+        chosen: dict[str, Choice] = {task: (robot, at) for task, robot, at in solved.true(self.does)}
+        blocks = {leader: [leader] for leader, _ in solved.true(self.leads)}
+        for task, leader in solved.true(self.joins):
+            blocks[leader].append(task)
+        return BlockSchedule(blocks=tuple(map(tuple, blocks.values())), chosen=chosen)
+
+    def hints(self, schedule: BlockSchedule) -> list[tuple[Any, bool]]:
+        """The values that a schedule has."""
+        leader = {task: max(block, key=self._order.__getitem__) for block in schedule.blocks for task in block}
+        chosen = schedule.chosen
+        hints = [(it, chosen[task] == (robot, at)) for (task, robot, at), it in self.does.items()]
+        hints += [(it, leader[task] == other) for (task, other), it in self.joins.items()]
+        return [
+            *hints,
+            *((it, leader[task] == task and chosen[task][1] == at) for (task, at), it in self.leads.items()),
+        ]
+
+    def _flag(self) -> Any:
+        return self.model.new_bool_var("")
+
+    def _stations(self, task: str) -> set[int]:
+        return {at for _, at in self.instance.options[task]}
+
+    def _at(self, task: str, station: int) -> Any:
+        """Whether a task is done at a station."""
+        return sum(self._places.get((task, station), ()))
+
+    def _by(self, task: str, robot: str) -> Any:
+        """Whether a task is done by a robot."""
+        return sum(self._places.get((task, robot), ()))
+
+    def _each_once(self) -> None:
+        """Every task is done once, and leads a block or joins one."""
+        for task in self.instance.tasks:
+            self.model.add_exactly_one(it for (name, _, _), it in self.does.items() if name == task)
+            leads = [it for (name, _), it in self.leads.items() if name == task]
+            self.model.add_exactly_one([*leads, *(it for (name, _), it in self.joins.items() if name == task)])
+        for (task, station), lead in self.leads.items():
+            self.model.add(lead <= self._at(task, station))
+
+    def _together(self) -> None:
+        """Tasks of a block are done at one station by different robots."""
+        model, robots = self.model, self.instance.robots
+        for (task, leader), join in self.joins.items():
+            for station in self._stations(task) | self._stations(leader):
+                model.add(self._at(task, station) == self._at(leader, station)).only_enforce_if(join)
+            model.add(sum(it for (name, _), it in self.leads.items() if name == leader) == 1).only_enforce_if(join)
+            for robot in robots:
+                model.add(self._by(task, robot) + self._by(leader, robot) <= 1).only_enforce_if(join)
+        for first, second, joins in self._joining_pairs():
+            for robot in robots:
+                model.add(self._by(first, robot) + self._by(second, robot) <= 1).only_enforce_if(*joins)
+
+    def _joining_pairs(self) -> list[tuple[str, str, tuple[Any, Any]]]:
+        """Two tasks that may join one leader, and the literals of both."""
+        by_leader: dict[str, list[str]] = {}
+        for task, leader in self.joins:
+            by_leader.setdefault(leader, []).append(task)
+        return [
+            (first, second, (self.joins[first, leader], self.joins[second, leader]))
+            for leader, tasks in by_leader.items()
+            for first, second in combinations(tasks, 2)
+        ]
+
+    def _no_conflicts(self) -> None:
+        """Two tasks with a conflict are not in one block."""
+        shared: dict[frozenset[str], list[tuple[Any, ...]]] = {}
+        for pair, join in self.joins.items():
+            shared.setdefault(frozenset(pair), []).append((join,))
+        for first, second, joins in self._joining_pairs():
+            shared.setdefault(frozenset((first, second)), []).append(joins)
+        for conflict in sorted(self.instance.conflicts, key=sorted):
+            keys = sorted(conflict)
+            if all(key in self.does for key in keys):
+                for joins in shared.get(frozenset(key[0] for key in keys), ()):
+                    self.model.add_bool_or(*(self.does[key].negated() for key in keys), *(it.negated() for it in joins))
+
+    def _cliques(self) -> None:
+        """The leaders at a station last at least as long, and are as many, as the tasks of any clique."""
+        steps = self.instance.steps
+        for station in self.instance.used:
+            leads = [(task, it) for (task, at), it in self.leads.items() if at == station]
+            alone = [[(task, robot)] for task, robot, at in self.does if at == station]
+            for clique in [*cliques_at(self.instance, station), *alone]:
+                done = [(task, self.does[task, robot, station]) for task, robot in clique]
+                self.model.add(
+                    sum(it * steps(task) for task, it in leads) >= sum(it * steps(task) for task, it in done)
+                )
+                self.model.add(sum(it for _, it in leads) >= sum(it for _, it in done))
+
+    def _tour(self, least: int) -> Any:
+        """Steps of the part from home over all stations in use and back, beyond the transfers that are counted."""
+        instance, used = self.instance, {station: self._flag() for station in self.instance.used}
+        for (_, _, station), it in self.does.items():
+            self.model.add_implication(it, used[station])
+        places: Sequence[int | None] = (None, *instance.used)
+        arcs, cost = [(place, place, used[at].negated()) for place, at in enumerate(places) if at is not None], []
+        for i, first in enumerate(places):
+            for j, second in enumerate(places):
+                if i != j:
+                    goes = self._flag()
+                    arcs.append((i, j, goes))
+                    counted = 0 if second is None else least  # one of the transfers of the blocks is that of the part
+                    cost.append(goes * max(instance.station_steps(first, second) - counted, 0))
+        self.model.add_circuit(arcs)
+        return sum(cost)

@@ -1,0 +1,135 @@
+"""Which modes are free of collisions by themselves, and which two cannot be at work at the same time.
+
+Both are looked at in few configurations with a reserve, as an assignment asks for many; what it chooses is certified
+when it is solved.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.scene.pairs import Rule
+from cellplan.scene.scene import Scene
+from cellplan.search.assign.goals import Stations
+from cellplan.search.assign.table import TaskMode
+
+LOOKED_AT: Final = 5  # configurations of a mode that are looked at, those before and after its path among them
+MET: Final = 4  # configurations of each of two modes that are combined
+RESERVE: Final = 0.007  # [m] beyond the demand, of bodies of different robots, the part and the surroundings
+WITHIN_ROBOT: Final = 0.0005  # [m] likewise of bodies of one robot, whose design often sets the distance
+FAR: Final = 0.75  # [m] points on the axes of two arms that are farther apart do not meet
+
+
+@dataclass(eq=False)
+class AssignmentClearance:
+    """Clearance of modes in one cell.
+
+    Attributes:
+        scene: The scene of the cell, with all tools at work.
+        home: Stacked homes of all robots in [rad] or [m], shape (nq,).
+        conflict: Distance in [m] that two robots at work are to keep.
+        asked: Numbers of modes, and of pairs of modes, that were looked at.
+    """
+
+    scene: Scene
+    home: Array
+    stations: Stations
+    conflict: float
+    asked: tuple[int, int] = (0, 0)
+
+    def stacked(self, modes: Mapping[str, Array], station: int) -> Array:
+        """Stacked configurations with some robots in configurations of shape (S, n) each and the others at home."""
+        cell, count = self.scene.cell, max(map(len, modes.values()), default=1)
+        q = np.tile(self.home, (count, 1))
+        if self.stations.holder is not None:
+            q[:, cell.columns(self.stations.holder)] = self.stations.q[station]
+        for name, positions in modes.items():
+            q[:, cell.columns(name)] = positions
+        return q
+
+    def is_open(self, station: int) -> bool:
+        """Whether the part and its holder touch nothing at a station while all operators are at home."""
+        return self._standing.touching(self.stacked({}, station)[0]) is None
+
+    def is_free(self, mode: TaskMode) -> bool:
+        """Whether a mode keeps its distance from all that stands, from the part and within its robot."""
+        self.asked = self.asked[0] + 1, self.asked[1]
+        scene, demands = self._alone[mode.robot]
+        rows = spread_rows(len(mode.q), LOOKED_AT)
+        near = scene.near(self.stacked({mode.robot: mode.q[rows]}, mode.station), float(demands.max(initial=0.0)))
+        return bool(np.all(near.distances >= demands[near.rows]))
+
+    def meet(self, first: TaskMode, second: TaskMode) -> bool:
+        """Whether two modes of different robots come too near each other at some combination of their samples."""
+        a, b = self._points(first), self._points(second)
+        apart = float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
+        if apart > FAR:
+            return False
+        self.asked = self.asked[0], self.asked[1] + 1
+        names = tuple(sorted((first.robot, second.robot)))
+        scene = self._between[names]
+        picked = {mode.robot: mode.q[spread_rows(len(mode.q), MET)] for mode in (first, second)}
+        q = {
+            first.robot: np.repeat(picked[first.robot], MET, axis=0),
+            second.robot: np.tile(picked[second.robot], (MET, 1)),
+        }
+        return len(scene.near(self.stacked(q, first.station), self.conflict).rows) > 0
+
+    def _points(self, mode: TaskMode) -> Array:
+        """Points on the axes of an arm and its tool tip while it follows a mode, in the world in [m], shape (P, 3)."""
+        chain = self.scene.chains[mode.robot]
+        q = mode.q[spread_rows(len(mode.q), MET)]
+        points = np.concatenate([chain.axis_points(q), chain.tool_poses(q)[:, None, :3, 3]], axis=1)
+        return np.concatenate([points, 0.5 * (points[:, 1:] + points[:, :-1])], axis=1).reshape(-1, 3)
+
+    @cached_property
+    def _moved(self) -> dict[str, set[int]]:
+        """Pairs that each robot moves."""
+        return {robot.name: set(rows_moved_by(self.scene, robot.name)) for robot in self.scene.cell.robots}
+
+    @cached_property
+    def _operators(self) -> list[str]:
+        """Robots that do not carry the part."""
+        return [robot.name for robot in self.scene.cell.robots if robot.name not in self.scene.cell.positioners]
+
+    @cached_property
+    def _standing(self) -> Scene:
+        """The scene without the pairs that operators move."""
+        moved = set().union(*(self._moved[name] for name in self._operators))
+        return scene_of_rows(self.scene, [row for row in range(len(self.scene.pairs)) if row not in moved])
+
+    @cached_property
+    def _alone(self) -> dict[str, tuple[Scene, Array]]:
+        """By operator, the scene of its pairs but those with other operators at work, and their demands in [m]."""
+        scenes = {}
+        for name in self._operators:
+            rows = sorted(self._moved[name])
+            demands = np.array([self._demand(row) for row in rows])
+            scenes[name] = scene_of_rows(self.scene, rows), demands
+        return scenes
+
+    @cached_property
+    def _between(self) -> dict[tuple[str, ...], Scene]:
+        """The pairs between two operators."""
+        return {
+            (a, b): scene_of_rows(self.scene, sorted(self._moved[a] & self._moved[b]))
+            for a, b in combinations(sorted(self._operators), 2)
+        }
+
+    def _demand(self, row: int) -> float:
+        """Distance in [m] that a pair is to keep with its reserve."""
+        pair = self.scene.pairs[row]
+        bodies = self.scene.bodies[pair.first], self.scene.bodies[pair.second]
+        reserve = WITHIN_ROBOT if bodies[0].robot == bodies[1].robot else RESERVE
+        return (pair.demand if pair.rule is Rule.CLEARANCE else 0.0) + reserve
+
+
+def spread_rows(count: int, looked_at: int) -> Indices:
+    """Rows spread evenly over some, both ends among them."""
+    return np.linspace(0, count - 1, looked_at).round().astype(np.intp)

@@ -1,0 +1,88 @@
+"""What an assignment chooses from: tasks with their tool poses, robots that may do them, and poses of the part."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.transforms import inverse
+from cellplan.model.cell.cell import Cell
+from cellplan.model.task.toolpath import Toolpath
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import clock_paths
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+SAMPLES: Final = 7  # [-] poses along a path; twice as many, less one, along a closed one
+STRAIGHT: Final = 1e-6  # [-] cosine of the angle between tool axis and path: below it the tool neither pushes nor drags
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TaskGoal:
+    """A task as an assignment sees it."""
+
+    name: str
+    robots: tuple[str, ...]  # that may do it, in the order of the cell
+    X_PT: Array  # tool poses at the end of the approach's way, along the path, and after the retraction, (S + 2, 4, 4)
+    steps: int  # whole steps from the begin of the approach to the end of the retraction
+    is_reversible: bool  # whether it may be done from its end to its begin with the same tool poses
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stations:
+    """Poses of the part at which tasks may be done."""
+
+    holder: str | None  # robot that brings the part there; None where it is fixed
+    q: Array  # configurations of the holder in [rad] or [m], shape (K, n); one without joints for a fixed part
+    X_WP: Array  # the part, shape (K, 4, 4)
+
+    @classmethod
+    def of(cls, cell: Cell, q: Array) -> "Stations":
+        """Stations of the first holder at some configurations, shape (K, n); the part where it is without a holder."""
+        if not cell.positioners:
+            X_WP = np.eye(4) if cell.part.X_WP is None else cell.part.X_WP
+            return cls(holder=None, q=np.zeros((1, 0)), X_WP=X_WP[None])
+        grasp = cell.part.held_by[0]
+        X_WT = ScrewChain(cell.robot(grasp.robot)).tool_poses(q)
+        return cls(holder=grasp.robot, q=q, X_WP=X_WT @ inverse(grasp.X_PT))
+
+
+def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal]:
+    """The tasks of a cell with their tool poses and durations.
+
+    Args:
+        robots: Names of the robots that may do a task, by its name; the task's own where it is absent.
+
+    Raises:
+        InputError: A path cannot be drawn or timed.
+    """
+    toolpaths = [build_toolpath(task, cell.part) for task in cell.tasks]
+    clocked = clock_paths(cell, toolpaths)
+    goals = []
+    for task, toolpath in zip(cell.tasks, toolpaths, strict=True):
+        on_path = toolpath.spread(2 * SAMPLES - 1 if toolpath.is_closed else SAMPLES)
+        ends = on_path[[0, -1]].copy()
+        for end, move in zip(ends, (task.approach, task.retract), strict=True):
+            end[:3, 3] -= (0.0 if move is None else move.distance) * end[:3, 2]
+        able = tuple(robot.name for robot in cell.robots if robot.name in robots.get(task.name, (task.robot,)))
+        goals.append(
+            TaskGoal(
+                name=task.name,
+                robots=able,
+                X_PT=np.concatenate([ends[:1], on_path, ends[1:]]),
+                steps=int(np.ceil(clocked[task.name].over / cell.motion.step - 1e-9)),
+                is_reversible=is_reversible(toolpath, on_path),
+            )
+        )
+    return goals
+
+
+def is_reversible(toolpath: Toolpath, on_path: Array) -> bool:
+    """Whether an open path has its tool across its direction everywhere, so that backwards is neither push nor drag."""
+    if toolpath.is_closed or toolpath.is_timed or toolpath.turn:
+        return False
+    steps = np.diff(on_path[:, :3, 3], axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    along = [(steps * on_path[rows, :3, 2]).sum(axis=1) for rows in (slice(None, -1), slice(1, None))]
+    return bool(np.all(np.abs(along) <= STRAIGHT * np.maximum(lengths, STRAIGHT)))

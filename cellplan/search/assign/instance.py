@@ -1,0 +1,185 @@
+"""The instance that a schedule is made for: few stations, the free modes at them, times in whole steps, conflicts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.planning.timing.retime import JointLimitsInTime
+from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.goals import Stations, TaskGoal
+from cellplan.search.assign.table import Key, ModeTable, TaskMode
+
+MOST_MODES: Final = 2  # free modes of one robot for one task at one station
+SECOND: Final = 0.25  # [-] worth of a further robot for a task that another one can do already, over their number
+WORTHLESS: Final = 0.05  # [-] share of the tasks: a station that is worth less is left out once all tasks are covered
+APART: Final = 0.3  # [rad, m] stations nearer than that to a chosen one are left out once all tasks are covered
+
+Conflict = frozenset[Key]  # two of task, robot and station that cannot be at work together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class End:
+    """One way to begin and end a task."""
+
+    mode: TaskMode
+    is_reversed: bool
+
+    @property
+    def begin(self) -> Array:
+        """Configuration in which the robot comes to the task in [rad] or [m], shape (n,)."""
+        return self.mode.q[-1 if self.is_reversed else 0]
+
+    @property
+    def end(self) -> Array:
+        """Configuration in which it leaves the task, shape (n,)."""
+        return self.mode.q[0 if self.is_reversed else -1]
+
+
+@dataclass(eq=False, kw_only=True)
+class Instance:
+    """What a schedule is made for."""
+
+    goals: Mapping[str, TaskGoal]  # by task
+    robots: tuple[str, ...]  # operators
+    modes: Mapping[Key, tuple[TaskMode, ...]]  # free ones, at the stations in use
+    stations: Stations
+    used: tuple[int, ...]  # stations in use
+    conflicts: frozenset[Conflict]
+    homes: Mapping[str, Array]  # configurations in [rad] or [m] by robot, the holder's among them, shape (n,) each
+    bounds: Mapping[str, JointLimitsInTime]  # limits of the joints by robot, likewise
+    step: float  # time between two rows in [s]
+
+    @cached_property
+    def tasks(self) -> tuple[str, ...]:
+        """Tasks that some robot can do at a station in use."""
+        able = {task for task, _, _ in self.modes}
+        return tuple(name for name in self.goals if name in able)
+
+    @cached_property
+    def options(self) -> dict[str, list[tuple[str, int]]]:
+        """Robots and stations of each task."""
+        return {
+            task: [(robot, at) for robot in self.robots for at in self.used if (task, robot, at) in self.modes]
+            for task in self.tasks
+        }
+
+    def steps(self, task: str) -> int:
+        """Whole steps of a task."""
+        return self.goals[task].steps
+
+    def ends(self, task: str, robot: str, station: int) -> list[End]:
+        """All modes in all directions."""
+        directions = (False, True) if self.goals[task].is_reversible else (False,)
+        return [End(mode=mode, is_reversed=it) for mode in self.modes[task, robot, station] for it in directions]
+
+    def transfer_steps(self, robot: str, first: Array, second: Array) -> Indices:
+        """Whole steps of straight moves from rest to rest, broadcast over configurations of shape (..., n)."""
+        return straight_steps(np.asarray(second) - np.asarray(first), self.bounds[robot], self.step)
+
+    def station_steps(self, first: int | None, second: int | None) -> int:
+        """Whole steps that the holder takes between two stations; None stands for its home."""
+        holder = self.stations.holder
+        if holder is None:
+            return 0
+        a, b = (self.homes[holder] if it is None else self.stations.q[it] for it in (first, second))
+        return int(self.transfer_steps(holder, a, b))
+
+
+def straight_steps(move: Array, bounds: JointLimitsInTime, step: float) -> Indices:
+    """Whole steps of the fastest straight moves from rest to rest, see ``planning.transfer.straight_time``.
+
+    Args:
+        move: Changes of the joints of one robot in [rad] or [m], shape (..., n).
+        bounds: Limits of its joints, shape (n,) each.
+        step: Time between two rows in [s].
+
+    Returns:
+        Shape (...); zero where nothing moves.
+    """
+    length = np.abs(move)
+    with np.errstate(divide="ignore"):
+        v, a, j = ((limit / length).min(axis=-1) for limit in (bounds.velocity, bounds.acceleration, bounds.jerk))
+    moves = length.max(axis=-1) > 0.0
+    v, a, j = (np.where(moves, it, 1.0) for it in (v, a, j))
+    third = np.maximum(step, np.where(np.isfinite(j), np.minimum(a / j, np.sqrt(v / j)), 0.0))
+    second = np.maximum(third, np.where(np.isfinite(a), v / a, 0.0))
+    first = 1.0 / v
+    short = first < second + third
+    half = np.maximum(third, 0.5 * (np.sqrt(third**2 + np.where(np.isfinite(a), 4.0 / a, 0.0)) - third))
+    is_jerky = short & np.isfinite(j) & (half <= third)
+    second = np.where(short, half, second)
+    third = np.where(is_jerky, np.maximum(step, np.cbrt(0.5 / j)), third)
+    second = np.where(is_jerky, third, second)
+    total = np.where(short, second + third, first) + second + third
+    return np.where(moves, np.ceil(total / step), 0.0).astype(np.intp)
+
+
+def choose_stations(
+    table: ModeTable, goals: Sequence[TaskGoal], clearance: AssignmentClearance, *, most: int
+) -> tuple[tuple[int, ...], dict[Key, tuple[TaskMode, ...]]]:
+    """Stations by greedy cover, with the free modes at them.
+
+    A station is worth most where tasks can be done that none of those chosen has a mode for, then where further robots
+    can do them.
+
+    Args:
+        most: Number of stations at most.
+    """
+    at_station: dict[int, list[Key]] = {}
+    for key in table.modes:
+        at_station.setdefault(key[2], []).append(key)
+    candidates = {station for station in sorted(at_station) if clearance.is_open(station)}
+    able: dict[str, int] = dict.fromkeys((goal.name for goal in goals), 0)
+    used, modes = list[int](), dict[Key, tuple[TaskMode, ...]]()
+    while candidates and len(used) < most:
+        worth = {station: _worth(at_station[station], able) for station in sorted(candidates)}
+        best = max(worth, key=lambda station: (worth[station], -station))
+        if worth[best] < WORTHLESS * len(goals) and all(able.values()):
+            break
+        candidates.discard(best)
+        here = {key: free for key in at_station[best] if (free := _free(table.modes[key], clearance))}
+        if here:
+            used.append(best)
+            modes |= here
+        for task, _, _ in here:
+            able[task] += 1
+        if all(able.values()):
+            q = clearance.stations.q
+            candidates = {it for it in candidates if np.abs(q[it] - q[best]).max() > APART}
+    return tuple(used), modes
+
+
+def _worth(keys: Sequence[Key], able: Mapping[str, int]) -> float:
+    """What the modes at a station add to robots that are able to do each task."""
+    robots: dict[str, int] = {}
+    for task, _, _ in keys:
+        robots[task] = robots.get(task, 0) + 1
+    worth = ((1.0 if able[task] == 0 else SECOND / (1 + able[task])) + 0.01 * count for task, count in robots.items())
+    return round(sum(worth), 6)
+
+
+def _free(modes: Sequence[TaskMode], clearance: AssignmentClearance) -> tuple[TaskMode, ...]:
+    """The first modes that are free of collisions."""
+    free: list[TaskMode] = []
+    for mode in modes:
+        if len(free) < MOST_MODES and clearance.is_free(mode):
+            free.append(mode)
+    return tuple(free)
+
+
+def find_conflicts(modes: Mapping[Key, Sequence[TaskMode]], clearance: AssignmentClearance) -> frozenset[Conflict]:
+    """Tasks of two robots at one station that come too near each other, by their best modes."""
+    at_station: dict[int, list[Key]] = {}
+    for key in modes:
+        at_station.setdefault(key[2], []).append(key)
+    return frozenset(
+        frozenset((first, second))
+        for keys in at_station.values()
+        for first, second in combinations(keys, 2)
+        if first[0] != second[0] and first[1] != second[1] and clearance.meet(modes[first][0], modes[second][0])
+    )

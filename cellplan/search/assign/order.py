@@ -1,0 +1,183 @@
+"""Order of the blocks, and the modes and directions of their tasks, with the exact times of straight transfers.
+
+For a given order the best modes of all robots are found by dynamic programming over the modes of a block: a transfer
+takes as long as its slowest robot, or the part. Transfers that are not free straight cost what they were found to take.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, permutations
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.search.assign.instance import End, Instance
+from cellplan.search.assign.schedule import BlockSchedule
+
+MOST_PERMUTED: Final = 7  # stations of which all tours are compared
+TOURS: Final = 4  # shortest ones that are tried
+ROUNDS: Final = 3  # of relocations of all blocks
+
+Layer = tuple[int | None, list[list[End | None]]]  # station, and the ends that each operator may choose
+Stop = tuple[int | None, tuple[End | None, ...]]  # station, and the end of each operator's task; None at home
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refusal:
+    """A transfer that is not free straight."""
+
+    before: Mapping[str, bytes]  # configurations that the robots at fault come from, by robot
+    after: Mapping[str, bytes]  # and go to
+    stations: tuple[int | None, int | None]
+    steps: int  # that it takes instead
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SequencedBlocks:
+    """Blocks in their order with a mode of every task."""
+
+    schedule: BlockSchedule
+    stops: tuple[Stop, ...]  # one for each block
+    steps: int  # from home to home
+
+
+@dataclass(eq=False)
+class Sequencer:
+    """Times of blocks in an order.
+
+    Attributes:
+        refusals: Transfers that are known not to be free straight.
+    """
+
+    instance: Instance
+    refusals: list[Refusal] = field(default_factory=list)
+
+    def sequenced(self, schedule: BlockSchedule) -> SequencedBlocks:
+        """The blocks in their order with the modes and directions that take least time."""
+        layers = [(None, self._at_home()), *self._layers(schedule), (None, self._at_home())]
+        cost, back = np.zeros([1] * len(self.instance.robots), dtype=np.int64), []
+        for before, after in pairwise(layers):
+            cost, came = self._step(cost, before, after)
+            back.append(came)
+        stops, place = list[Stop](), tuple([0] * len(self.instance.robots))
+        for came, (station, ends) in zip(reversed(back), reversed(layers[1:]), strict=True):
+            stops.append((station, tuple(choices[k] for choices, k in zip(ends, place, strict=True))))
+            shape = tuple(map(len, layers[len(back) - len(stops)][1]))
+            place = tuple(int(k) for k in np.unravel_index(came[place], shape))
+        work = schedule.work(self.instance)
+        return SequencedBlocks(schedule=schedule, stops=tuple(reversed(stops[1:])), steps=work + int(cost.ravel()[0]))
+
+    def ordered(self, schedule: BlockSchedule) -> SequencedBlocks:
+        """The best order found: stations in a short tour, blocks of a station relocated while that saves time."""
+        best = min((self.sequenced(tour) for tour in self._tours(schedule)), key=lambda it: it.steps)
+        for _ in range(ROUNDS):
+            before = best.steps
+            for first in range(len(schedule.blocks)):
+                for second in range(len(schedule.blocks)):
+                    trial = _relocated(best.schedule, first, second)
+                    if trial is not None and (it := self.sequenced(trial)).steps < best.steps:
+                        best = it
+            if best.steps == before:
+                break
+        return best
+
+    def _at_home(self) -> list[list[End | None]]:
+        return [[None] for _ in self.instance.robots]
+
+    def _layers(self, schedule: BlockSchedule) -> Iterator[Layer]:
+        """Station of each block, and the ends that each operator may have; None at home."""
+        for block in schedule.blocks:
+            at_work = {schedule.chosen[task][0]: task for task in block}
+            station = schedule.station_of(block)
+            ends: list[list[End | None]] = []
+            for robot in self.instance.robots:
+                task = at_work.get(robot)
+                ends.append([None] if task is None else [*self.instance.ends(task, robot, station)])
+            yield station, ends
+
+    def _step(self, cost: Indices, before: Layer, after: Layer) -> tuple[Indices, Indices]:
+        """Least steps up to every joint choice of a layer, and the choice before it, flattened."""
+        (first, starts), (second, goals) = before, after
+        shape, rows = tuple(map(len, goals)), cost.size
+        total = np.full((rows, *shape), self.instance.station_steps(first, second), dtype=np.int64)
+        places = np.unravel_index(np.arange(rows), cost.shape)
+        for axis, robot in enumerate(self.instance.robots):
+            a = np.array([self._leaving(robot, it) for it in starts[axis]])
+            b = np.array([self._coming(robot, it) for it in goals[axis]])
+            table = self.instance.transfer_steps(robot, a[:, None], b[None])
+            view = [1] * len(shape)
+            view[axis] = shape[axis]
+            total = np.maximum(total, table[places[axis]].reshape(rows, *view))
+        for refusal in self.refusals:
+            if refusal.stations == (first, second):
+                self._refuse(total, places, refusal, starts, goals)
+        total += cost.reshape(rows, *([1] * len(shape)))
+        came = np.argmin(total, axis=0)
+        return np.min(total, axis=0), came
+
+    def _refuse(
+        self,
+        total: Indices,
+        places: Sequence[Indices],
+        refusal: Refusal,
+        starts: Sequence[Sequence[End | None]],
+        goals: Sequence[Sequence[End | None]],
+    ) -> None:
+        """Raise the steps of transfers that are refused, in place."""
+        rows, columns = np.ones(len(total), dtype=bool), np.ones(total.shape[1:], dtype=bool)
+        for axis, robot in enumerate(self.instance.robots):
+            if robot not in refusal.before:
+                continue
+            leaves = np.array([self._leaving(robot, it).tobytes() == refusal.before[robot] for it in starts[axis]])
+            comes = np.array([self._coming(robot, it).tobytes() == refusal.after[robot] for it in goals[axis]])
+            rows &= leaves[places[axis]]
+            view = [1] * columns.ndim
+            view[axis] = len(comes)
+            columns &= comes.reshape(view)
+        is_refused: Flags = rows.reshape(-1, *([1] * columns.ndim)) & columns
+        total[is_refused] = np.maximum(total[is_refused], refusal.steps)
+
+    def _leaving(self, robot: str, end: End | None) -> Array:
+        return self.instance.homes[robot] if end is None else end.end
+
+    def _coming(self, robot: str, end: End | None) -> Array:
+        return self.instance.homes[robot] if end is None else end.begin
+
+    def _tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
+        """The blocks with their stations in the shortest tours."""
+        stations = list(dict.fromkeys(schedule.station_of(block) for block in schedule.blocks))
+        if len(stations) > MOST_PERMUTED:
+            orders = [self._nearest_first(stations)]
+        else:
+            orders = sorted(permutations(stations), key=lambda order: (self._length(order), order))[:TOURS]
+        return [
+            BlockSchedule(
+                blocks=tuple(block for at in order for block in schedule.blocks if schedule.station_of(block) == at),
+                chosen=schedule.chosen,
+            )
+            for order in orders
+        ]
+
+    def _length(self, order: Sequence[int]) -> int:
+        """Steps of the part over stations in an order, from home and back."""
+        places = [None, *order, None]
+        return sum(self.instance.station_steps(a, b) for a, b in pairwise(places))
+
+    def _nearest_first(self, stations: Sequence[int]) -> tuple[int, ...]:
+        """Stations, each the nearest to the one before."""
+        order, left = list[int](), set(stations)
+        while left:
+            last = order[-1] if order else None
+            order.append(min(left, key=lambda it: (self.instance.station_steps(last, it), it)))
+            left.discard(order[-1])
+        return tuple(order)
+
+
+def _relocated(schedule: BlockSchedule, first: int, second: int) -> BlockSchedule | None:
+    """The schedule with a block at another place among those of its station; None where that is none."""
+    blocks = list(schedule.blocks)
+    if first == second or schedule.station_of(blocks[first]) != schedule.station_of(blocks[second]):
+        return None
+    blocks.insert(second, blocks.pop(first))
+    return BlockSchedule(blocks=tuple(blocks), chosen=schedule.chosen)

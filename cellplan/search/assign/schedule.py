@@ -1,0 +1,44 @@
+"""Schedules in blocks: which tasks begin together, by which robots and at which station."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from cellplan.search.assign.instance import Instance
+
+Choice = tuple[str, int]  # robot and station of a task
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockSchedule:
+    """Blocks of tasks that begin together; the next one begins when all of them are done and all robots rest."""
+
+    blocks: tuple[tuple[str, ...], ...]  # tasks, in the order of the blocks
+    chosen: Mapping[str, Choice]  # by task
+
+    def station_of(self, block: Sequence[str]) -> int:
+        """The station at which a block is done."""
+        return self.chosen[block[0]][1]
+
+    def work(self, instance: Instance) -> int:
+        """Whole steps of all blocks, without what lies between them."""
+        return sum(max(instance.steps(task) for task in block) for block in self.blocks)
+
+
+def refuse_impossible(instance: Instance, schedule: BlockSchedule) -> None:
+    """Refuse a schedule that is not one of an instance.
+
+    Raises:
+        ValueError: With what is wrong with it.
+    """
+    done = [task for block in schedule.blocks for task in block]
+    if sorted(done) != sorted(instance.tasks):
+        raise ValueError(f"expected every task once, got {done}")
+    for block in schedule.blocks:
+        robots = [schedule.chosen[task][0] for task in block]
+        if len(set(robots)) < len(robots) or len({schedule.chosen[task][1] for task in block}) > 1:
+            raise ValueError(f"expected different robots at one station, got {block}")
+        keys = [(task, *schedule.chosen[task]) for task in block]
+        if any(key not in instance.modes for key in keys):
+            raise ValueError(f"expected tasks with modes, got {block}")
+        if any(frozenset((a, b)) in instance.conflicts for a in keys for b in keys):
+            raise ValueError(f"expected no conflict, got {block}")

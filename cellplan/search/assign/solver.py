@@ -1,0 +1,65 @@
+"""The one door to OR-Tools, the extra ``assign``: models of truth values that end by counts, not by the clock."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from cellplan.errors import InputError
+
+WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
+ROUNDING: Final = 1e-6  # [steps] of a bound
+MISSING: Final = "expected OR-Tools, which is not installed: pip install 'cellplan[assign]'"
+
+
+def new_model() -> Any:
+    """An empty model.
+
+    Raises:
+        InputError: OR-Tools is not installed.
+    """
+    return _cp_model().CpModel()
+
+
+class Solved:
+    """The best answer of a model that was found, and what is proved of all others."""
+
+    def __init__(self, model: Any, effort: float, hints: Sequence[tuple[Any, bool]] = ()) -> None:
+        """Solve a model.
+
+        Args:
+            effort: Work in units of deterministic time, about seconds of one processor.
+            hints: Values of an answer that is known.
+        """
+        cp_model = _cp_model()
+        for literal, value in hints:
+            model.add_hint(literal, value)
+        self._solver = cp_model.CpSolver()
+        parameters = self._solver.parameters
+        parameters.num_workers, parameters.interleave_search, parameters.random_seed = WORKERS, True, 1
+        parameters.max_deterministic_time = effort
+        status = self._solver.solve(model)
+        self.is_solved = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
+        self.is_proved = status == cp_model.OPTIMAL
+
+    @property
+    def objective(self) -> int:
+        """The objective of the answer."""
+        return round(self._solver.objective_value)
+
+    @property
+    def bound(self) -> int:
+        """No answer has a smaller objective."""
+        bound = self._solver.best_objective_bound - ROUNDING
+        return int(bound) + (bound > int(bound))
+
+    def true(self, literals: Mapping[Any, Any]) -> list[Any]:
+        """Keys of the literals that are true."""
+        return [key for key, literal in literals.items() if self._solver.value(literal)]
+
+
+def _cp_model() -> Any:
+    """The module of OR-Tools."""
+    try:
+        from ortools.sat.python import cp_model
+    except ImportError:
+        raise InputError(MISSING) from None
+    return cp_model

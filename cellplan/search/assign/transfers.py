@@ -1,0 +1,109 @@
+"""Transfers between blocks, certified straight; those that are refused cost what the move in legs takes instead."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.certify import certify
+from cellplan.certify.run_pairs import scene_of_run
+from cellplan.geometry.arrays import Array
+from cellplan.planning.timing.retime import Retimer
+from cellplan.planning.transfer.in_legs import leg_steps, legs_of, refusing_robots
+from cellplan.planning.transfer.query import TransferQuery
+from cellplan.planning.transfer.reasons import Tried
+from cellplan.planning.transfer.straight_time import straight_line
+from cellplan.scene.scene import Scene
+from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
+from cellplan.search.assign.schedule import BlockSchedule
+
+MOST_SETTLED: Final = 60  # choices of modes until no transfer of the best one is newly refused
+
+
+@dataclass(eq=False)
+class TransferCertifier:
+    """Certificates of straight transfers, each asked once.
+
+    Attributes:
+        scene: The scene of the cell.
+        home: Stacked homes of all robots in [rad] or [m], shape (nq,).
+        retimer: The limits of all joints and the step of the rows.
+        asked: Number of transfers that were certified.
+    """
+
+    scene: Scene
+    home: Array
+    retimer: Retimer
+    asked: int = 0
+    _known: set[bytes] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """In transfers no tool is at work."""
+        self.scene = scene_of_run(self.scene, ())
+
+    def settle(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
+        """The best modes for an order of blocks in which no transfer is refused any more."""
+        for _ in range(MOST_SETTLED):
+            best = sequencer.sequenced(schedule)
+            refusals = self.refusals(sequencer, best)
+            if not refusals:
+                return best
+            sequencer.refusals += refusals
+        return sequencer.sequenced(schedule)
+
+    def refusals(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
+        """Transfers of a sequence that are not free straight and were not known to be."""
+        resting: Stop = (None, (None,) * len(sequencer.instance.robots))
+        found = []
+        for before, after in pairwise((resting, *sequenced.stops, resting)):
+            start, goal = self._stacked(sequencer, before, leaves=True), self._stacked(sequencer, after, leaves=False)
+            if (key := np.concatenate([start, goal]).tobytes()) in self._known:
+                continue
+            self._known.add(key)
+            refusal = self._refusal(sequencer, (start, goal), (before[0], after[0]))
+            found += [] if refusal is None else [refusal]
+        return found
+
+    def _refusal(
+        self, sequencer: Sequencer, ends: tuple[Array, Array], stations: tuple[int | None, int | None]
+    ) -> Refusal | None:
+        """The refusal of a transfer; None where it is free straight."""
+        start, goal = ends
+        query = TransferQuery.of(self.scene, start, goal, seed=0, home=self.home)
+        self.asked += 1
+        line = straight_line(start, goal)
+        if not query.movers or certify(self.scene, line, with_minimum=False).is_met:
+            return None
+        carriers = refusing_robots(self.scene, line, query.movers) or set(query.movers)
+        columns = {name: self.scene.cell.columns(name) for name in sequencer.instance.robots if name in carriers}
+        legs = legs_of(query, self.retimer, Tried())
+        return Refusal(
+            before={name: start[at].tobytes() for name, at in columns.items()},
+            after={name: goal[at].tobytes() for name, at in columns.items()},
+            stations=stations,
+            steps=self._steps_of(legs) if legs else self._one_by_one(query),
+        )
+
+    def _steps_of(self, ends: list[Array]) -> int:
+        """Steps of straight legs of all robots."""
+        return sum(leg_steps(b - a, self.retimer.bounds, self.retimer.step) for a, b in pairwise(ends))
+
+    def _one_by_one(self, query: TransferQuery) -> int:
+        """Steps of all robots straight, one after the other."""
+        moves = [np.zeros_like(query.start) for _ in query.movers]
+        for move, name in zip(moves, query.movers, strict=True):
+            at = self.scene.cell.columns(name)
+            move[at] = query.goal[at] - query.start[at]
+        return sum(leg_steps(move, self.retimer.bounds, self.retimer.step) for move in moves)
+
+    def _stacked(self, sequencer: Sequencer, stop: Stop, *, leaves: bool) -> Array:
+        """Stacked configuration in which all robots leave a stop, or come to it, shape (nq,)."""
+        (station, ends), q, cell = stop, self.home.copy(), self.scene.cell
+        holder = sequencer.instance.stations.holder
+        if station is not None and holder is not None:
+            q[cell.columns(holder)] = sequencer.instance.stations.q[station]
+        for robot, end in zip(sequencer.instance.robots, ends, strict=True):
+            if end is not None:
+                q[cell.columns(robot)] = end.end if leaves else end.begin
+        return q
