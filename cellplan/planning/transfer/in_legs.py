@@ -1,18 +1,18 @@
 """In legs: all robots straight in joint space, in up to three legs; only robots that are in each other's way wait.
 
 A leg is a straight move of some robots together, from rest to rest. A robot moves in one of the legs and stands in the
-others, or it backs off towards its home before the part turns and goes on afterwards. Of all such moves the fastest one
-that is free is taken.
+others, or it backs off towards its home before the part turns and goes on afterwards; a positioner may also go joint by
+joint. Of all such moves the fastest one that is free is taken.
 
 In a leg all joints share one law. Whether two bodies come too near in it therefore depends only on where the robots
 that carry them stand at its ends, not on how long it takes: a leg that is refused is refused in every move in which
 those robots go the same way.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
@@ -30,6 +30,7 @@ LEGS: Final = 3
 BACK: Final = (0.3, 0.6, 1.0)  # [-] shares of the way home that a robot backs off
 MOST_REFUSED: Final = 60  # legs that are refused before none is looked for any more
 MOST_COMBINATIONS: Final = 2_000_000  # of the ways of all robots that are compared
+CORNERED: Final = 2  # joints of a positioner that goes joint by joint
 START, GOAL = 0, 1  # places of a robot among those at which it may stand between two legs
 
 Ends = tuple[bytes, bytes]  # configurations of one robot at both ends of a leg
@@ -44,28 +45,20 @@ class RobotWays:
     steps: Indices  # whole steps that each leg takes it, zero where it stands, shape (K, LEGS)
 
     @classmethod
-    def of(cls, stops: Array, bounds: JointLimitsInTime, step: float) -> "RobotWays":
-        """All ways over some stops.
+    def over(
+        cls, stops: Sequence[Array], ways: Sequence[Sequence[int]], limits: JointLimitsInTime, step: float
+    ) -> Self:
+        """Ways over some stops.
 
         Args:
-            stops: Start and goal, then pairs of places beside the start and beside the goal, shape (P, n).
-            bounds: Limits of its joints, shape (n,) each.
+            stops: Configurations in [rad] or [m], shape (n,) each.
+            ways: Places among them at both ends of every leg.
+            limits: Limits of the joints, shape (n,) each.
             step: Time between two rows in [s].
         """
-        direct = [[START] * (LEGS + 1 - moved) + [GOAL] * moved for moved in range(LEGS, 0, -1)]
-        back = [
-            way
-            for near_start, near_goal in zip(range(2, len(stops), 2), range(3, len(stops), 2), strict=True)
-            for way in (
-                [START, near_start, near_goal, GOAL],
-                [START, near_start, near_start, GOAL],
-                [START, near_start, GOAL, GOAL],
-                [START, START, near_goal, GOAL],
-            )
-        ]
-        ways = np.array(direct + back, dtype=np.intp)
-        between = np.array([[leg_steps(b - a, bounds, step) for b in stops] for a in stops], dtype=np.intp)
-        return cls(stops=stops, ways=ways, steps=between[ways[:, :-1], ways[:, 1:]])
+        between = np.array([[leg_steps(b - a, limits, step) for b in stops] for a in stops], dtype=np.intp)
+        places = np.array(ways, dtype=np.intp)
+        return cls(stops=np.array(stops), ways=places, steps=between[places[:, :-1], places[:, 1:]])
 
     def going(self, leg: int, ends: Ends) -> Flags:
         """Which ways have given ends of a leg, shape (K,)."""
@@ -86,7 +79,7 @@ def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]
     blocked: set[str] = set()
     free: set[bytes] = set()
     while tried.legs < MOST_REFUSED:
-        ways = {name: _ways_of(query, name, retimer, backs_off=name in blocked) for name in query.movers}
+        ways = {name: _ways_of(query, name, retimer, is_blocked=name in blocked) for name in query.movers}
         if np.prod([float(len(it.ways)) for it in ways.values()]) > MOST_COMBINATIONS:
             return []
         ends = _fastest(query, ways, refused)
@@ -138,19 +131,35 @@ def leg_steps(move: Array, bounds: JointLimitsInTime, step: float) -> int:
     return int(np.ceil(sum(box_widths(move, bounds, least=step)) / step)) if np.any(move) else 0
 
 
-def _ways_of(query: TransferQuery, name: str, retimer: Retimer, *, backs_off: bool) -> RobotWays:
-    """Ways of a robot; those that back off only where something was in its way, and no holder of the part."""
-    cell = query.scene.cell
-    columns, (start, goal) = cell.columns(name), query.ends_of(name)
-    stops = [start, goal]
-    if backs_off and query.home is not None and name not in cell.positioners:
-        home = query.home[columns]
-        stops += [end + share * (home - end) for share in BACK for end in (start, goal)]
+def _ways_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotWays:
+    """Ways of a robot: in one of the legs, and where something was in its way over other places too."""
+    cell, columns = query.scene.cell, query.scene.cell.columns(name)
+    stops = list(query.ends_of(name))
+    ways = [[START] * (LEGS + 1 - moved) + [GOAL] * moved for moved in range(LEGS, 0, -1)]
+    home = None if query.home is None else query.home[columns]
+    if is_blocked and name in cell.positioners:
+        for corner in _corners(stops[START], stops[GOAL], home):
+            via = len(stops)
+            stops.append(corner)
+            ways += [[START, via, GOAL, GOAL], [START, via, via, GOAL], [START, START, via, GOAL]]
+    elif is_blocked and home is not None:
+        for share in BACK:
+            a, b = len(stops), len(stops) + 1  # off the start, and off the goal
+            stops += [end + share * (home - end) for end in stops[:2]]
+            ways += [[START, a, b, GOAL], [START, a, a, GOAL], [START, a, GOAL, GOAL], [START, START, b, GOAL]]
     limits = retimer.bounds
-    bounds = JointLimitsInTime(
+    of_robot = JointLimitsInTime(
         velocity=limits.velocity[columns], acceleration=limits.acceleration[columns], jerk=limits.jerk[columns]
     )
-    return RobotWays.of(np.array(stops), bounds, retimer.step)
+    return RobotWays.over(stops, ways, of_robot, retimer.step)
+
+
+def _corners(start: Array, goal: Array, home: Array | None) -> list[Array]:
+    """Places over which a holder goes where it cannot go straight: joint by joint in either order, and its home."""
+    places = [] if home is None else [home]
+    if len(start) == CORNERED:
+        places += [np.array([goal[0], start[1]]), np.array([start[0], goal[1]])]
+    return [place for place in places if np.any(place != start) and np.any(place != goal)]
 
 
 def _fastest(
