@@ -74,11 +74,11 @@ def reached_by_rows(
             break
         at = at[going_on]
         J = rows @ tip_jacobian(screws_W[going_on], X_WT[going_on, :3, 3], X_PW[at, :3, :3])
-        q = q[going_on] + _damped_move(J, error[going_on])
+        q = q[going_on] + damped_move(J, error[going_on])
     return np.concatenate(arrived), np.concatenate(places)
 
 
-def _damped_move(J: Array, error: Array) -> Array:
+def damped_move(J: Array, error: Array) -> Array:
     """Damped Newton moves, shape (B, n), none of their joints by more than ``LONGEST_MOVE``."""
     J_T = np.swapaxes(J, 1, 2)
     normal = J @ J_T + DAMPING**2 * np.eye(J.shape[1])

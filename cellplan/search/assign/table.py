@@ -13,16 +13,19 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.geometry.transforms import inverse, rotation_about
+from cellplan.geometry.transforms import inverse, rotation_about, rotation_vector
 from cellplan.model.cell.cell import Cell, Robot
-from cellplan.model.robot.robot import RobotModel
+from cellplan.model.seeds import generator
+from cellplan.planning.start.inverse_kinematics import damped_move, on_nearest_turns, random_configurations
 from cellplan.scene.kinematics.screw_chain import ScrewChain
-from cellplan.scene.kinematics.spherical_wrist import BRANCHES, SphericalWristArm
+from cellplan.scene.kinematics.spherical_wrist import SphericalWristArm
 from cellplan.search.assign.goals import Stations, TaskGoal
 
 MARGIN: Final = float(np.radians(4.0))  # [rad] that modes stay away from joint limits
 LONGEST_MOVE: Final = 0.9  # [rad] of a joint between two poses of a mode: more is another branch, or a singular place
-NEWTON_STEPS: Final = 2  # that take rounding in robot files out of the closed form
+FOLLOWING: Final = 4  # Newton moves from one pose of a mode to the next
+SEARCHING: Final = 30  # likewise from a seed
+SEEDS: Final = 24  # configurations that branches are searched from where there is no closed form
 ARRIVED: Final = 1e-6  # [m, rad] errors of a mode's poses
 ALIKE: Final = 0.15  # [rad] modes that begin nearer to each other count as one
 MOST_MODES: Final = 6  # of one robot for one task at one station
@@ -126,103 +129,77 @@ class FollowedBranches:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BranchFollower:
-    """Branches of one arm along tool poses."""
+    """Branches of one arm along tool poses: in closed form where its wrist allows it, else from many starts."""
 
     robot: Robot
     chain: ScrewChain
-    arm: SphericalWristArm
+    arm: SphericalWristArm | None
+    seeds: Array  # configurations that a search for branches starts from, shape (B, n)
 
     @classmethod
     def of(cls, robot: Robot) -> "BranchFollower":
-        """The branches of a robot.
-
-        Raises:
-            ValueError: The robot has no spherical wrist.
-        """
-        arm = SphericalWristArm.of(robot.model)
-        if arm is None:
-            raise ValueError(f"'{robot.name}' has no spherical wrist")
-        return cls(robot=robot, chain=ScrewChain(robot), arm=arm)
+        """The branches of a robot."""
+        model = robot.model
+        seeds = random_configurations(model, SEEDS, generator(f"modes of {robot.name}", 0))
+        return cls(robot=robot, chain=ScrewChain(robot), arm=SphericalWristArm.of(model), seeds=seeds)
 
     def follow(self, X_WT: Array) -> FollowedBranches:
         """All branches that can be followed along tool poses, shape (N, S, 4, 4)."""
-        robot, model = self.robot, self.robot.model
-        to_link = inverse(model.X_BF @ robot.tool.X_FT)
-        D = inverse(robot.X_WB) @ X_WT @ to_link
-        first = self.arm.configurations(D[:, 0])
-        reaches = ~np.isnan(first[..., 0])
-        first = within_range(model, first)
-        within = reaches & self._is_inside(first) & self._faces(first, D[:, 0])
-        rows, branches = np.nonzero(within)
-        inner = self.arm.configurations(D[rows, 1:].reshape(-1, 4, 4)) if len(rows) else np.zeros((0, BRANCHES, 6))
+        model, count = self.robot.model, len(X_WT)
+        rows, q = self._searched(X_WT[:, 0]) if self.arm is None else self._in_closed_form(self.arm, X_WT[:, 0])
+        reaches = np.bincount(rows, minlength=count) > 0
+        q = on_nearest_turns(model, q)
+        inside = np.all((q >= model.lower + MARGIN) & (q <= model.upper - MARGIN), axis=1)
+        rows, q = rows[inside], q[inside]
         path = np.empty((len(rows), X_WT.shape[1], len(model.joints)))
-        path[:, 0] = first[rows, branches]
-        for sample, q in enumerate(np.moveaxis(inner.reshape(len(rows), X_WT.shape[1] - 1, BRANCHES, -1), 1, 0), 1):
-            path[:, sample] = _nearest(path[:, sample - 1], q)
-        moves = np.abs(np.diff(path, axis=1)).max(axis=(1, 2), initial=0.0)
-        margins = np.minimum(path - model.lower, model.upper - path).min(axis=(1, 2))
-        good = (moves < LONGEST_MOVE) & (margins >= MARGIN)
-        path, rows, margins = path[good], rows[good], margins[good]
-        arrived = self._refined(path, X_WT[rows])
+        followed = np.ones(len(rows), dtype=bool)
+        for sample in range(X_WT.shape[1]):
+            before, goals = q, X_WT[rows, sample]
+            q, error = self._newton(q, goals, FOLLOWING)
+            followed &= (error < ARRIVED) & (np.abs(q - before).max(axis=1, initial=0.0) < LONGEST_MOVE)
+            path[:, sample] = q
+        margins = np.minimum(path - model.lower, model.upper - path).min(axis=(1, 2), initial=np.inf)
+        good = followed & (margins >= MARGIN)
         return FollowedBranches(
-            reaches=np.any(reaches, axis=1),
-            begins=np.any(within, axis=1),
-            rows=rows[arrived],
-            q=path[arrived],
-            margins=margins[arrived],
+            reaches=reaches,
+            begins=np.bincount(rows, minlength=count) > 0,
+            rows=rows[good],
+            q=path[good],
+            margins=margins[good],
         )
 
-    def _is_inside(self, q: Array) -> Flags:
-        """Whether configurations keep away from the joint limits."""
-        model = self.robot.model
-        return np.all((q >= model.lower + MARGIN) & (q <= model.upper - MARGIN), axis=-1)
-
-    def _faces(self, q: Array, D: Array) -> Flags:
-        """Whether the first joint turns the arm towards its goal rather than over its back, shape (N, 8)."""
-        axis, origin, centre = self.arm.axes[0], self.arm.points[0], self.arm.points[3]
+    def _in_closed_form(self, arm: SphericalWristArm, X_WT: Array) -> tuple[Indices, Array]:
+        """All branches at tool poses, shape (N, 4, 4), none with the arm over its back; rows and joints, (M, 6)."""
+        robot = self.robot
+        D = inverse(robot.X_WB) @ X_WT @ inverse(robot.model.X_BF @ robot.tool.X_FT)
+        q = arm.configurations(D)
+        axis, origin, centre = arm.axes[0], arm.points[0], arm.points[3]
         ahead = (centre - origin) - ((centre - origin) @ axis) * axis
         goal = D[:, :3, :3] @ centre + D[:, :3, 3] - origin
-        R = rotation_about(axis, np.nan_to_num(q[..., 0]).ravel()).reshape(*q.shape[:-1], 3, 3)
-        return ((R @ ahead) * goal[:, None]).sum(axis=-1) >= 0.0
+        R = rotation_about(axis, np.nan_to_num(q[..., 0]).ravel()).reshape(*q.shape[:2], 3, 3)
+        rows, branches = np.nonzero(~np.isnan(q[..., 0]) & (((R @ ahead) * goal[:, None]).sum(axis=-1) >= 0.0))
+        return rows, q[rows, branches]
 
-    def _refined(self, path: Array, X_WT: Array) -> Flags:
-        """Take the rounding of robot files out of paths, in place; which of them arrive at all their poses, (M,)."""
-        q, goals = path.reshape(-1, path.shape[-1]), X_WT.reshape(-1, 4, 4)
-        for step in range(NEWTON_STEPS + 1):
+    def _searched(self, X_WT: Array) -> tuple[Indices, Array]:
+        """Branches at tool poses, shape (N, 4, 4), to which the seeds lead; their rows, and joints of shape (M, n)."""
+        rows = np.repeat(np.arange(len(X_WT)), len(self.seeds))
+        q, error = self._newton(np.tile(self.seeds, (len(X_WT), 1)), X_WT[rows], SEARCHING)
+        rows, q = rows[error < ARRIVED], on_nearest_turns(self.robot.model, q[error < ARRIVED])
+        alike = np.column_stack([rows, np.round(q / ALIKE)])
+        _, first = np.unique(alike, axis=0, return_index=True)
+        return rows[first], q[first]
+
+    def _newton(self, q: Array, X_WT: Array, iterations: int) -> tuple[Array, Array]:
+        """Damped Newton moves to tool poses, shape (N, 4, 4); joints, and the largest errors in [m] or [rad], (N,)."""
+        for iteration in range(iterations + 1):
             X, screws = self.chain.tool_motion(q)
-            error = _pose_error(X, goals)
-            if step < NEWTON_STEPS:
-                q += _newton(screws, error)
-        return (np.abs(error).max(axis=1) < ARRIVED).reshape(path.shape[:2]).all(axis=1)
-
-
-def within_range(model: RobotModel, q: Array) -> Array:
-    """Configurations turned by whole turns as near to the middle of the joints' ranges as they go."""
-    bounded = np.isfinite(model.lower) & np.isfinite(model.upper)
-    middle = np.where(bounded, 0.5 * (model.lower + model.upper), 0.0)
-    return q - 2.0 * np.pi * np.round((q - middle) / (2.0 * np.pi))
-
-
-def _nearest(before: Array, q: Array) -> Array:
-    """The branches nearest to configurations, shape (M, n), among those of shape (M, 8, n); turns are unwound."""
-    q = q - 2.0 * np.pi * np.round((q - before[:, None]) / (2.0 * np.pi))
-    moves = np.where(np.isnan(q), np.inf, np.abs(q - before[:, None])).max(axis=-1)
-    return q[np.arange(len(q)), np.argmin(moves, axis=1)]
-
-
-def _pose_error(X: Array, goals: Array) -> Array:
-    """Twists at the world's origin that lead from poses to goals, near each other, shape (N, 6)."""
-    R, p = X[:, :3, :3], X[:, :3, 3]
-    S = goals[:, :3, :3] @ np.swapaxes(R, 1, 2)
-    turn = 0.5 * np.stack([S[:, 2, 1] - S[:, 1, 2], S[:, 0, 2] - S[:, 2, 0], S[:, 1, 0] - S[:, 0, 1]], axis=1)
-    return np.concatenate([goals[:, :3, 3] - p + np.cross(p, turn), turn], axis=1)
-
-
-def _newton(screws: Array, error: Array) -> Array:
-    """Newton moves of the joints, shape (N, n)."""
-    J_T = np.swapaxes(screws, 1, 2)
-    normal = screws @ J_T + 1e-12 * np.eye(6)
-    return (J_T @ np.linalg.solve(normal, error[:, :, None]))[..., 0]
+            p = X[:, :3, 3]
+            turn = rotation_vector(X_WT[:, :3, :3] @ np.swapaxes(X[:, :3, :3], 1, 2))
+            shift = X_WT[:, :3, 3] - p
+            if iteration < iterations:
+                twist = np.concatenate([shift + np.cross(p, turn), turn], axis=1)
+                q = q + damped_move(screws, twist)
+        return q, np.abs(np.concatenate([shift, turn], axis=1)).max(axis=1, initial=0.0)
 
 
 def _distinct(modes: Sequence[TaskMode]) -> list[TaskMode]:
