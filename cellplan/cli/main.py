@@ -19,6 +19,7 @@ from cellplan.cli.begin.init import init
 from cellplan.cli.begin.robots import robots
 from cellplan.cli.begin.schema import schema
 from cellplan.cli.command import Work, as_command
+from cellplan.cli.improve.assign import assign
 from cellplan.cli.improve.base_map import base_map
 from cellplan.cli.improve.compare import compare
 from cellplan.cli.improve.fastest import fastest
@@ -57,7 +58,14 @@ app = typer.Typer(
 COMMANDS: Final[dict[str, dict[str, Work]]] = {
     "Begin": {"init": init, "robots": robots, "check": check, "explain": explain, "schema": schema},
     "Solve": {"solve": solve, "view": view, "floorplan": floor_plan, "verify": verify, "export": export},
-    "Improve": {"layout": layout, "map": base_map, "fastest": fastest, "sweep": sweep, "compare": compare},
+    "Improve": {
+        "assign": assign,
+        "layout": layout,
+        "map": base_map,
+        "fastest": fastest,
+        "sweep": sweep,
+        "compare": compare,
+    },
     "Real cell": {"rehearse": rehearse, "recover": recover},
 }  # by group, in the order of work
 

@@ -36,6 +36,7 @@ EXAMPLES: Final[dict[str, tuple[str, ...]]] = {
     ),
     "layout": ("cellplan layout cell.yaml --repair", "cellplan layout cell.yaml --objective cycle --budget 5min"),
     "map": ("cellplan map cell.yaml --robot kuka --grid 100 --certify 3",),
+    "assign": ("cellplan assign cell.yaml -o outputs/assigned",),
     "fastest": ("cellplan fastest cell.yaml -o outputs/fastest", "cellplan fastest cell.yaml --demand 120/h"),
     "sweep": ("cellplan sweep cell.yaml --vary motion.duration_s=3:6:0.5",),
     "compare": ("cellplan compare cell.yaml", "cellplan compare outputs/one outputs/two"),

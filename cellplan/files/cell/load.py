@@ -27,6 +27,7 @@ from cellplan.files.cell.build.mounting import (
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.layout.build_layout import read_layout
+from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, with_first_robots
 from cellplan.files.cell.referenced_files import Sources
 from cellplan.files.cell.rules.path_rules import path_findings
 from cellplan.files.cell.rules.program_rules import posture_findings, program_findings, with_stand_offs
@@ -111,11 +112,33 @@ def load_cell(path: Path | str, *, allow_dirs: Sequence[Path] = (), folder: Path
     return _read(CellFile(document=document, name=path.name, folder=folder or path.parent, allow_dirs=allowed))
 
 
+def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tuple[Cell, dict[str, tuple[str, ...]]]:
+    """Read a cell in which tasks may be open to several robots, for a search that chooses one of them.
+
+    Args:
+        path: The cell file.
+        allow_dirs: As for ``load_cell``.
+
+    Returns:
+        The cell with the first robot of each open task, and all robots of each by the name of the task.
+
+    Raises:
+        InvalidFileError: As ``load_cell``.
+        InputError: The cell file cannot be read at all.
+    """
+    path = Path(path)
+    document = read_yaml(path, file=str(path))
+    allowed, robots = tuple(Path(folder) for folder in allow_dirs), open_tasks(document.root)
+    first = {f"tasks.{name}.robot": able[0] for name, able in robots.items() if able}
+    source = CellFile(document=changed(document, first), name=path.name, folder=path.parent, allow_dirs=allowed)
+    return _read(source), robots
+
+
 def _read(source: CellFile) -> Cell:
     """The cell of a document, after all rules were applied to it and to the files that it names."""
-    document, file = source.document, source.document.file
+    document, file = with_first_robots(source.document), source.document.file
     valid, findings = read_valid_entries(document)
-    findings += document.findings
+    findings += [*document.findings, *open_task_findings(source.document)]
     if valid.is_too_large:
         raise_findings(file, findings)
     findings += program_findings(valid, document)
@@ -269,6 +292,7 @@ def _cell(
         remarks=tuple(sources.remarks),
         program=whole.program or NoTransfers(),
         controllers=whole.controllers or {},
+        assign=whole.assign,
     )
 
 

@@ -9,6 +9,7 @@ from cellplan.files.schema.shapes import ObstacleEntry, PartShapeEntry
 from cellplan.files.schema.task import CornerChoice, Seconds, TaskAxis, TaskEntry, TimeLawChoice
 from cellplan.files.schema.tool import Mass
 from cellplan.model.settings.acceleration import AccelerationChoice, CycleTime
+from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry
 from cellplan.model.settings.entry import (
@@ -228,6 +229,9 @@ class CellDocument(Entry):
         default=None,
         description="A program from home to home, with any number of tasks for each robot; {} for all its defaults. "
         "When absent the program begins and ends with the tasks, of which a robot has at most one.",
+    )
+    assign: AssignEntry | None = Field(
+        default=None, description="What `cellplan assign` may choose of a program; not used by solve."
     )
     acceleration: AccelerationChoice | None = Field(
         default=None,

@@ -2,13 +2,14 @@
 
 from typing import Annotated, Final, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag, WithJsonSchema, model_validator
 
 from cellplan.files.schema.path import PathEntry
 from cellplan.files.schema.robot import Configuration
 from cellplan.model.settings.checks import ToolDepth
 from cellplan.model.settings.entry import (
     DIRECTION_WORDS,
+    NAME_PATTERN,
     Angle,
     Direction,
     Entry,
@@ -45,6 +46,19 @@ ToolAxis = Annotated[
     Annotated[Literal["normal", "+x", "-x", "+y", "-y", "+z", "-z"], Tag(f"<{TOOL_AXIS_WORDS}>")]
     | Annotated[Vector, Tag("<list>")],
     by_kind(TOOL_AXIS_WORDS, list=tuple),
+]
+
+
+OneRobot = Annotated[
+    Name,
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "pattern": NAME_PATTERN},
+                {"type": "array", "items": {"type": "string", "pattern": NAME_PATTERN}, "minItems": 1},
+            ]
+        }
+    ),
 ]
 
 
@@ -96,7 +110,10 @@ TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 class TaskEntry(Entry):
     """One operator's work on the part."""
 
-    robot: Name = Field(description="Robot that does the task; without program a robot has at most one.")
+    robot: OneRobot = Field(
+        description="Robot that does the task; without program a robot has at most one. With any, or a list of robots, "
+        "the task is open: `cellplan assign` chooses one of them, or of all that do not hold the part."
+    )
     relative_to: Literal["part", "world"] = Field(
         default="part",
         description="Frame that path, tool axis and axes are given in. With world, a robot that holds the part (the "

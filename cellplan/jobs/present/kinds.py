@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Final
 
+from cellplan.jobs.assign.result import ASSIGNMENT
 from cellplan.jobs.base_map.result import MAP
 from cellplan.jobs.compare.result import COMPARISON
 from cellplan.jobs.fastest.result import FASTEST
@@ -39,7 +40,16 @@ SERIES: Final = ResultKind(
     tables=lambda record: {"curves": lambda: curve_columns(record)},
     shown={},
 )
-OF_JOBS: Final = (MAP, FASTEST, ADVICE, REHEARSAL, COMPARISON, LAYOUT, STUDY)  # where two files are, the first is shown
+OF_JOBS: Final = (
+    MAP,
+    FASTEST,
+    ASSIGNMENT,
+    ADVICE,
+    REHEARSAL,
+    COMPARISON,
+    LAYOUT,
+    STUDY,
+)  # where two files are, the first is shown
 KINDS: Final[Mapping[str, ResultKind]] = {kind.name: kind for kind in (*OF_JOBS, RUN, SERIES)}
 
 

@@ -18,6 +18,7 @@ from cellplan.model.cell.rod import Rod
 from cellplan.model.origin import Origin
 from cellplan.model.presented import Presented
 from cellplan.model.robot.robot import Body, JointLimits, RobotModel
+from cellplan.model.settings.assign import AssignEntry
 from cellplan.model.settings.checks import ChecksEntry
 from cellplan.model.settings.controllers import ControllerEntry, RobotControlEntry
 from cellplan.model.settings.motion import LockedJointEntry
@@ -256,6 +257,7 @@ class Cell(Presented):
         program: Cycles, marks and places of the part; ``NoTransfers`` where it does not go from home to home.
         layout: What a layout search may change; None for a cell that was built in Python.
         controllers: Its controllers by name; empty when none are stated.
+        assign: What an assignment may choose; None where nothing is said of it.
     """
 
     name: str
@@ -272,6 +274,7 @@ class Cell(Presented):
     program: ProgramEntry = NoTransfers()  # noqa: RUF009 - frozen
     layout: LayoutSettings | None = None
     controllers: Mapping[str, ControllerEntry] = field(default_factory=dict)
+    assign: AssignEntry | None = None
 
     def with_values(self, values: Mapping[str, object]) -> "Cell":
         """The cell of the same document with other values, validated like those of the file.

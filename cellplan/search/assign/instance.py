@@ -119,6 +119,26 @@ def straight_steps(move: Array, bounds: JointLimitsInTime, step: float) -> Indic
     return np.where(moves, np.ceil(total / step), 0.0).astype(np.intp)
 
 
+def least_transfer(instance: Instance) -> int:
+    """Steps that every transfer to a block takes at least: from task to task, from home, or of the part."""
+    shortest = [
+        int(instance.transfer_steps(robot, instance.homes[robot], end.begin))
+        for task, robot, station in instance.modes
+        for end in instance.ends(task, robot, station)
+    ]
+    for robot in instance.robots:
+        for station in instance.used:
+            tasks = [task for task, by, at in instance.modes if (by, at) == (robot, station)]
+            ends = [(place, end) for place, task in enumerate(tasks) for end in instance.ends(task, robot, station)]
+            if len(tasks) > 1:
+                leaves, comes = (np.array([getattr(end, side) for _, end in ends]) for side in ("end", "begin"))
+                steps = instance.transfer_steps(robot, leaves[:, None], comes[None])
+                places = np.array([place for place, _ in ends])
+                shortest.append(int(steps[places[:, None] != places[None]].min()))
+    shortest += [instance.station_steps(a, b) for a in instance.used for b in instance.used if a != b]
+    return min(shortest)
+
+
 def choose_stations(
     table: ModeTable, goals: Sequence[TaskGoal], clearance: AssignmentClearance, *, most: int
 ) -> tuple[tuple[int, ...], dict[Key, tuple[TaskMode, ...]]]:

@@ -17,7 +17,6 @@ from cellplan.search.assign.schedule import BlockSchedule
 
 MOST_PERMUTED: Final = 7  # stations of which all tours are compared
 TOURS: Final = 4  # shortest ones that are tried
-ROUNDS: Final = 3  # of relocations of all blocks
 
 Layer = tuple[int | None, list[list[End | None]]]  # station, and the ends that each operator may choose
 Stop = tuple[int | None, tuple[End | None, ...]]  # station, and the end of each operator's task; None at home
@@ -70,17 +69,13 @@ class Sequencer:
 
     def ordered(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The best order found: stations in a short tour, blocks of a station relocated while that saves time."""
-        best = min((self.sequenced(tour) for tour in self._tours(schedule)), key=lambda it: it.steps)
-        for _ in range(ROUNDS):
-            before = best.steps
-            for first in range(len(schedule.blocks)):
-                for second in range(len(schedule.blocks)):
-                    trial = _relocated(best.schedule, first, second)
-                    if trial is not None and (it := self.sequenced(trial)).steps < best.steps:
-                        best = it
-            if best.steps == before:
-                break
-        return best
+        best = min((self.sequenced(tour) for tour in self.tours(schedule)), key=lambda it: it.steps)
+        while True:
+            trials = (self.sequenced(trial) for trial in relocations(best.schedule))
+            better = next((trial for trial in trials if trial.steps < best.steps), None)
+            if better is None:
+                return best
+            best = better
 
     def _at_home(self) -> list[list[End | None]]:
         return [[None] for _ in self.instance.robots]
@@ -144,7 +139,7 @@ class Sequencer:
     def _coming(self, robot: str, end: End | None) -> Array:
         return self.instance.homes[robot] if end is None else end.begin
 
-    def _tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
+    def tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
         """The blocks with their stations in the shortest tours."""
         stations = list(dict.fromkeys(schedule.station_of(block) for block in schedule.blocks))
         if len(stations) > MOST_PERMUTED:
@@ -174,10 +169,12 @@ class Sequencer:
         return tuple(order)
 
 
-def _relocated(schedule: BlockSchedule, first: int, second: int) -> BlockSchedule | None:
-    """The schedule with a block at another place among those of its station; None where that is none."""
-    blocks = list(schedule.blocks)
-    if first == second or schedule.station_of(blocks[first]) != schedule.station_of(blocks[second]):
-        return None
-    blocks.insert(second, blocks.pop(first))
-    return BlockSchedule(blocks=tuple(blocks), chosen=schedule.chosen)
+def relocations(schedule: BlockSchedule) -> Iterator[BlockSchedule]:
+    """Schedules in which one block is at another place among those of its station."""
+    stations = [schedule.station_of(block) for block in schedule.blocks]
+    for source, station in enumerate(stations):
+        for target, other in enumerate(stations):
+            if source != target and station == other:
+                blocks = list(schedule.blocks)
+                blocks.insert(target, blocks.pop(source))
+                yield BlockSchedule(blocks=tuple(blocks), chosen=schedule.chosen)

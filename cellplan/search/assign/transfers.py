@@ -15,7 +15,7 @@ from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
+from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, relocations
 from cellplan.search.assign.schedule import BlockSchedule
 
 MOST_SETTLED: Final = 60  # choices of modes until no transfer of the best one is newly refused
@@ -51,6 +51,23 @@ class TransferCertifier:
                 return best
             sequencer.refusals += refusals
         return sequencer.sequenced(schedule)
+
+    def best(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
+        """The best order that is found with certified transfers: of short tours, and by relocation of blocks."""
+        best = min((self.settle(sequencer, tour) for tour in sequencer.tours(schedule)), key=lambda it: it.steps)
+        while True:
+            better = next(
+                (
+                    settled
+                    for trial in relocations(best.schedule)
+                    if sequencer.sequenced(trial).steps < best.steps
+                    and (settled := self.settle(sequencer, trial)).steps < best.steps
+                ),
+                None,
+            )
+            if better is None:
+                return best
+            best = better
 
     def refusals(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
         """Transfers of a sequence that are not free straight and were not known to be."""

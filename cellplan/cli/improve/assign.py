@@ -1,0 +1,51 @@
+"""``cellplan assign``: who does which task, in which order, in which direction and at which pose of the part."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cellplan.cli.options.request import Options, option
+from cellplan.cli.options.shared import AllowDirs, AsJson, CellFile, Quiet
+from cellplan.cli.terminal.output import Result
+from cellplan.cli.terminal.progress import progress_listener
+from cellplan.errors import ExitStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AssignOptions(Options):
+    """Whose tasks are assigned."""
+
+    SCHEMA = "cellplan.assignment/1"
+
+    cell: CellFile
+    output: Annotated[
+        Path | None, option("-o, --output DIR", "Folder (default: outputs/NAME-assign, NAME that of the cell).")
+    ] = None
+    effort: Annotated[int, option("--effort N", "Work of the solver: 1 quick, 2 usual, 5 very long.", min=1, max=5)] = 2
+    as_json: AsJson = False
+    quiet: Quiet = False
+    allow_dirs: AllowDirs = ()
+
+
+def assign(options: AssignOptions) -> Result:
+    """Choose for every task the robot, the block, the direction, the spin and the pose of the part.
+
+    Tasks with robot: any, or a list of robots, are open; what is given is kept. The result, best.yaml, is solved and
+    verified from home to home, and stated with a lower bound of the cycle. Exit status: 0 passed every check, 1 a check
+    failed, 2 bad input, 3 a task that no robot can do or no program, 4 internal error.
+    """
+    from cellplan.files.run.folder import refuse_unless_replaceable
+    from cellplan.jobs.assign.assign import assign as assigned
+    from cellplan.jobs.assign.draft import Draft
+    from cellplan.jobs.assign.result import assign_lines, write_assignment
+
+    draft = Draft.load(options.cell, allow_dirs=options.allow_dirs)
+    folder = options.output or Path("outputs") / f"{draft.cell.name}-assign"
+    refuse_unless_replaceable(folder)
+    with progress_listener(quiet=options.quiet) as progress:
+        assignment = assigned(draft, effort=options.effort, progress=progress)
+        record = write_assignment(assignment, options.cell, folder, progress=progress)
+    status = ExitStatus.PASSED if assignment.passed else ExitStatus.CHECK_FAILED
+    about = {"exit": int(status), "folder": str(folder), "report_path": str(folder / "assign.html")}
+    lines = [*assign_lines(record), f"cell: {folder / 'best.yaml'}", f"report: {folder / 'assign.html'}"]
+    return Result(status, lines, {**record, **about})

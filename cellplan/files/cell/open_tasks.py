@@ -1,0 +1,53 @@
+"""Open tasks: tasks that several robots may do, one of which an assignment chooses."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+from cellplan.files.input.findings import Finding, shown
+from cellplan.files.yaml.reader import YamlDocument
+
+ANY: Final = "any"
+
+
+def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """The robots that may do each open task: those that are listed, or all that do not hold the part.
+
+    Args:
+        root: The values of a cell file as they stand in it.
+    """
+    tasks, robots = root.get("tasks"), root.get("robots")
+    if not isinstance(tasks, Mapping) or not isinstance(robots, Mapping):
+        return {}
+    part = root.get("part")
+    held_by = part.get("held_by", ()) if isinstance(part, Mapping) else ()
+    holders = {entry.get("robot") for entry in held_by if isinstance(entry, Mapping)}
+    free = tuple(name for name in robots if name not in holders)
+    able: dict[str, tuple[str, ...]] = {}
+    for name, task in tasks.items():
+        robot = task.get("robot") if isinstance(task, Mapping) else None
+        if robot == ANY and ANY not in robots:
+            able[name] = free
+        elif isinstance(robot, tuple):
+            able[name] = tuple(str(it) for it in robot)
+    return able
+
+
+def with_first_robots(document: YamlDocument) -> YamlDocument:
+    """The document with the first robot of each open task, so that everything else in it can be read."""
+    opened = {name: robots for name, robots in open_tasks(document.root).items() if robots}
+    if not opened:
+        return document
+    tasks = {
+        name: {**task, "robot": opened[name][0]} if name in opened else task
+        for name, task in document.root["tasks"].items()
+    }
+    return replace(document, root={**document.root, "tasks": tasks})
+
+
+def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
+    """Refuse open tasks."""
+    for name in open_tasks(document.root):
+        value = document.root["tasks"][name]["robot"]
+        words = f"expected the name of a robot, got {shown(value)}: cellplan assign chooses who does an open task"
+        yield document.finding(("tasks", name, "robot"), words)

@@ -1,0 +1,335 @@
+"""Assign: a draft becomes a program from home to home that passed every check, with a lower bound of its cycle.
+
+In each round the block model chooses who does which tasks together, the sequencer orders the blocks and chooses the
+modes, and the transfers are certified; the program is then solved as any other. Blocks that fail a check are not chosen
+again.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+
+from cellplan.errors import NoSolutionError
+from cellplan.files.cell.write import in_file_units
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.assign.draft import Draft
+from cellplan.model.cell.cell import Cell
+from cellplan.model.presented import Presented
+from cellplan.model.progress import Progress, silent
+from cellplan.model.robot.robot import RobotModel, start_keys
+from cellplan.model.settings.units import file_number
+from cellplan.planning.timing.retime import JointLimitsInTime
+from cellplan.runs.plan.retiming import transfer_retimer
+from cellplan.runs.solution import Run, Solution
+from cellplan.runs.solve import solve
+from cellplan.scene.scene import Scene
+from cellplan.search.assign.blocks import solve_blocks
+from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.goals import TaskGoal, task_goals
+from cellplan.search.assign.greedy import greedy_schedule, improved
+from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer
+from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.table import ModeSearch, ModeTable
+from cellplan.search.assign.transfers import TransferCertifier
+
+ROUNDS: Final = 4  # programs that are solved until one passes
+EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
+LOOKED_FOR: Final = ("demanded direction of the tool", "reach", "joint limits", "path", "collisions")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Assignment(Presented):
+    """Who does which task, in which order, at which pose of the part; and what is proved of it."""
+
+    draft: Cell  # each open task with the first of its robots
+    cell: Cell  # the program, with nothing open
+    solution: Solution  # it, solved and verified
+    instance: Instance  # what was chosen from
+    sequenced: SequencedBlocks
+    bound: float  # no program in blocks at the chosen stations, with the modes and conflicts found, is shorter, in [s]
+    is_proved: bool  # whether no schedule of the block model is better than the one that was first sequenced
+    greedy: float  # cycle in [s] of the nearest tasks first, by the model
+    rounds: int  # programs that were solved
+    counts: Mapping[str, int]  # of goals, modes, certificates and refusals
+
+    @property
+    def passed(self) -> bool:
+        """Whether the program passed every check."""
+        return self.solution.passed
+
+    @property
+    def cycle(self) -> float:
+        """Time of the program from home to home in [s]."""
+        return sum(run.report.cycle_time for run in self.solution.runs)
+
+    @property
+    def model_cycle(self) -> float:
+        """The same by the model, in [s]."""
+        return self.sequenced.steps * self.instance.step
+
+    def __repr__(self) -> str:
+        """One line without arrays."""
+        verdict = "passed" if self.passed else "failed"
+        return f"<Assignment of '{self.cell.name}': {self.cycle:.4g} s, at least {self.bound:.4g} s; {verdict}>"
+
+
+def assign(draft: Draft, *, effort: int = 2, progress: Progress = silent) -> Assignment:
+    """Choose robots, order, directions, spins and poses of the part for all tasks.
+
+    Args:
+        draft: The cell with open tasks.
+        effort: Work of the block model, from 1 to 5.
+        progress: Called with the stage and the fraction done.
+
+    Raises:
+        InputError: Something in the cell cannot be assigned, or OR-Tools is missing.
+        NoSolutionError: A task can be done by no robot at any pose of the part, or no program passed.
+    """
+    progress("table of modes", 0.0)
+    search = _Search(draft, effort)
+    instance = search.instance(progress)
+    counts = search.counts
+    for number in range(1, ROUNDS + 1):
+        progress("blocks", (number - 1) / ROUNDS)
+        planned = search.planned(instance)
+        cell = written_cell(draft, instance, planned.sequenced)
+        solution = _solved(cell, progress)
+        if number == 1:
+            bound, is_proved = planned.bound * instance.step, planned.is_proved
+        if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
+            return Assignment(
+                draft=draft.cell,
+                cell=cell,
+                solution=solution,
+                instance=instance,
+                sequenced=planned.sequenced,
+                bound=bound,
+                is_proved=is_proved,
+                greedy=planned.greedy * instance.step,
+                rounds=number,
+                counts=counts | {"certificates": planned.asked, "refused": planned.refused},
+            )
+        instance = without_failed(instance, planned.sequenced, solution)
+    raise NoSolutionError(
+        f"{draft.cell.origin.at('tasks')}: no program passed in {ROUNDS} rounds; the last one: {solution}"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Planned:
+    """A schedule with its modes, and what is known of it."""
+
+    sequenced: SequencedBlocks
+    bound: int  # [steps]
+    is_proved: bool
+    greedy: int  # [steps]
+    asked: int
+    refused: int
+
+
+class _Search:
+    """The search of one draft."""
+
+    def __init__(self, draft: Draft, effort: int) -> None:
+        self.draft, self._effort = draft, EFFORT[effort - 1]
+        self._scene = Scene.from_cell(draft.cell)
+        self.counts: dict[str, int] = {}
+
+    def instance(self, progress: Progress) -> Instance:
+        """Stations, modes and conflicts.
+
+        Raises:
+            NoSolutionError: A task can be done nowhere.
+        """
+        draft, settings = self.draft, self.draft.settings
+        cell, stations = draft.cell, draft.stations()
+        goals = task_goals(cell, draft.robots)
+        table = ModeSearch(
+            cell=cell,
+            goals=goals,
+            stations=stations,
+            spins=draft.spins(),
+            most_lean=settings.torch_within_deg.si,
+        ).table()
+        progress("stations", 0.0)
+        clearance = AssignmentClearance(
+            scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
+        )
+        used, modes = choose_stations(table, goals, clearance, most=settings.most_stations)
+        refuse_impossible_tasks(draft, goals, table, {task for task, _, _ in modes})
+        progress("conflicts", 0.0)
+        columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
+        bounds = transfer_retimer(self._scene).bounds
+        instance = Instance(
+            goals={goal.name: self._with_direction(goal) for goal in goals},
+            robots=draft.operators,
+            modes=modes,
+            stations=stations,
+            used=used,
+            conflicts=find_conflicts(modes, clearance),
+            homes={name: draft.home[at] for name, at in columns.items()},
+            bounds={
+                name: JointLimitsInTime(
+                    velocity=bounds.velocity[at], acceleration=bounds.acceleration[at], jerk=bounds.jerk[at]
+                )
+                for name, at in columns.items()
+            },
+            step=cell.motion.step,
+        )
+        self.counts = {
+            "tasks": len(goals),
+            "poses": len(stations.q),
+            "modes": sum(map(len, table.modes.values())),
+            "stations": len(used),
+            "free_modes": sum(map(len, modes.values())),
+            "conflicts": len(instance.conflicts),
+        }
+        return instance
+
+    def planned(self, instance: Instance) -> _Planned:
+        """The best schedule of an instance, with certified transfers."""
+        draft, sequencer = self.draft, Sequencer(instance)
+        greedy = greedy_schedule(instance)
+        nearest = sequencer.sequenced(greedy).steps
+        exchanged = sequencer.ordered(improved(instance, greedy)).schedule
+        answer = solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=exchanged)
+        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
+        schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
+        best = min((certifier.best(sequencer, schedule) for schedule in schedules), key=lambda it: it.steps)
+        return _Planned(
+            sequenced=best,
+            bound=answer.bound,
+            is_proved=answer.is_proved,
+            greedy=nearest,
+            asked=certifier.asked,
+            refused=len(sequencer.refusals),
+        )
+
+    def _with_direction(self, goal: TaskGoal) -> TaskGoal:
+        """The goal, reversible only where its path is written as points and its direction is free."""
+        is_free = "direction" in self.draft.settings.free and written_points(self.draft.cell, goal.name) is not None
+        return replace(goal, is_reversible=goal.is_reversible and is_free)
+
+
+def refuse_impossible_tasks(draft: Draft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
+    """Refuse tasks that no robot can do at any pose of the part, each with the filter that dropped it.
+
+    Raises:
+        NoSolutionError: One line for each of them.
+    """
+    lines = []
+    for goal in goals:
+        if goal.name not in able:
+            counts: Mapping[str, int] = table.counts.get(goal.name, {})
+            dropped = next((name for name in LOOKED_FOR if not counts.get(name)), LOOKED_FOR[-1])
+            names = ", ".join(goal.robots)
+            lines.append(
+                f"{draft.cell.task(goal.name).where()}: none of {names} can do it at any pose of the part: nothing is "
+                f"left after the filter '{dropped}'; give more poses of the part, other robots or bases"
+            )
+    if lines:
+        raise NoSolutionError("\n".join(lines))
+
+
+def written_cell(draft: Draft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
+    """The program of a schedule, read from the draft's document with the chosen values."""
+    values: dict[str, object] = {}
+    orders: dict[str, list[str]] = {}
+    before: tuple[str, ...] = ()
+    for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
+        for robot, end in zip(instance.robots, ends, strict=True):
+            if end is not None:
+                values |= _task_values(draft.cell, robot, end, before, _holder(instance, station))
+                orders.setdefault(robot, []).append(end.mode.task)
+        before = block
+    return draft.cell.with_values(values | {f"robots.{robot}.order": tasks for robot, tasks in orders.items()})
+
+
+def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None:
+    """Holder and its configuration at a station; None for a part that is fixed."""
+    holder = instance.stations.holder
+    return None if holder is None or station is None else (holder, instance.stations.q[station])
+
+
+def _task_values(
+    cell: Cell, robot: str, end: End, before: tuple[str, ...], holder: tuple[str, Array] | None
+) -> dict[str, object]:
+    """Values of one task by address."""
+    task = cell.task(end.mode.task)
+    place = f"tasks.{task.name}"
+    values: dict[str, object] = {f"{place}.robot": robot}
+    spin = file_number(float(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), is_revolute=True)
+    if end.mode.spin:
+        values[f"{place}.spin_deg"] = spin
+    values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)
+    if holder is not None:
+        values |= _configuration(f"{place}.holder", cell.robot(holder[0]).model, holder[1])
+    if after := tuple(dict.fromkeys((*task.after, *before))):
+        values[f"{place}.after"] = after
+    points = written_points(cell, task.name)
+    if end.is_reversed and points is not None:
+        values[f"{place}.path.polyline.points_mm"] = points[::-1]
+    return values
+
+
+def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:
+    """Points of the path of a task as they stand in the file; None where it is no polyline."""
+    tasks: Any = cell.origin.document["tasks"]
+    polyline = tasks[task]["path"].get("polyline")
+    return None if polyline is None else tuple(polyline["points_mm"])
+
+
+def _configuration(address: str, model: RobotModel, q: Array) -> dict[str, object]:
+    """A configuration by address, under the key that suits the joints of the robot; the other key is left out."""
+    values = in_file_units(model, q)
+    if all(joint.is_revolute for joint in model.joints):
+        return {f"{address}_deg": values, address: None}
+    return {address: dict(zip(start_keys(model), values, strict=True)), f"{address}_deg": None}
+
+
+def _solved(cell: Cell, progress: Progress) -> Solution | str:
+    """The program, solved and verified; why there is none."""
+    try:
+        return solve(cell, is_reported=False, progress=progress)
+    except NoSolutionError as error:
+        return str(error)
+
+
+def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Solution | str) -> Instance:
+    """The instance without the choices of blocks that failed."""
+    failed = set(range(len(sequenced.stops)))
+    if not isinstance(solution, str):
+        works = [run for run in solution.runs if run.schedule.tasks]
+        failed = {place for place, run in enumerate(works) if not _passed(run)} or failed
+    modes, conflicts = dict(instance.modes), set(instance.conflicts)
+    for place in failed:
+        keys = [
+            (end.mode.task, end.mode.robot, end.mode.station) for end in sequenced.stops[place][1] if end is not None
+        ]
+        if len(keys) > 1:
+            conflicts |= {frozenset(pair) for pair in pairwise(keys)}
+        else:
+            chosen = next(end.mode for end in sequenced.stops[place][1] if end is not None)
+            left = tuple(mode for mode in modes[keys[0]] if mode is not chosen)
+            if left:
+                modes[keys[0]] = left
+            elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):
+                del modes[keys[0]]
+    return Instance(
+        goals=instance.goals,
+        robots=instance.robots,
+        modes=modes,
+        stations=instance.stations,
+        used=instance.used,
+        conflicts=frozenset(conflicts),
+        homes=instance.homes,
+        bounds=instance.bounds,
+        step=instance.step,
+    )
+
+
+def _passed(run: Run) -> bool:
+    return all(check.passed for check in run.report.checks)

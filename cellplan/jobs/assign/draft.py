@@ -1,0 +1,152 @@
+"""Drafts: cells whose tasks are open to several robots, and what an assignment refuses of them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from cellplan.errors import InputError
+from cellplan.files.cell.load import load_open_cell
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell.cell import Cell, Mode, Robot
+from cellplan.model.robot.robot import configuration_in_si, start_keys
+from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
+from cellplan.search.assign.goals import Stations
+
+RESTS = (Mode.SEMI_COORDINATED, Mode.PART_AT_REST)  # modes in which the part rests while tools are at work
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Draft:
+    """A cell in which somebody has to be found for every task."""
+
+    cell: Cell  # each open task with the first of its robots
+    robots: Mapping[str, Sequence[str]]  # robots that may do each open task
+    file: Path
+
+    @classmethod
+    def load(cls, file: Path | str, *, allow_dirs: Sequence[Path] = ()) -> "Draft":
+        """Read a cell file.
+
+        Raises:
+            InputError: The file cannot be read, or an assignment is not made for such cells; one located line each.
+        """
+        cell, robots = load_open_cell(file, allow_dirs=allow_dirs)
+        refuse_unless_assignable(cell)
+        return cls(cell=cell, robots=robots, file=Path(file))
+
+    @property
+    def settings(self) -> AssignEntry:
+        """What may be chosen."""
+        return self.cell.assign or AssignEntry()
+
+    @property
+    def operators(self) -> tuple[str, ...]:
+        """Robots that do not hold the part."""
+        return tuple(robot.name for robot in self.cell.robots if robot.name not in self.cell.positioners)
+
+    @property
+    def home(self) -> Array:
+        """Stacked homes of all robots in [rad] or [m], shape (nq,); the start of a holder without a home."""
+        homes = [robot.home if robot.home is not None else robot.start for robot in self.cell.robots]
+        return np.concatenate([home for home in homes if home is not None])
+
+    def stations(self) -> Stations:
+        """The poses of the part that are compared.
+
+        Raises:
+            InputError: A station has other joints than the holder, or there are too many.
+        """
+        if not self.cell.positioners:
+            return Stations.of(self.cell, np.zeros((1, 0)))
+        holder = self.cell.robot(self.cell.positioners[0])
+        given = self.settings.stations if "station" in self.settings.free else None
+        if given is None:
+            postures = [task.holder_posture for task in self.cell.tasks if task.holder_posture is not None]
+            return Stations.of(self.cell, np.unique([*postures, *([] if postures else [_start(holder)])], axis=0))
+        where = self.cell.origin.at("assign.stations")
+        return Stations.of(
+            self.cell, _grid(holder, given, where) if isinstance(given, Mapping) else _listed(holder, given, where)
+        )
+
+    def spins(self) -> Array:
+        """Turns of the tools about their axes that are compared, beside those of the tasks, in [rad], shape (S,)."""
+        step = self.settings.spin_step_deg if "spin" in self.settings.free else 360.0
+        return np.radians(np.arange(0.0, 360.0, step))
+
+
+def refuse_unless_assignable(cell: Cell) -> None:
+    """Refuse cells of which no assignment is made.
+
+    Raises:
+        InputError: With what is wrong, where, and the cure.
+    """
+    at, program = cell.origin.at, cell.program
+    if program is None:
+        raise InputError(
+            f"{at('program')}: missing, expected program: {{}}, as an assignment is made from home to home"
+        )
+    if cell.motion.mode not in RESTS:
+        raise InputError(
+            f"{at('motion.mode')}: expected semi_coordinated or part_at_rest, got {cell.motion.mode}: in what an "
+            "assignment plans the part rests while tools are at work"
+        )
+    if program.all_marks or program.attach is not None or program.detach is not None:
+        raise InputError(
+            f"{at('program')}: expected no marks, attach or detach, as an assignment orders all tasks itself"
+        )
+    if len(cell.positioners) > 1:
+        raise InputError(f"{at('part.held_by')}: expected one robot that holds the part, got {len(cell.positioners)}")
+    for robot in cell.robots:
+        if robot.home is None and (robot.name not in cell.positioners or robot.start is None):
+            raise InputError(f"{at(f'robots.{robot.name}')}: missing, expected home_deg, from which a program begins")
+        if f"robots.{robot.name}.order" in cell.origin.lines:
+            raise InputError(f"{at(f'robots.{robot.name}.order')}: unexpected key, write after in the tasks instead")
+
+
+def _start(holder: Robot) -> Array:
+    """The start of a holder, or its home."""
+    start = holder.start if holder.start is not None else holder.home
+    return np.zeros(len(holder.model.joints)) if start is None else start
+
+
+def _listed(holder: Robot, postures: Sequence[Sequence[float]], where: str) -> Array:
+    """Postures in a list, in [rad] or [m], shape (K, n)."""
+    count = len(holder.model.joints)
+    for index, posture in enumerate(postures):
+        if len(posture) != count:
+            raise InputError(
+                f"{where}[{index}]: expected {count} values, one for each joint of '{holder.name}', got {len(posture)}"
+            )
+    return np.array([configuration_in_si(holder.model, posture) for posture in postures])
+
+
+def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
+    """All postures of a grid, in [rad] or [m], shape (K, n)."""
+    keys = start_keys(holder.model)
+    for key, (first, last, step) in ranges.items():
+        if key not in keys:
+            raise InputError(f"{where}.{key}: expected a joint of '{holder.name}': {', '.join(keys)}")
+        if not step > 0.0 or last < first:
+            raise InputError(
+                f"{where}.{key}: expected [first, last, step] with a step above 0, got [{first:g}, {last:g}, {step:g}]"
+            )
+    count = np.prod([np.floor((ranges[key][1] - ranges[key][0]) / ranges[key][2] + 1e-9) + 1 for key in ranges])
+    if count > POSTURE_LIMIT:
+        raise InputError(f"{where}: expected at most {POSTURE_LIMIT} postures, got {count:.0f}: take longer steps")
+    start = _start(holder)
+    values = []
+    for column, key in enumerate(keys):
+        if key in ranges:
+            first, last, step = ranges[key]
+            written = first + step * np.arange(int(np.floor((last - first) / step + 1e-9)) + 1)
+            values.append([float(configuration_in_si(holder.model, [it] * len(keys))[column]) for it in written])
+        else:
+            values.append([float(start[column])])
+    postures = np.array(list(product(*values)))
+    inside = np.all((postures >= holder.model.lower) & (postures <= holder.model.upper), axis=1)
+    if not inside.any():
+        raise InputError(f"{where}: expected a posture within the joint limits of '{holder.name}', got none")
+    return postures[inside]

@@ -1,0 +1,241 @@
+"""An assignment as record, text and page: what is shown, and in which order."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final
+
+from cellplan.files.run.folder import RunFolder
+from cellplan.jobs.assign.assign import Assignment
+from cellplan.jobs.layout.result_file import file_records, result_files
+from cellplan.model.progress import Progress, silent
+from cellplan.model.report.report import CAUTION
+from cellplan.report.page.figures import figure
+from cellplan.report.page.kind import ResultKind
+from cellplan.report.page.render import template
+from cellplan.report.plots.palette import ROBOTS
+from cellplan.report.record.common import Record, as_json, number
+from cellplan.report.record.rows import Tables, columns_of, flat
+from cellplan.runs.solution import Run
+from cellplan.runs.write_run import versions, write_run
+
+SCHEMA: Final = "cellplan.assignment/1"
+HOLDS_FOR: Final = (
+    "programs in blocks at the chosen poses of the part, with the modes that were found and the conflicts as listed"
+)
+
+
+# The record: assign.json
+
+
+def assign_record(assignment: Assignment) -> dict[str, Any]:
+    """The assignment in printed units: content of ``assign.json``."""
+    instance, sequenced = assignment.instance, assignment.sequenced
+    step, cycle = instance.step, assignment.cycle
+    works = [run for run in assignment.solution.runs if run.schedule.tasks]
+    failed = [check.message for run in assignment.solution.runs for check in run.report.checks if not check.passed]
+    blocks = [
+        _block(assignment, place, run, begin)
+        for place, (run, begin) in enumerate(zip(works, _begins(assignment.solution.runs), strict=True))
+    ]
+    return {
+        "schema": SCHEMA,
+        "cell": assignment.cell.name,
+        "status": "passed" if assignment.passed else "failed",
+        "cycle_time_s": number(cycle),
+        "model_cycle_s": number(assignment.model_cycle),
+        "bound_s": number(assignment.bound),
+        "bound_holds_for": HOLDS_FOR,
+        "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound > 0.0 else None,
+        "is_proved": assignment.is_proved,
+        "greedy_cycle_s": number(assignment.greedy),
+        "binding": _binding(assignment, blocks),
+        "blocks": blocks,
+        "robots": {name: _use(blocks, name, cycle) for name in instance.robots},
+        "only_one_robot": {
+            task: robots[0]
+            for task in instance.tasks
+            if len(robots := sorted({robot for robot, _ in instance.options[task]})) == 1
+        },
+        "part_moves_s": number(step * _part_steps(assignment)),
+        "stations": len({station for station, _ in sequenced.stops}),
+        "rounds": assignment.rounds,
+        "counts": dict(assignment.counts),
+        "failed": failed,
+        "inputs": dict(assignment.draft.inputs),
+        "versions": versions(),
+    }
+
+
+def _begins(runs: Sequence[Run]) -> Iterator[float]:
+    """Times of the program at which phases with tasks begin, in [s]."""
+    begin = 0.0
+    for run in runs:
+        if run.schedule.tasks:
+            yield begin
+        begin += run.report.cycle_time
+
+
+def _block(assignment: Assignment, place: int, run: Run, begin: float) -> dict[str, Any]:
+    """One block: its tasks by robot, with their times in the program."""
+    instance = assignment.instance
+    station, ends = assignment.sequenced.stops[place]
+    return {
+        "block": place + 1,
+        "phase": run.phase.name,
+        "station": station,
+        "begin_s": number(begin),
+        "end_s": number(begin + run.report.cycle_time),
+        "tasks": {
+            robot: {
+                "task": end.mode.task,
+                "work_s": number(instance.steps(end.mode.task) * instance.step),
+                "is_reversed": end.is_reversed,
+            }
+            for robot, end in zip(instance.robots, ends, strict=True)
+            if end is not None
+        },
+    }
+
+
+def _use(blocks: Sequence[Record], robot: str, cycle: float) -> dict[str, Any]:
+    """How long a robot works, and the share of the cycle."""
+    work = sum(block["tasks"][robot]["work_s"] for block in blocks if robot in block["tasks"])
+    tasks = sum(robot in block["tasks"] for block in blocks)
+    return {"tasks": tasks, "work_s": number(work), "use_percent": number(100.0 * work / cycle)}
+
+
+def _binding(assignment: Assignment, blocks: Sequence[Record]) -> dict[str, Any]:
+    """What the cycle is made of."""
+    work = sum(block["end_s"] - block["begin_s"] for block in blocks)
+    waits = sum(
+        block["end_s"] - block["begin_s"] - task["work_s"] for block in blocks for task in block["tasks"].values()
+    )
+    busiest = max(assignment.instance.robots, key=lambda name: _use(blocks, name, assignment.cycle)["work_s"])
+    return {
+        "busiest_robot": busiest,
+        "blocks_s": number(work),
+        "transfers_s": number(assignment.cycle - work),
+        "waiting_s": number(waits),
+    }
+
+
+def _part_steps(assignment: Assignment) -> int:
+    """Steps of the part from home over all stations and back."""
+    places = [None, *(station for station, _ in assignment.sequenced.stops), None]
+    return sum(assignment.instance.station_steps(a, b) for a, b in pairwise(places) if a != b)
+
+
+# Text
+
+
+def assign_lines(record: Record) -> list[str]:
+    """All lines on the terminal."""
+    gap = "" if record["gap_percent"] is None else f", {record['gap_percent']:.2g} % above"
+    binding, only = record["binding"], record["only_one_robot"]
+    lines = [
+        f"{record['cell']}: {record['status']}, {record['cycle_time_s']:g} s",
+        f"  lower bound {record['bound_s']:g} s{gap}: of {record['bound_holds_for']}",
+        f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; the part "
+        f"moves for {record['part_moves_s']:g} s between {record['stations']} poses",
+        f"  the nearest tasks first would take {record['greedy_cycle_s']:g} s",
+    ]
+    for name, use in record["robots"].items():
+        busiest = " (busiest)" if name == binding["busiest_robot"] else ""
+        lines.append(
+            f"  {name}: {use['tasks']} tasks, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
+        )
+    if only:
+        lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
+    for block in record["blocks"]:
+        tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
+        lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}")
+    return [*lines, *(f"  FAILED {message}" for message in record["failed"])]
+
+
+# Page
+
+
+def assign_page(record: Record) -> str:
+    """The page of an assignment."""
+    robots = list(record["robots"])
+    return template("jobs/assign/assign.html").render(
+        r=record,
+        figures=[
+            figure("cycle", f"{record['cycle_time_s']:g}", "s", is_bad=record["status"] != "passed"),
+            figure("lower bound", f"{record['bound_s']:g}", "s", note=record["bound_holds_for"]),
+        ],
+        bars=_bars(record),
+        colours=dict(zip(robots, ROBOTS * len(robots), strict=False)),
+        caution=CAUTION,
+    )
+
+
+def _bars(record: Record) -> list[tuple[str, list[tuple[float, float, str]]]]:
+    """For each robot, where its bars begin, how long they are in [%] of the cycle, and their tasks."""
+    cycle = record["cycle_time_s"]
+    return [
+        (
+            robot,
+            [
+                (100.0 * block["begin_s"] / cycle, 100.0 * it["work_s"] / cycle, it["task"])
+                for block in record["blocks"]
+                if (it := block["tasks"].get(robot))
+            ],
+        )
+        for robot in record["robots"]
+    ]
+
+
+# Tables and files
+
+
+def assign_tables(record: Record) -> Tables:
+    """The tables of frames and notebooks: tasks in their blocks, and the use of the robots."""
+    tasks = [
+        {"block": block["block"], "begin_s": block["begin_s"], "robot": robot, **it}
+        for block in record["blocks"]
+        for robot, it in block["tasks"].items()
+    ]
+    robots = [{"robot": name, **use} for name, use in record["robots"].items()]
+    return {"tasks": lambda: columns_of(map(flat, tasks), []), "robots": lambda: columns_of(map(flat, robots), [])}
+
+
+def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progress: Progress = silent) -> Record:
+    """Write an assignment into a folder, which appears whole or not at all.
+
+    It holds ``assign.json``, ``assign.html``, ``best.yaml`` with the files that it names, and its run.
+
+    Args:
+        given: The cell file that it was made from.
+        folder: The folder; an earlier one is replaced.
+        progress: Called with the stage and the fraction done.
+
+    Returns:
+        The record in ``assign.json``.
+
+    Raises:
+        InputError: The folder cannot be written, or holds something that cellplan did not write.
+    """
+    record = assign_record(assignment)
+    head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s, at least {record['bound_s']:g} s."
+    with RunFolder(folder) as target:
+        files = result_files(assignment.cell, given, folder, head=head)
+        for name, content in files.items():
+            target.write_bytes(name, content)
+        record["files"] = file_records(files)
+        target.write_text("assign.json", as_json(record))
+        target.write_text("assign.html", assign_page(record))
+        write_run(assignment.solution, target.within("run"), progress=progress)
+    return record
+
+
+ASSIGNMENT: Final = ResultKind(
+    name="assignment",
+    title="Assignment",
+    file="assign.json",
+    made_of=Assignment,
+    record=assign_record,
+    tables=assign_tables,
+    shown={"robots": ("robot", "tasks", "work_s", "use_percent")},
+)

@@ -1,0 +1,48 @@
+"""Assignment: what a search chooses of who does which task, in which order, at which pose of the part."""
+
+from typing import Annotated, Final, Literal
+
+from pydantic import Field, Tag
+
+from cellplan.model.settings.entry import Angle, Entry, by_kind
+from cellplan.model.settings.units import Deg, Mm, Within
+
+STATION_LIMIT: Final = 40  # poses of the part in use
+POSTURE_LIMIT: Final = 1000  # that are compared
+WIDEST_CONFLICT_MM: Final = 1000.0
+STATION_WORDS: Final = "a list of postures or a mapping of joints to [first, last, step] (tilt_deg, rail_mm)"
+
+StationChoice = Annotated[
+    Annotated[tuple[tuple[float, ...], ...], Field(min_length=1, max_length=POSTURE_LIMIT), Tag("<list>")]
+    | Annotated[dict[str, tuple[float, float, float]], Field(min_length=1), Tag("<mapping>")],
+    by_kind(STATION_WORDS, list=tuple, mapping=dict),
+]
+FreeWord = Literal["direction", "spin", "station"]
+
+
+class AssignEntry(Entry):
+    """What ``cellplan assign`` chooses beside the robots of tasks that are open, and the order of all."""
+
+    stations: StationChoice | None = Field(
+        default=None,
+        description="Poses of the part that are compared, as postures of its first holder: a list of them, one value "
+        "per joint, or a grid of its joints, [first, last, step] for each key (tilt_deg, rail_mm); a joint without a "
+        "key stays at its start. When absent those that the tasks and the start of the holder give.",
+    )
+    free: tuple[FreeWord, ...] = Field(
+        default=("direction", "spin", "station"),
+        description="What may be chosen anew for every task: the direction of an open polyline whose tool stands "
+        "across it, the turn of the tool about its axis, the pose of the part.",
+    )
+    spin_step_deg: Annotated[Deg, Within(ge=5.0, le=360.0)] = Field(
+        default=Deg(60.0), description="Step of the turns of the tool about its axis that are compared."
+    )
+    torch_within_deg: Annotated[Angle, Within(gt=0.0, le=180.0)] = Field(
+        default=Deg(180.0), description="Largest angle between the axis of every tool along its path and gravity."
+    )
+    most_stations: Annotated[int, Field(ge=1, le=STATION_LIMIT)] = Field(
+        default=8, description="Number of poses of the part that are in use at most."
+    )
+    conflict_mm: Annotated[Mm, Within(ge=0.0, le=WIDEST_CONFLICT_MM)] = Field(
+        default=Mm(50.0), description="Robots that would come nearer to each other than that are not at work together."
+    )
