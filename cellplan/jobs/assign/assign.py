@@ -20,7 +20,6 @@ from cellplan.model.cell.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.model.robot.robot import RobotModel, start_keys
-from cellplan.model.settings.units import file_number
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.runs.solution import Run, Solution
@@ -261,7 +260,7 @@ def _task_values(
     task = cell.task(end.mode.task)
     place = f"tasks.{task.name}"
     values: dict[str, object] = {f"{place}.robot": robot}
-    spin = file_number(float(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), is_revolute=True)
+    spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
     if end.mode.spin:
         values[f"{place}.spin_deg"] = spin
     values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)

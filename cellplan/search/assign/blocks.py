@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from cellplan.search.assign.cliques import cliques_at
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.schedule import BlockSchedule, Choice
+from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
 
 HORIZON: Final = 10_000_000  # [steps] no cycle is longer
@@ -68,6 +68,7 @@ class _BlockModel:
         self._together()
         self._no_conflicts()
         self._cliques()
+        self._in_order()
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
         objective = self.model.new_int_var(0, HORIZON, "")
         self.model.add(objective >= cost)
@@ -79,7 +80,8 @@ class _BlockModel:
         blocks = {leader: [leader] for leader, _ in solved.true(self.leads)}
         for task, leader in solved.true(self.joins):
             blocks[leader].append(task)
-        return BlockSchedule(blocks=tuple(map(tuple, blocks.values())), chosen=chosen)
+        ordered = in_order(list(map(tuple, blocks.values())), self.instance.goals)
+        return BlockSchedule(blocks=ordered or (), chosen=chosen)
 
     def hints(self, schedule: BlockSchedule) -> list[tuple[Any, bool]]:
         """The values that a schedule has."""
@@ -164,6 +166,18 @@ class _BlockModel:
                     sum(it * steps(task) for task, it in leads) >= sum(it * steps(task) for task, it in done)
                 )
                 self.model.add(sum(it for _, it in leads) >= sum(it for _, it in done))
+
+    def _in_order(self) -> None:
+        """Tasks come in later blocks than those that they must follow."""
+        tasks = self.instance.tasks
+        pairs = [(task, first) for task in tasks for first in self.instance.goals[task].after if first in tasks]
+        if not pairs:
+            return
+        place = {task: self.model.new_int_var(0, len(tasks) - 1, "") for task in tasks}
+        for task, first in pairs:
+            self.model.add(place[task] > place[first])
+        for (task, leader), join in self.joins.items():
+            self.model.add(place[task] == place[leader]).only_enforce_if(join)
 
     def _tour(self, least: int) -> Any:
         """Steps of the part from home over all stations in use and back, beyond the transfers that are counted."""

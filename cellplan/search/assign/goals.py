@@ -27,6 +27,7 @@ class TaskGoal:
     X_PT: Array  # tool poses at the end of the approach's way, along the path, and after the retraction, (S + 2, 4, 4)
     steps: int  # whole steps from the begin of the approach to the end of the retraction
     is_reversible: bool  # whether it may be done from its end to its begin with the same tool poses
+    after: tuple[str, ...] = ()  # tasks that must be done before it begins
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +74,7 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
                 X_PT=np.concatenate([ends[:1], on_path, ends[1:]]),
                 steps=int(np.ceil(clocked[task.name].over / cell.motion.step - 1e-9)),
                 is_reversible=is_reversible(toolpath, on_path),
+                after=task.after,
             )
         )
     return goals

@@ -1,26 +1,22 @@
 """Schedules without a solver: station by station, the scarcest tasks first, then exchanges while they save time."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.schedule import BlockSchedule, Choice
+from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 
 
 def greedy_schedule(instance: Instance) -> BlockSchedule:
     """The stations at which most tasks are left first; at each, every robot takes a task that few others can do."""
-    left, used = set(instance.tasks), set[int]()
+    left = set(instance.tasks)
     blocks, chosen = list[tuple[str, ...]](), dict[str, Choice]()
     while left:
-        station = max(
-            (it for it in instance.used if it not in used), key=lambda it: (len(_here(instance, left, it)), -it)
-        )
-        used.add(station)
-        here = _here(instance, left, station)
-        while here:
+        station = max(instance.used, key=lambda it: (len(_here(instance, left, it)), -it))
+        while here := _here(instance, left, station):
             block = _block(instance, station, here)
             chosen |= {task: (robot, station) for robot, task in block.items()}
             blocks.append(tuple(block.values()))
-            here -= set(block.values())
             left -= set(block.values())
     return BlockSchedule(blocks=tuple(blocks), chosen=chosen)
 
@@ -29,15 +25,21 @@ def improved(instance: Instance, schedule: BlockSchedule) -> BlockSchedule:
     """Tasks moved to other blocks and robots, one or two at a time, while the work of all blocks gets shorter."""
     best, shortest = schedule, schedule.work(instance)
     while True:
-        better = next((it for it in _neighbours(instance, best) if it.work(instance) < shortest), None)
+        shorter = (it for it in _neighbours(instance, best) if it.work(instance) < shortest)
+        ordered = ((it, in_order(it.blocks, instance.goals)) for it in shorter)
+        better = next((replace(it, blocks=blocks) for it, blocks in ordered if blocks is not None), None)
         if better is None:
             return best
         best, shortest = better, better.work(instance)
 
 
 def _here(instance: Instance, left: set[str], station: int) -> set[str]:
-    """Tasks that are left and can be done at a station."""
-    return {task for task in left if any(at == station for _, at in instance.options[task])}
+    """Tasks that are left, can be done at a station and come after no other one that is left."""
+    return {
+        task
+        for task in left
+        if left.isdisjoint(instance.goals[task].after) and any(at == station for _, at in instance.options[task])
+    }
 
 
 def _able(instance: Instance, task: str, station: int) -> list[str]:

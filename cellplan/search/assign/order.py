@@ -5,15 +5,16 @@ takes as long as its slowest robot, or the part. Transfers that are not free str
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise, permutations
 from typing import Final
 
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
+from cellplan.search.assign.goals import TaskGoal
 from cellplan.search.assign.instance import End, Instance
-from cellplan.search.assign.schedule import BlockSchedule
+from cellplan.search.assign.schedule import BlockSchedule, in_order
 
 MOST_PERMUTED: Final = 7  # stations of which all tours are compared
 TOURS: Final = 4  # shortest ones that are tried
@@ -71,7 +72,7 @@ class Sequencer:
         """The best order found: stations in a short tour, blocks of a station relocated while that saves time."""
         best = min((self.sequenced(tour) for tour in self.tours(schedule)), key=lambda it: it.steps)
         while True:
-            trials = (self.sequenced(trial) for trial in relocations(best.schedule))
+            trials = (self.sequenced(trial) for trial in relocations(best.schedule, self.instance.goals))
             better = next((trial for trial in trials if trial.steps < best.steps), None)
             if better is None:
                 return best
@@ -140,19 +141,18 @@ class Sequencer:
         return self.instance.homes[robot] if end is None else end.begin
 
     def tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
-        """The blocks with their stations in the shortest tours."""
+        """The blocks with their stations in the shortest tours; where tasks must follow others, as soon as they may."""
         stations = list(dict.fromkeys(schedule.station_of(block) for block in schedule.blocks))
         if len(stations) > MOST_PERMUTED:
             orders = [self._nearest_first(stations)]
         else:
-            orders = sorted(permutations(stations), key=lambda order: (self._length(order), order))[:TOURS]
-        return [
-            BlockSchedule(
-                blocks=tuple(block for at in order for block in schedule.blocks if schedule.station_of(block) == at),
-                chosen=schedule.chosen,
-            )
-            for order in orders
-        ]
+            orders = sorted(permutations(stations), key=lambda order: (self._length(order), order))
+        tours = list[BlockSchedule]()
+        for order in orders:
+            blocks = sorted(schedule.blocks, key=lambda block: order.index(schedule.station_of(block)))
+            if (ordered := in_order(blocks, self.instance.goals)) is not None and len(tours) < TOURS:
+                tours.append(replace(schedule, blocks=ordered))
+        return tours
 
     def _length(self, order: Sequence[int]) -> int:
         """Steps of the part over stations in an order, from home and back."""
@@ -169,7 +169,7 @@ class Sequencer:
         return tuple(order)
 
 
-def relocations(schedule: BlockSchedule) -> Iterator[BlockSchedule]:
+def relocations(schedule: BlockSchedule, goals: Mapping[str, TaskGoal]) -> Iterator[BlockSchedule]:
     """Schedules in which one block is at another place among those of its station."""
     stations = [schedule.station_of(block) for block in schedule.blocks]
     for source, station in enumerate(stations):
@@ -177,4 +177,5 @@ def relocations(schedule: BlockSchedule) -> Iterator[BlockSchedule]:
             if source != target and station == other:
                 blocks = list(schedule.blocks)
                 blocks.insert(target, blocks.pop(source))
-                yield BlockSchedule(blocks=tuple(blocks), chosen=schedule.chosen)
+                if in_order(blocks, goals) == tuple(blocks):
+                    yield replace(schedule, blocks=tuple(blocks))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from cellplan.search.assign.goals import TaskGoal
 from cellplan.search.assign.instance import Instance
 
 Choice = tuple[str, int]  # robot and station of a task
@@ -24,6 +25,20 @@ class BlockSchedule:
         return sum(max(instance.steps(task) for task in block) for block in self.blocks)
 
 
+def in_order(blocks: Sequence[tuple[str, ...]], goals: Mapping[str, TaskGoal]) -> tuple[tuple[str, ...], ...] | None:
+    """Blocks so that every task comes after those that it must follow, else as they are; None where no order does."""
+    left, ordered = list(blocks), list[tuple[str, ...]]()
+    while left:
+        open_tasks = {task for block in left for task in block}
+        ready = (block for block in left if all(open_tasks.isdisjoint(goals[task].after) for task in block))
+        block = next(ready, None)
+        if block is None:
+            return None
+        left.remove(block)
+        ordered.append(block)
+    return tuple(ordered)
+
+
 def refuse_impossible(instance: Instance, schedule: BlockSchedule) -> None:
     """Refuse a schedule that is not one of an instance.
 
@@ -31,6 +46,8 @@ def refuse_impossible(instance: Instance, schedule: BlockSchedule) -> None:
         ValueError: With what is wrong with it.
     """
     done = [task for block in schedule.blocks for task in block]
+    if in_order(schedule.blocks, instance.goals) != schedule.blocks:
+        raise ValueError("expected every task after those that it must follow")
     if sorted(done) != sorted(instance.tasks):
         raise ValueError(f"expected every task once, got {done}")
     for block in schedule.blocks:

@@ -59,7 +59,7 @@ class TransferCertifier:
             better = next(
                 (
                     settled
-                    for trial in relocations(best.schedule)
+                    for trial in relocations(best.schedule, sequencer.instance.goals)
                     if sequencer.sequenced(trial).steps < best.steps
                     and (settled := self.settle(sequencer, trial)).steps < best.steps
                 ),

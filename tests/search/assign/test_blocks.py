@@ -1,0 +1,107 @@
+"""The block model by enumeration of every schedule, and schedules without a solver beside it."""
+
+from collections.abc import Iterator
+from itertools import pairwise, permutations, product
+
+import pytest
+from builders.assignments import small_instance
+
+from cellplan.search.assign.blocks import solve_blocks
+from cellplan.search.assign.cliques import cliques_at, excludes
+from cellplan.search.assign.greedy import greedy_schedule, improved
+from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.order import Sequencer
+from cellplan.search.assign.schedule import BlockSchedule, in_order, refuse_impossible
+
+LEAST = 5  # [steps] of a transfer
+
+
+def partitions(tasks: tuple[str, ...]) -> Iterator[list[list[str]]]:
+    """All ways to split tasks into blocks."""
+    if not tasks:
+        yield []
+        return
+    first, *rest = tasks
+    for blocks in partitions(tuple(rest)):
+        yield [[first], *blocks]
+        for place in range(len(blocks)):
+            yield [*blocks[:place], [first, *blocks[place]], *blocks[place + 1 :]]
+
+
+def is_schedule(instance: Instance, schedule: BlockSchedule) -> bool:
+    try:
+        refuse_impossible(instance, schedule)
+    except ValueError:
+        return False
+    return True
+
+
+def model_cycle(instance: Instance, schedule: BlockSchedule) -> int:
+    """Blocks, a least transfer for each, and the shortest tour of the part beyond the transfers that are counted."""
+    stations = {schedule.station_of(block) for block in schedule.blocks}
+    tours = []
+    for order in permutations(sorted(stations)):
+        places = [None, *order]
+        steps = sum(max(instance.station_steps(a, b) - LEAST, 0) for a, b in pairwise(places))
+        tours.append(steps + instance.station_steps(places[-1], None))
+    return schedule.work(instance) + LEAST * len(schedule.blocks) + min(tours)
+
+
+def best_by_enumeration(instance: Instance) -> int:
+    best = 10**9
+    for choices in product(*(instance.options[task] for task in instance.tasks)):
+        chosen = dict(zip(instance.tasks, choices, strict=True))
+        for split in partitions(instance.tasks):
+            blocks = in_order([tuple(block) for block in split], instance.goals)
+            schedule = None if blocks is None else BlockSchedule(blocks=blocks, chosen=chosen)
+            if schedule is not None and is_schedule(instance, schedule):
+                best = min(best, model_cycle(instance, schedule))
+    return best
+
+
+@pytest.mark.parametrize(("seed", "chained"), [(0, False), (1, False), (2, True), (3, True)])
+def test_the_model_is_as_good_as_enumeration(seed: int, chained: bool) -> None:
+    pytest.importorskip("ortools")
+    instance = small_instance(seed, 4, chained=chained)
+
+    answer = solve_blocks(instance, least=LEAST, effort=10.0)
+
+    assert answer.schedule is not None
+    refuse_impossible(instance, answer.schedule)
+    assert answer.is_proved
+    assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_exchanges_keep_schedules_possible_and_never_make_them_longer(seed: int) -> None:
+    instance = small_instance(seed, 9, stations=3, chained=seed % 2 == 0)
+
+    greedy = greedy_schedule(instance)
+    exchanged = improved(instance, greedy)
+
+    refuse_impossible(instance, greedy)
+    refuse_impossible(instance, exchanged)
+    assert exchanged.work(instance) <= greedy.work(instance)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_of_a_clique_are_never_at_work_together(seed: int) -> None:
+    instance = small_instance(seed, 8)
+
+    for station in instance.used:
+        for clique in cliques_at(instance, station):
+            assert all(excludes(instance, station, a, b) for a in clique for b in clique if a != b)
+            assert len(clique) > 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_bound_is_below_every_sequence_of_blocks(seed: int) -> None:
+    pytest.importorskip("ortools")
+    instance = small_instance(seed, 6, modes=2)
+    sequencer = Sequencer(instance)
+
+    answer = solve_blocks(instance, least=0, effort=5.0)
+
+    for schedule in (greedy_schedule(instance), improved(instance, greedy_schedule(instance)), answer.schedule):
+        assert schedule is not None
+        assert sequencer.ordered(schedule).steps >= answer.bound

@@ -1,0 +1,100 @@
+"""Modes along an order of blocks by enumeration, and straight times by the planner of transfer moves."""
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from builders.assignments import STEP, small_instance
+
+from cellplan.planning.timing.retime import JointLimitsInTime
+from cellplan.planning.transfer.straight_time import box_widths
+from cellplan.search.assign.greedy import greedy_schedule
+from cellplan.search.assign.instance import End, Instance, least_transfer, straight_steps
+from cellplan.search.assign.order import Refusal, Sequencer, relocations
+from cellplan.search.assign.schedule import BlockSchedule, in_order
+
+
+def steps_of(instance: Instance, schedule: BlockSchedule, picked: dict[str, End]) -> int:
+    """Steps from home to home with given modes, each transfer as slow as its slowest robot or the part."""
+    total, at, station = schedule.work(instance), dict(instance.homes), None
+    for block in (*schedule.blocks, ()):
+        here = schedule.station_of(block) if block else None
+        goals = {robot: instance.homes[robot] for robot in instance.robots}
+        goals |= {schedule.chosen[task][0]: picked[task].begin for task in block}
+        moves = [int(instance.transfer_steps(robot, at[robot], goal)) for robot, goal in goals.items()]
+        total += max([*moves, instance.station_steps(station, here)])
+        at = goals | {schedule.chosen[task][0]: picked[task].end for task in block}
+        station = here
+    return total
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_choice_of_modes_is_faster(seed: int) -> None:
+    instance = small_instance(seed, 5, modes=2)
+    schedule = greedy_schedule(instance)
+
+    sequenced = Sequencer(instance).sequenced(schedule)
+
+    ends = [instance.ends(task, *schedule.chosen[task]) for task in instance.tasks]
+    every = (dict(zip(instance.tasks, choice, strict=True)) for choice in product(*ends))
+    picked = {end.mode.task: end for _, stop in sequenced.stops for end in stop if end is not None}
+    assert sequenced.steps == min(steps_of(instance, schedule, choice) for choice in every)
+    assert sequenced.steps == steps_of(instance, schedule, picked)
+
+
+def test_a_refused_transfer_is_avoided_or_costs_what_it_takes() -> None:
+    instance = small_instance(1, 5, modes=2)
+    schedule, sequencer = greedy_schedule(instance), Sequencer(instance)
+    before = sequencer.sequenced(schedule)
+    end = next(end for end in before.stops[0][1] if end is not None)
+    robot = end.mode.robot
+
+    sequencer.refusals.append(
+        Refusal(
+            before={robot: instance.homes[robot].tobytes()},
+            after={robot: end.begin.tobytes()},
+            stations=(None, before.stops[0][0]),
+            steps=10_000,
+        )
+    )
+    after = sequencer.sequenced(schedule)
+
+    assert before.steps <= after.steps < 10_000
+    assert all(other is None or other.begin is not end.begin for other in after.stops[0][1])
+
+
+@pytest.mark.parametrize("jerk", [np.inf, 40.0, 4000.0])
+def test_straight_steps_are_those_of_the_planner_of_transfers(jerk: float) -> None:
+    rng = np.random.default_rng(4)
+    bounds = JointLimitsInTime(velocity=rng.uniform(1, 4, 6), acceleration=rng.uniform(3, 20, 6), jerk=np.full(6, jerk))
+    moves = rng.normal(size=(40, 6)) * rng.choice([0.01, 0.3, 2.0], (40, 1))
+
+    steps = straight_steps(moves, bounds, STEP)
+
+    assert steps.tolist() == [int(np.ceil(sum(box_widths(move, bounds, least=STEP)) / STEP)) for move in moves]
+    assert straight_steps(np.zeros((2, 6)), bounds, STEP).tolist() == [0, 0]
+
+
+def test_relocated_blocks_stay_at_their_stations_and_in_order() -> None:
+    instance = small_instance(3, 8, chained=True)
+    schedule = greedy_schedule(instance)
+
+    for trial in relocations(schedule, instance.goals):
+        assert sorted(trial.blocks) == sorted(schedule.blocks)
+        assert in_order(trial.blocks, instance.goals) == trial.blocks
+        assert [trial.station_of(it) for it in trial.blocks] == [schedule.station_of(it) for it in schedule.blocks]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_transfer_is_shorter_than_the_least_one(seed: int) -> None:
+    instance = small_instance(seed, 7, modes=2, stations=3)
+    sequenced = Sequencer(instance).sequenced(greedy_schedule(instance))
+    at, least = dict(instance.homes), least_transfer(instance)
+
+    for (first, _), (station, ends) in pairwise([(None, ()), *sequenced.stops]):
+        goals = {
+            robot: instance.homes[robot] if end is None else end.begin for robot, end in zip("ab", ends, strict=True)
+        }
+        moves = [int(instance.transfer_steps(robot, at[robot], goal)) for robot, goal in goals.items()]
+        assert max([*moves, instance.station_steps(first, station)]) >= least
+        at = {robot: goals[robot] if end is None else end.end for robot, end in zip("ab", ends, strict=True)}
