@@ -11,17 +11,18 @@ From a cell file to a verified program, in a few lines::
 The public interface; everything else may change without notice:
 
 - read: ``load_cell``, ``load_errors``
-- compute: ``solve``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``map_study``,
+- compute: ``solve``, ``assign``, ``fastest``, ``screen``, ``sweep``, ``compare``, ``base_map``, ``map_study``,
   ``search_layout``, ``repair``, ``rehearse``, ``recover``
 - verify: ``verify``, ``open_gate``
-- write: ``write_run``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``, ``write_repair``,
-  ``write_recovery``, ``export_program``, ``export_programs``; 3-D pages: ``view``, ``write_view``; floor plans:
-  ``requested_floor_plan``, ``write_floor_plan``
+- write: ``write_run``, ``write_assignment``, ``write_fastest``, ``write_base_map``, ``write_rehearsal``,
+  ``write_repair``, ``write_recovery``, ``export_program``, ``export_programs``; 3-D pages: ``view``, ``write_view``;
+  floor plans: ``requested_floor_plan``, ``write_floor_plan``
 - show: ``tables``, ``to_frame``, ``to_html``: results as pandas frames, and in a notebook
-- inputs: ``Cell``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``, ``Axis``, ``BaseGrid``,
-  ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``, ``FloorPlanRequest``, ``Choice``
-- results: ``Solution``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``, ``Screening``,
-  ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``
+- inputs: ``Cell``, ``AssignmentDraft``, ``Robot``, ``Part``, ``Task``, ``Toolpath``, ``Candidates``, ``SweepJob``,
+  ``Axis``, ``BaseGrid``, ``CompareJob``, ``LayoutRequest``, ``MapRequest``, ``Stop``, ``ViewRequest``,
+  ``FloorPlanRequest``, ``Choice``
+- results: ``Solution``, ``Assignment``, ``ShortestCycles``, ``Motion``, ``Program``, ``Report``, ``Check``,
+  ``Screening``, ``LayoutResult``, ``Recovery``, ``Repair``, ``VerifiedRun``, ``Exported``
 - errors: ``CellplanError``
 
 All values are frozen data in metres, radians and seconds, with NumPy arrays; frames, pages and files are in mm, deg and
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from cellplan.errors import CellplanError
     from cellplan.files.cell.load import load_cell
     from cellplan.files.cell_errors import load_errors
+    from cellplan.jobs.assign.assign import Assignment, assign
+    from cellplan.jobs.assign.draft import AssignmentDraft
+    from cellplan.jobs.assign.result import write_assignment
     from cellplan.jobs.base_map.base_map import base_map, map_study, write_base_map
     from cellplan.jobs.base_map.grid import BaseGrid
     from cellplan.jobs.base_map.prepared import MapRequest
@@ -85,6 +89,8 @@ if TYPE_CHECKING:
     from cellplan.study.variants import Axis
 
 _HOME: Final = {
+    "Assignment": "jobs.assign.assign",
+    "AssignmentDraft": "jobs.assign.draft",
     "Axis": "study.variants",
     "BaseGrid": "jobs.base_map.grid",
     "Candidates": "planning.layout_screening",
@@ -114,6 +120,7 @@ _HOME: Final = {
     "Toolpath": "model.task.toolpath",
     "VerifiedRun": "model.report.verified_run",
     "ViewRequest": "jobs.view.write",
+    "assign": "jobs.assign.assign",
     "base_map": "jobs.base_map.base_map",
     "compare": "jobs.compare.compare",
     "export_program": "programs.export.program",
@@ -136,6 +143,7 @@ _HOME: Final = {
     "to_html": "jobs.present.notebook",
     "verify": "runs.verify",
     "view": "jobs.view.write",
+    "write_assignment": "jobs.assign.result",
     "write_base_map": "jobs.base_map.base_map",
     "write_fastest": "jobs.fastest.result",
     "write_floor_plan": "jobs.floor_plan_file",
@@ -147,6 +155,8 @@ _HOME: Final = {
 }
 
 __all__ = [
+    "Assignment",
+    "AssignmentDraft",
     "Axis",
     "BaseGrid",
     "Candidates",
@@ -177,6 +187,7 @@ __all__ = [
     "VerifiedRun",
     "ViewRequest",
     "__version__",
+    "assign",
     "base_map",
     "compare",
     "export_program",
@@ -199,6 +210,7 @@ __all__ = [
     "to_html",
     "verify",
     "view",
+    "write_assignment",
     "write_base_map",
     "write_fastest",
     "write_floor_plan",

@@ -225,7 +225,9 @@ def short(places: set[str]) -> list[str]:
 def test_every_engine_is_a_declared_dependency() -> None:
     """Extras read xacro files, talk to a cluster, write DXF, PNG and PDF, make frames: only who does so needs them."""
     extras = CONFIGURATION["project"]["optional-dependencies"]
-    further = [requirement for name in ("xacro", "cluster", "plots", "dxf", "frames") for requirement in extras[name]]
+    further = [
+        requirement for name in ("assign", "xacro", "cluster", "plots", "dxf", "frames") for requirement in extras[name]
+    ]
     requirements = [*CONFIGURATION["project"]["dependencies"], *further]
     declared = {re.split(r"[<>=!~ \[]", requirement)[0].lower() for requirement in requirements}
     package_of = {"pinocchio": "pin", "fcl": "python-fcl", "yaml": "pyyaml", "pydantic_core": "pydantic"}

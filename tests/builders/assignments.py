@@ -35,15 +35,15 @@ def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, 
         )
         for name in names
     }
-    found = {}
+    modes_by_key = {}
     for name in names:
         able = [(robot, at) for robot in ROBOTS for at in range(stations) if rng.random() < 0.7]
         for robot, at in able or [("a", 0)]:
-            found[name, robot, at] = tuple(_mode(name, robot, at, rng) for _ in range(modes))
+            modes_by_key[name, robot, at] = tuple(_mode(name, robot, at, rng) for _ in range(modes))
     conflicts = frozenset(
         frozenset((first, second))
-        for first in found
-        for second in found
+        for first in modes_by_key
+        for second in modes_by_key
         if first[0] != second[0] and first[1] != second[1] and first[2] == second[2] and rng.random() < 0.3
     )
     limits = JointLimitsInTime(velocity=np.full(2, 2.7), acceleration=np.full(2, 10.0), jerk=np.full(2, np.inf))
@@ -51,7 +51,7 @@ def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, 
     return Instance(
         goals=goals,
         robots=ROBOTS,
-        modes=found,
+        modes=modes_by_key,
         stations=Stations(
             holder="table", q=rng.uniform(-1, 1, (stations, 2)), X_WP=np.tile(np.eye(4), (stations, 1, 1))
         ),

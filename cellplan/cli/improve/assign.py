@@ -36,10 +36,10 @@ def assign(options: AssignOptions) -> Result:
     """
     from cellplan.files.run.folder import refuse_unless_replaceable
     from cellplan.jobs.assign.assign import assign as assigned
-    from cellplan.jobs.assign.draft import Draft
+    from cellplan.jobs.assign.draft import AssignmentDraft
     from cellplan.jobs.assign.result import assign_lines, write_assignment
 
-    draft = Draft.load(options.cell, allow_dirs=options.allow_dirs)
+    draft = AssignmentDraft.load(options.cell, allow_dirs=options.allow_dirs)
     folder = options.output or Path("outputs") / f"{draft.cell.name}-assign"
     refuse_unless_replaceable(folder)
     with progress_listener(quiet=options.quiet) as progress:

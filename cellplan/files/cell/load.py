@@ -27,7 +27,7 @@ from cellplan.files.cell.build.mounting import (
 from cellplan.files.cell.build.srdf import apply_srdfs
 from cellplan.files.cell.changes import changed, plain_values
 from cellplan.files.cell.layout.build_layout import read_layout
-from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, with_first_robots
+from cellplan.files.cell.open_tasks import open_task_findings, open_tasks, unknown_robot_findings, with_first_robots
 from cellplan.files.cell.referenced_files import Sources
 from cellplan.files.cell.rules.path_rules import path_findings
 from cellplan.files.cell.rules.program_rules import posture_findings, program_findings, with_stand_offs
@@ -128,10 +128,10 @@ def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tupl
     """
     path = Path(path)
     document = read_yaml(path, file=str(path))
-    allowed, robots = tuple(Path(folder) for folder in allow_dirs), open_tasks(document.root)
-    first = {f"tasks.{name}.robot": able[0] for name, able in robots.items() if able}
-    source = CellFile(document=changed(document, first), name=path.name, folder=path.parent, allow_dirs=allowed)
-    return _read(source), robots
+    raise_findings(str(path), list(unknown_robot_findings(document)))
+    allowed, first = tuple(Path(folder) for folder in allow_dirs), with_first_robots(document)
+    source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed)
+    return _read(source), open_tasks(document.root)
 
 
 def _read(source: CellFile) -> Cell:

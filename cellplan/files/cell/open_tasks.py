@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
-from cellplan.files.input.findings import Finding, shown
+from cellplan.files.input.findings import Finding, did_you_mean, listed, shown
 from cellplan.files.yaml.reader import YamlDocument
 
 ANY: Final = "any"
@@ -51,3 +51,15 @@ def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
         value = document.root["tasks"][name]["robot"]
         words = f"expected the name of a robot, got {shown(value)}: cellplan assign chooses who does an open task"
         yield document.finding(("tasks", name, "robot"), words)
+
+
+def unknown_robot_findings(document: YamlDocument) -> Iterator[Finding]:
+    """Refuse lists with names that are not those of robots."""
+    for name, robots in open_tasks(document.root).items():
+        known = list(document.root["robots"])
+        for index, robot in enumerate(robots):
+            if robot not in known:
+                words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
+                yield document.finding(("tasks", name, "robot", index), words)
+        if not robots:
+            yield document.finding(("tasks", name, "robot"), "expected a robot that does not hold the part, got none")

@@ -15,22 +15,22 @@ import numpy as np
 from cellplan.errors import NoSolutionError
 from cellplan.files.cell.write import in_file_units
 from cellplan.geometry.arrays import Array
-from cellplan.jobs.assign.draft import Draft
+from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.model.cell.cell import Cell
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
 from cellplan.model.robot.robot import RobotModel, start_keys
-from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.blocks import solve_blocks
+from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.table import ModeSearch, ModeTable
 from cellplan.search.assign.transfers import TransferCertifier
 
@@ -48,7 +48,9 @@ class Assignment(Presented):
     solution: Solution  # it, solved and verified
     instance: Instance  # what was chosen from
     sequenced: SequencedBlocks
-    bound: float  # no program in blocks at the chosen stations, with the modes and conflicts found, is shorter, in [s]
+    bound: (
+        float | None
+    )  # no program in blocks at these stations, with these modes, is shorter, in [s]; None if not known
     is_proved: bool  # whether no schedule of the block model is better than the one that was first sequenced
     greedy: float  # cycle in [s] of the nearest tasks first, by the model
     rounds: int  # programs that were solved
@@ -72,11 +74,14 @@ class Assignment(Presented):
     def __repr__(self) -> str:
         """One line without arrays."""
         verdict = "passed" if self.passed else "failed"
-        return f"<Assignment of '{self.cell.name}': {self.cycle:.4g} s, at least {self.bound:.4g} s; {verdict}>"
+        bound = "" if self.bound is None else f", at least {self.bound:.4g} s"
+        return f"<Assignment of '{self.cell.name}': {self.cycle:.4g} s{bound}; {verdict}>"
 
 
-def assign(draft: Draft, *, effort: int = 2, progress: Progress = silent) -> Assignment:
+def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = silent) -> Assignment:
     """Choose robots, order, directions, spins and poses of the part for all tasks.
+
+    Without OR-Tools blocks are improved by exchanges alone, and no lower bound is known.
 
     Args:
         draft: The cell with open tasks.
@@ -84,7 +89,7 @@ def assign(draft: Draft, *, effort: int = 2, progress: Progress = silent) -> Ass
         progress: Called with the stage and the fraction done.
 
     Raises:
-        InputError: Something in the cell cannot be assigned, or OR-Tools is missing.
+        InputError: Something in the cell cannot be assigned.
         NoSolutionError: A task can be done by no robot at any pose of the part, or no program passed.
     """
     progress("table of modes", 0.0)
@@ -97,7 +102,8 @@ def assign(draft: Draft, *, effort: int = 2, progress: Progress = silent) -> Ass
         cell = written_cell(draft, instance, planned.sequenced)
         solution = _solved(cell, progress)
         if number == 1:
-            bound, is_proved = planned.bound * instance.step, planned.is_proved
+            bound = None if planned.bound is None else planned.bound * instance.step
+            is_proved = planned.is_proved
         if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
             return Assignment(
                 draft=draft.cell,
@@ -109,7 +115,7 @@ def assign(draft: Draft, *, effort: int = 2, progress: Progress = silent) -> Ass
                 is_proved=is_proved,
                 greedy=planned.greedy * instance.step,
                 rounds=number,
-                counts=counts | {"certificates": planned.asked, "refused": planned.refused},
+                counts=counts | {"certificates": planned.examined, "refused": planned.refused},
             )
         instance = without_failed(instance, planned.sequenced, solution)
     raise NoSolutionError(
@@ -122,17 +128,17 @@ class _Planned:
     """A schedule with its modes, and what is known of it."""
 
     sequenced: SequencedBlocks
-    bound: int  # [steps]
+    bound: int | None  # [steps]
     is_proved: bool
     greedy: int  # [steps]
-    asked: int
+    examined: int
     refused: int
 
 
 class _Search:
     """The search of one draft."""
 
-    def __init__(self, draft: Draft, effort: int) -> None:
+    def __init__(self, draft: AssignmentDraft, effort: int) -> None:
         self.draft, self._effort = draft, EFFORT[effort - 1]
         self._scene = Scene.from_cell(draft.cell)
         self.counts: dict[str, int] = {}
@@ -170,12 +176,7 @@ class _Search:
             used=used,
             conflicts=find_conflicts(modes, clearance),
             homes={name: draft.home[at] for name, at in columns.items()},
-            bounds={
-                name: JointLimitsInTime(
-                    velocity=bounds.velocity[at], acceleration=bounds.acceleration[at], jerk=bounds.jerk[at]
-                )
-                for name, at in columns.items()
-            },
+            bounds={name: bounds.of(at) for name, at in columns.items()},
             step=cell.motion.step,
         )
         self.counts = {
@@ -194,7 +195,9 @@ class _Search:
         greedy = greedy_schedule(instance)
         nearest = sequencer.sequenced(greedy).steps
         exchanged = sequencer.ordered(improved(instance, greedy)).schedule
-        answer = solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=exchanged)
+        answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
+        if is_installed():
+            answer = solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=exchanged)
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
         schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
         best = min((certifier.best(sequencer, schedule) for schedule in schedules), key=lambda it: it.steps)
@@ -203,7 +206,7 @@ class _Search:
             bound=answer.bound,
             is_proved=answer.is_proved,
             greedy=nearest,
-            asked=certifier.asked,
+            examined=certifier.examined,
             refused=len(sequencer.refusals),
         )
 
@@ -213,7 +216,7 @@ class _Search:
         return replace(goal, is_reversible=goal.is_reversible and is_free)
 
 
-def refuse_impossible_tasks(draft: Draft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
+def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
     """Refuse tasks that no robot can do at any pose of the part, each with the filter that dropped it.
 
     Raises:
@@ -233,7 +236,7 @@ def refuse_impossible_tasks(draft: Draft, goals: list[TaskGoal], table: ModeTabl
         raise NoSolutionError("\n".join(lines))
 
 
-def written_cell(draft: Draft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
+def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
     """The program of a schedule, read from the draft's document with the chosen values."""
     values: dict[str, object] = {}
     orders: dict[str, list[str]] = {}

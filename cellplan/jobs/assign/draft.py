@@ -19,7 +19,7 @@ RESTS = (Mode.SEMI_COORDINATED, Mode.PART_AT_REST)  # modes in which the part re
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Draft:
+class AssignmentDraft:
     """A cell in which somebody has to be found for every task."""
 
     cell: Cell  # each open task with the first of its robots
@@ -27,7 +27,7 @@ class Draft:
     file: Path
 
     @classmethod
-    def load(cls, file: Path | str, *, allow_dirs: Sequence[Path] = ()) -> "Draft":
+    def load(cls, file: Path | str, *, allow_dirs: Sequence[Path] = ()) -> "AssignmentDraft":
         """Read a cell file.
 
         Raises:

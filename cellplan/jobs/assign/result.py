@@ -23,6 +23,7 @@ SCHEMA: Final = "cellplan.assignment/1"
 HOLDS_FOR: Final = (
     "programs in blocks at the chosen poses of the part, with the modes that were found and the conflicts as listed"
 )
+NO_SOLVER: Final = "no lower bound is known, as OR-Tools is not installed: pip install 'cellplan[assign]'"
 
 
 # The record: assign.json
@@ -44,9 +45,9 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "status": "passed" if assignment.passed else "failed",
         "cycle_time_s": number(cycle),
         "model_cycle_s": number(assignment.model_cycle),
-        "bound_s": number(assignment.bound),
-        "bound_holds_for": HOLDS_FOR,
-        "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound > 0.0 else None,
+        "bound_s": None if assignment.bound is None else number(assignment.bound),
+        "bound_holds_for": NO_SOLVER if assignment.bound is None else HOLDS_FOR,
+        "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound else None,
         "is_proved": assignment.is_proved,
         "greedy_cycle_s": number(assignment.greedy),
         "binding": _binding(assignment, blocks),
@@ -131,11 +132,14 @@ def _part_steps(assignment: Assignment) -> int:
 
 def assign_lines(record: Record) -> list[str]:
     """All lines on the terminal."""
-    gap = "" if record["gap_percent"] is None else f", {record['gap_percent']:.2g} % above"
     binding, only = record["binding"], record["only_one_robot"]
+    bound = f"  {record['bound_holds_for']}"
+    if record["bound_s"] is not None:
+        above = f"the program is {record['gap_percent']:.2g} % above it"
+        bound = f"  lower bound {record['bound_s']:g} s, of {record['bound_holds_for']}; {above}"
     lines = [
         f"{record['cell']}: {record['status']}, {record['cycle_time_s']:g} s",
-        f"  lower bound {record['bound_s']:g} s{gap}: of {record['bound_holds_for']}",
+        bound,
         f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; the part "
         f"moves for {record['part_moves_s']:g} s between {record['stations']} poses",
         f"  the nearest tasks first would take {record['greedy_cycle_s']:g} s",
@@ -163,12 +167,19 @@ def assign_page(record: Record) -> str:
         r=record,
         figures=[
             figure("cycle", f"{record['cycle_time_s']:g}", "s", is_bad=record["status"] != "passed"),
-            figure("lower bound", f"{record['bound_s']:g}", "s", note=record["bound_holds_for"]),
+            *_bound_figure(record),
         ],
         bars=_bars(record),
         colours=dict(zip(robots, ROBOTS * len(robots), strict=False)),
         caution=CAUTION,
     )
+
+
+def _bound_figure(record: Record) -> list[dict[str, Any]]:
+    """The lower bound at the top of the page; nothing where none is known."""
+    if record["bound_s"] is None:
+        return []
+    return [figure("lower bound", f"{record['bound_s']:g}", "s", note=record["bound_holds_for"])]
 
 
 def _bars(record: Record) -> list[tuple[str, list[tuple[float, float, str]]]]:
@@ -218,7 +229,7 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
         InputError: The folder cannot be written, or holds something that cellplan did not write.
     """
     record = assign_record(assignment)
-    head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s, at least {record['bound_s']:g} s."
+    head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s from home to home."
     with RunFolder(folder) as target:
         files = result_files(assignment.cell, given, folder, head=head)
         for name, content in files.items():

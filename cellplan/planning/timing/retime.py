@@ -60,6 +60,15 @@ class JointLimitsInTime:
     acceleration: Array
     jerk: Array
 
+    def of(self, columns: slice) -> Self:
+        """Those of some joints."""
+        return replace(
+            self,
+            velocity=self.velocity[columns],
+            acceleration=self.acceleration[columns],
+            jerk=self.jerk[columns],
+        )
+
     @property
     def build_up(self) -> float:
         """Time in [s] in which every limited joint can build up its full acceleration; 0 without a limit of jerk."""

@@ -29,7 +29,7 @@ from cellplan.scene.scene import Scene
 LEGS: Final = 3
 BACK: Final = (0.3, 0.6, 1.0)  # [-] shares of the way home that a robot backs off
 MOST_REFUSED: Final = 60  # legs that are refused before none is looked for any more
-MOST_COMBINATIONS: Final = 2_000_000  # of the ways of all robots that are compared
+MOST_COMBINATIONS: Final = 2_000_000  # of the routes of all robots that are compared
 CORNERED: Final = 2  # joints of a positioner that goes joint by joint
 START, GOAL = 0, 1  # places of a robot among those at which it may stand between two legs
 
@@ -37,33 +37,33 @@ Ends = tuple[bytes, bytes]  # configurations of one robot at both ends of a leg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class RobotWays:
-    """Ways of one robot from its start to its goal."""
+class RobotRoutes:
+    """Routes of one robot from its start to its goal."""
 
     stops: Array  # configurations at which it may stand between legs in [rad] or [m], shape (P, n)
-    ways: Indices  # its place among them at both ends of every leg, shape (K, LEGS + 1)
+    routes: Indices  # its place among them at both ends of every leg, shape (K, LEGS + 1)
     steps: Indices  # whole steps that each leg takes it, zero where it stands, shape (K, LEGS)
 
     @classmethod
     def over(
-        cls, stops: Sequence[Array], ways: Sequence[Sequence[int]], limits: JointLimitsInTime, step: float
+        cls, stops: Sequence[Array], routes: Sequence[Sequence[int]], limits: JointLimitsInTime, step: float
     ) -> Self:
-        """Ways over some stops.
+        """Routes over some stops.
 
         Args:
             stops: Configurations in [rad] or [m], shape (n,) each.
-            ways: Places among them at both ends of every leg.
+            routes: Places among them at both ends of every leg.
             limits: Limits of the joints, shape (n,) each.
             step: Time between two rows in [s].
         """
         between = np.array([[leg_steps(b - a, limits, step) for b in stops] for a in stops], dtype=np.intp)
-        places = np.array(ways, dtype=np.intp)
-        return cls(stops=np.array(stops), ways=places, steps=between[places[:, :-1], places[:, 1:]])
+        places = np.array(routes, dtype=np.intp)
+        return cls(stops=np.array(stops), routes=places, steps=between[places[:, :-1], places[:, 1:]])
 
     def going(self, leg: int, ends: Ends) -> Flags:
-        """Which ways have given ends of a leg, shape (K,)."""
+        """Which routes have given ends of a leg, shape (K,)."""
         at = [stop.tobytes() for stop in self.stops]
-        return np.array([(at[way[leg]], at[way[leg + 1]]) == ends for way in self.ways.tolist()])
+        return np.array([(at[route[leg]], at[route[leg + 1]]) == ends for route in self.routes.tolist()])
 
 
 def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]:
@@ -79,10 +79,10 @@ def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]
     blocked: set[str] = set()
     free: set[bytes] = set()
     while tried.legs < MOST_REFUSED:
-        ways = {name: _ways_of(query, name, retimer, is_blocked=name in blocked) for name in query.movers}
-        if np.prod([float(len(it.ways)) for it in ways.values()]) > MOST_COMBINATIONS:
+        routes = {name: _routes_of(query, name, retimer, is_blocked=name in blocked) for name in query.movers}
+        if np.prod([float(len(it.routes)) for it in routes.values()]) > MOST_COMBINATIONS:
             return []
-        ends = _fastest(query, ways, refused)
+        ends = _fastest(query, routes, refused)
         if ends is None:
             return []
         for a, b in pairwise(ends):
@@ -131,27 +131,23 @@ def leg_steps(move: Array, bounds: JointLimitsInTime, step: float) -> int:
     return int(np.ceil(sum(box_widths(move, bounds, least=step)) / step)) if np.any(move) else 0
 
 
-def _ways_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotWays:
-    """Ways of a robot: in one of the legs, and where something was in its way over other places too."""
+def _routes_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotRoutes:
+    """Routes of a robot: in one of the legs, and where something was in its way over other places too."""
     cell, columns = query.scene.cell, query.scene.cell.columns(name)
     stops = list(query.ends_of(name))
-    ways = [[START] * (LEGS + 1 - moved) + [GOAL] * moved for moved in range(LEGS, 0, -1)]
+    routes = [[START] * (LEGS + 1 - moved) + [GOAL] * moved for moved in range(LEGS, 0, -1)]
     home = None if query.home is None else query.home[columns]
     if is_blocked and name in cell.positioners:
         for corner in _corners(stops[START], stops[GOAL], home):
             via = len(stops)
             stops.append(corner)
-            ways += [[START, via, GOAL, GOAL], [START, via, via, GOAL], [START, START, via, GOAL]]
+            routes += [[START, via, GOAL, GOAL], [START, via, via, GOAL], [START, START, via, GOAL]]
     elif is_blocked and home is not None:
         for share in BACK:
             a, b = len(stops), len(stops) + 1  # off the start, and off the goal
             stops += [end + share * (home - end) for end in stops[:2]]
-            ways += [[START, a, b, GOAL], [START, a, a, GOAL], [START, a, GOAL, GOAL], [START, START, b, GOAL]]
-    limits = retimer.bounds
-    of_robot = JointLimitsInTime(
-        velocity=limits.velocity[columns], acceleration=limits.acceleration[columns], jerk=limits.jerk[columns]
-    )
-    return RobotWays.over(stops, ways, of_robot, retimer.step)
+            routes += [[START, a, b, GOAL], [START, a, a, GOAL], [START, a, GOAL, GOAL], [START, START, b, GOAL]]
+    return RobotRoutes.over(stops, routes, retimer.bounds.of(columns), retimer.step)
 
 
 def _corners(start: Array, goal: Array, home: Array | None) -> list[Array]:
@@ -163,28 +159,30 @@ def _corners(start: Array, goal: Array, home: Array | None) -> list[Array]:
 
 
 def _fastest(
-    query: TransferQuery, ways: Mapping[str, RobotWays], refused: list[Mapping[str, Ends]]
+    query: TransferQuery, routes: Mapping[str, RobotRoutes], refused: list[Mapping[str, Ends]]
 ) -> list[Array] | None:
     """Stacked configurations at the ends of the legs of the fastest move that is not refused; None where all are."""
-    total = np.zeros([len(it.ways) for it in ways.values()])
+    total = np.zeros([len(it.routes) for it in routes.values()])
     for leg in range(LEGS):
         longest = np.zeros(total.shape, dtype=np.intp)
-        for axis, robot in enumerate(ways.values()):
-            longest = np.maximum(longest, np.expand_dims(robot.steps[:, leg], _other_axes(axis, len(ways))))
+        for axis, robot in enumerate(routes.values()):
+            longest = np.maximum(longest, np.expand_dims(robot.steps[:, leg], _other_axes(axis, len(routes))))
         total += longest
     for ends in refused:
         for leg in range(LEGS):
-            going = [ways[name].going(leg, ends[name]) if name in ends else np.array(True) for name in ways]
+            going = [routes[name].going(leg, ends[name]) if name in ends else np.array(True) for name in routes]
             is_refused = np.array(True)
             for axis, flags in enumerate(going):
-                is_refused = is_refused & (np.expand_dims(flags, _other_axes(axis, len(ways))) if flags.ndim else flags)
+                is_refused = is_refused & (
+                    np.expand_dims(flags, _other_axes(axis, len(routes))) if flags.ndim else flags
+                )
             total[np.broadcast_to(is_refused, total.shape)] = np.inf
     best = np.unravel_index(int(np.argmin(total)), total.shape)
     if not np.isfinite(total[best]):
         return None
     stops = np.tile(query.start, (LEGS + 1, 1))
-    for (name, robot), choice in zip(ways.items(), best, strict=True):
-        stops[:, query.scene.cell.columns(name)] = robot.stops[robot.ways[choice]]
+    for (name, robot), choice in zip(routes.items(), best, strict=True):
+        stops[:, query.scene.cell.columns(name)] = robot.stops[robot.routes[choice]]
     return [stops[0], *(q for before, q in pairwise(stops) if not np.array_equal(before, q))]
 
 

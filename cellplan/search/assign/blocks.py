@@ -27,7 +27,7 @@ class BlockAnswer:
     """What the block model comes to."""
 
     schedule: BlockSchedule | None  # None where none is found
-    bound: int  # [steps] no schedule of the instance has a shorter cycle, by the model
+    bound: int | None  # [steps] no schedule of the instance has a shorter cycle, by the model; None without a solver
     is_proved: bool  # whether none is better by the model
 
 
@@ -62,9 +62,10 @@ class _BlockModel:
             (task, leader): self._flag()
             for task in tasks
             for leader in tasks
-            if self._order[task] < self._order[leader] and self._stations(task) & self._stations(leader)
+            if self._order[task] < self._order[leader]
+            and self.instance.stations_of(task) & self.instance.stations_of(leader)
         }
-        self._each_once()
+        self._every_task_once()
         self._together()
         self._no_conflicts()
         self._cliques()
@@ -97,38 +98,31 @@ class _BlockModel:
     def _flag(self) -> Any:
         return self.model.new_bool_var("")
 
-    def _stations(self, task: str) -> set[int]:
-        return {at for _, at in self.instance.options[task]}
+    def _done(self, task: str, place: int | str) -> Any:
+        """Whether a task is done at a station, or by a robot."""
+        return sum(self._places.get((task, place), ()))
 
-    def _at(self, task: str, station: int) -> Any:
-        """Whether a task is done at a station."""
-        return sum(self._places.get((task, station), ()))
-
-    def _by(self, task: str, robot: str) -> Any:
-        """Whether a task is done by a robot."""
-        return sum(self._places.get((task, robot), ()))
-
-    def _each_once(self) -> None:
+    def _every_task_once(self) -> None:
         """Every task is done once, and leads a block or joins one."""
         for task in self.instance.tasks:
             self.model.add_exactly_one(it for (name, _, _), it in self.does.items() if name == task)
             leads = [it for (name, _), it in self.leads.items() if name == task]
             self.model.add_exactly_one([*leads, *(it for (name, _), it in self.joins.items() if name == task)])
         for (task, station), lead in self.leads.items():
-            self.model.add(lead <= self._at(task, station))
+            self.model.add(lead <= self._done(task, station))
 
     def _together(self) -> None:
         """Tasks of a block are done at one station by different robots."""
         model, robots = self.model, self.instance.robots
         for (task, leader), join in self.joins.items():
-            for station in self._stations(task) | self._stations(leader):
-                model.add(self._at(task, station) == self._at(leader, station)).only_enforce_if(join)
+            for station in self.instance.stations_of(task) | self.instance.stations_of(leader):
+                model.add(self._done(task, station) == self._done(leader, station)).only_enforce_if(join)
             model.add(sum(it for (name, _), it in self.leads.items() if name == leader) == 1).only_enforce_if(join)
             for robot in robots:
-                model.add(self._by(task, robot) + self._by(leader, robot) <= 1).only_enforce_if(join)
+                model.add(self._done(task, robot) + self._done(leader, robot) <= 1).only_enforce_if(join)
         for first, second, joins in self._joining_pairs():
             for robot in robots:
-                model.add(self._by(first, robot) + self._by(second, robot) <= 1).only_enforce_if(*joins)
+                model.add(self._done(first, robot) + self._done(second, robot) <= 1).only_enforce_if(*joins)
 
     def _joining_pairs(self) -> list[tuple[str, str, tuple[Any, Any]]]:
         """Two tasks that may join one leader, and the literals of both."""

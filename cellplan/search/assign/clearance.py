@@ -1,6 +1,6 @@
 """Which modes are free of collisions by themselves, and which two cannot be at work at the same time.
 
-Both are looked at in few configurations with a reserve, as an assignment asks for many; what it chooses is certified
+Both are looked at in few configurations with a reserve, as an assignment needs many; what it chooses is certified
 when it is solved.
 """
 
@@ -34,14 +34,14 @@ class AssignmentClearance:
         scene: The scene of the cell, with all tools at work.
         home: Stacked homes of all robots in [rad] or [m], shape (nq,).
         conflict: Distance in [m] that two robots at work are to keep.
-        asked: Numbers of modes, and of pairs of modes, that were looked at.
+        examined: Numbers of modes, and of pairs of modes, that were looked at.
     """
 
     scene: Scene
     home: Array
     stations: Stations
     conflict: float
-    asked: tuple[int, int] = (0, 0)
+    examined: tuple[int, int] = (0, 0)
 
     def stacked(self, modes: Mapping[str, Array], station: int) -> Array:
         """Stacked configurations with some robots in configurations of shape (S, n) each and the others at home."""
@@ -59,7 +59,7 @@ class AssignmentClearance:
 
     def is_free(self, mode: TaskMode) -> bool:
         """Whether a mode keeps its distance from all that stands, from the part and within its robot."""
-        self.asked = self.asked[0] + 1, self.asked[1]
+        self.examined = self.examined[0] + 1, self.examined[1]
         scene, demands = self._alone[mode.robot]
         rows = spread_rows(len(mode.q), LOOKED_AT)
         near = scene.near(self.stacked({mode.robot: mode.q[rows]}, mode.station), float(demands.max(initial=0.0)))
@@ -71,7 +71,7 @@ class AssignmentClearance:
         apart = float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
         if apart > FAR:
             return False
-        self.asked = self.asked[0], self.asked[1] + 1
+        self.examined = self.examined[0], self.examined[1] + 1
         names = tuple(sorted((first.robot, second.robot)))
         scene = self._between[names]
         picked = {mode.robot: mode.q[spread_rows(len(mode.q), MET)] for mode in (first, second)}

@@ -68,6 +68,10 @@ class Instance:
             for task in self.tasks
         }
 
+    def stations_of(self, task: str) -> set[int]:
+        """Stations at which a task can be done."""
+        return {station for _, station in self.options[task]}
+
     def steps(self, task: str) -> int:
         """Whole steps of a task."""
         return self.goals[task].steps

@@ -1,22 +1,23 @@
 """The one door to OR-Tools, the extra ``assign``: models of truth values that end by counts, not by the clock."""
 
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any, Final
-
-from cellplan.errors import InputError
 
 WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
 ROUNDING: Final = 1e-6  # [steps] of a bound
-MISSING: Final = "expected OR-Tools, which is not installed: pip install 'cellplan[assign]'"
+
+
+def is_installed() -> bool:
+    """Whether the solver can be used."""
+    return find_spec("ortools") is not None
 
 
 def new_model() -> Any:
-    """An empty model.
+    """An empty model."""
+    from ortools.sat.python import cp_model
 
-    Raises:
-        InputError: OR-Tools is not installed.
-    """
-    return _cp_model().CpModel()
+    return cp_model.CpModel()
 
 
 class Solved:
@@ -29,7 +30,8 @@ class Solved:
             effort: Work in units of deterministic time, about seconds of one processor.
             hints: Values of an answer that is known.
         """
-        cp_model = _cp_model()
+        from ortools.sat.python import cp_model
+
         for literal, value in hints:
             model.add_hint(literal, value)
         self._solver = cp_model.CpSolver()
@@ -54,12 +56,3 @@ class Solved:
     def true(self, literals: Mapping[Any, Any]) -> list[Any]:
         """Keys of the literals that are true."""
         return [key for key, literal in literals.items() if self._solver.value(literal)]
-
-
-def _cp_model() -> Any:
-    """The module of OR-Tools."""
-    try:
-        from ortools.sat.python import cp_model
-    except ImportError:
-        raise InputError(MISSING) from None
-    return cp_model

@@ -23,19 +23,19 @@ MOST_SETTLED: Final = 60  # choices of modes until no transfer of the best one i
 
 @dataclass(eq=False)
 class TransferCertifier:
-    """Certificates of straight transfers, each asked once.
+    """Certificates of straight transfers, each made once.
 
     Attributes:
         scene: The scene of the cell.
         home: Stacked homes of all robots in [rad] or [m], shape (nq,).
         retimer: The limits of all joints and the step of the rows.
-        asked: Number of transfers that were certified.
+        examined: Number of transfers that were certified.
     """
 
     scene: Scene
     home: Array
     retimer: Retimer
-    asked: int = 0
+    examined: int = 0
     _known: set[bytes] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -72,15 +72,15 @@ class TransferCertifier:
     def refusals(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
         """Transfers of a sequence that are not free straight and were not known to be."""
         resting: Stop = (None, (None,) * len(sequencer.instance.robots))
-        found = []
+        refusals = []
         for before, after in pairwise((resting, *sequenced.stops, resting)):
             start, goal = self._stacked(sequencer, before, leaves=True), self._stacked(sequencer, after, leaves=False)
             if (key := np.concatenate([start, goal]).tobytes()) in self._known:
                 continue
             self._known.add(key)
             refusal = self._refusal(sequencer, (start, goal), (before[0], after[0]))
-            found += [] if refusal is None else [refusal]
-        return found
+            refusals += [] if refusal is None else [refusal]
+        return refusals
 
     def _refusal(
         self, sequencer: Sequencer, ends: tuple[Array, Array], stations: tuple[int | None, int | None]
@@ -88,7 +88,7 @@ class TransferCertifier:
         """The refusal of a transfer; None where it is free straight."""
         start, goal = ends
         query = TransferQuery.of(self.scene, start, goal, seed=0, home=self.home)
-        self.asked += 1
+        self.examined += 1
         line = straight_line(start, goal)
         if not query.movers or certify(self.scene, line, with_minimum=False).is_met:
             return None

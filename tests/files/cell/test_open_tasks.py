@@ -1,0 +1,53 @@
+"""Open tasks: who may do them, and what reads a cell that has them."""
+
+from pathlib import Path
+
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.files.cell.load import load_cell, load_open_cell
+from cellplan.files.cell.open_tasks import open_tasks
+
+OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
+
+
+def test_any_stands_for_all_robots_that_do_not_hold_the_part() -> None:
+    root = {
+        "robots": {"table": {}, "west": {}, "east": {}},
+        "part": {"held_by": ({"robot": "table"},)},
+        "tasks": {"a": {"robot": "any"}, "b": {"robot": ("east", "west")}, "c": {"robot": "west"}},
+    }
+
+    assert open_tasks(root) == {"a": ("west", "east"), "b": ("east", "west")}
+
+
+def test_a_robot_may_be_called_any() -> None:
+    assert open_tasks({"robots": {"any": {}}, "tasks": {"a": {"robot": "any"}}}) == {}
+
+
+@pytest.mark.parametrize("root", [{}, {"tasks": 3, "robots": {}}, {"tasks": {"a": None}, "robots": {"b": {}}}])
+def test_what_is_no_cell_has_no_open_tasks(root: dict[str, object]) -> None:
+    assert open_tasks(root) == {}
+
+
+def test_a_cell_with_open_tasks_is_read_for_an_assignment_alone() -> None:
+    cell, robots = load_open_cell(OPEN)
+
+    assert set(robots.values()) == {("west", "east")}
+    assert set(robots) == {task.name for task in cell.tasks}
+    assert {task.robot for task in cell.tasks} == {"west"}
+    with pytest.raises(InputError) as refused:
+        load_cell(OPEN)
+    lines = str(refused.value).splitlines()
+    assert len(lines) == len(cell.tasks)
+    assert lines[0].endswith(
+        "tasks.top_1.robot: expected the name of a robot, got 'any': cellplan assign chooses who does an open task"
+    )
+
+
+def test_a_list_with_an_unknown_robot_is_refused(tmp_path: Path) -> None:
+    text = OPEN.read_text().replace("robot: any", "robot: [north, east]", 1)
+    (tmp_path / "cell.yaml").write_text(text)
+
+    with pytest.raises(InputError, match=r"tasks\.top_1\.robot\[0\]: expected one of table, west, east, got 'north'"):
+        load_open_cell(tmp_path / "cell.yaml")

@@ -1,0 +1,80 @@
+"""Drafts: what an assignment refuses, and the poses of the part and turns of the tools that it compares."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cellplan.errors import InputError
+from cellplan.jobs.assign.draft import AssignmentDraft
+
+OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
+HOME = "    home_deg: [0, -40, 60, 0, 60, 0]\n"
+STATIONS = "{tilt_deg: [-90, 90, 30], turn_deg: [-180, 150, 30]}"
+
+
+def draft(folder: Path, *changes: tuple[str, str]) -> AssignmentDraft:
+    text = OPEN.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (folder / "cell.yaml").write_text(text)
+    return AssignmentDraft.load(folder / "cell.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("program: {}\n", "", "add program: {} for a program from home to home"),
+        ("semi_coordinated", "simultaneous", "motion.mode: expected semi_coordinated or part_at_rest"),
+        ("program: {}", "program: {detach: {at: {}}}", "program: expected no marks, attach or detach"),
+        (HOME, "", "robots.west: missing, expected home_deg"),
+        (HOME, HOME + "    order: [top_1, top_2, top_3, edge_1, edge_2, edge_3, side_1, side_2]\n", "west.order: unex"),
+    ],
+)
+def test_cells_of_which_no_assignment_is_made(tmp_path: Path, old: str, new: str, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        draft(tmp_path, (old, new))
+
+    assert words in str(refused.value)
+
+
+def test_the_grid_has_all_postures_from_first_to_last(tmp_path: Path) -> None:
+    stations = draft(tmp_path).stations()
+
+    assert stations.holder == "table"
+    assert np.unique(np.degrees(stations.q[:, 0]).round(9)).tolist() == [-90, -60, -30, 0, 30, 60, 90]
+    assert len(stations.q) == 7 * 12
+    assert np.abs(stations.X_WP[:, :3, :3] @ np.swapaxes(stations.X_WP[:, :3, :3], 1, 2) - np.eye(3)).max() < 1e-12
+
+
+def test_a_joint_without_a_range_stays_at_its_start_and_lists_are_taken_as_they_are(tmp_path: Path) -> None:
+    one_joint = draft(tmp_path, (STATIONS, "{tilt_deg: [0, 90, 45]}")).stations()
+    listed = draft(tmp_path, (STATIONS, "[[0, 10], [45, -20]]")).stations()
+
+    assert np.degrees(one_joint.q).round(9).tolist() == [[0, 0], [45, 0], [90, 0]]
+    assert np.degrees(listed.q).round(9).tolist() == [[0, 10], [45, -20]]
+
+
+def test_what_is_not_free_is_not_compared(tmp_path: Path) -> None:
+    few = draft(tmp_path, ("assign:\n", "assign:\n  free: [direction]\n"))
+
+    assert len(few.stations().q) == 1
+    assert few.spins().tolist() == [0.0]
+    assert len(draft(tmp_path).spins()) == 6
+
+
+@pytest.mark.parametrize(
+    ("stations", "words"),
+    [
+        ("{tilt: [0, 90, 45]}", "assign.stations.tilt: expected a joint of 'table': tilt_deg, turn_deg"),
+        ("{tilt_deg: [90, 0, 45]}", "assign.stations.tilt_deg: expected [first, last, step] with a step above 0"),
+        ("[[0, 10, 20]]", "assign.stations[0]: expected 2 values, one for each joint of 'table', got 3"),
+        ("{tilt_deg: [-90, 90, 1], turn_deg: [-180, 150, 1]}", "expected at most 1000 postures, got 59911"),
+    ],
+)
+def test_stations_that_the_holder_cannot_take(tmp_path: Path, stations: str, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        draft(tmp_path, (STATIONS, stations)).stations()
+
+    assert words in str(refused.value)
