@@ -11,7 +11,9 @@ ANY: Final = "any"
 
 
 def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """The robots that may do each open task: those that are listed, or all that do not hold the part.
+    """The robots that may do each open task: those that are listed, or all that are available and hold no part.
+
+    A task of a robot that is not available is open too.
 
     Args:
         root: The values of a cell file as they stand in it.
@@ -22,14 +24,15 @@ def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     part = root.get("part")
     held_by = part.get("held_by", ()) if isinstance(part, Mapping) else ()
     holders = {entry.get("robot") for entry in held_by if isinstance(entry, Mapping)}
-    free = tuple(name for name in robots if name not in holders)
+    absent = {name for name, robot in robots.items() if isinstance(robot, Mapping) and robot.get("available") is False}
+    free = tuple(name for name in robots if name not in holders | absent)
     able: dict[str, tuple[str, ...]] = {}
     for name, task in tasks.items():
         robot = task.get("robot") if isinstance(task, Mapping) else None
-        if robot == ANY and ANY not in robots:
+        if (robot == ANY and ANY not in robots) or (isinstance(robot, str) and robot in absent):
             able[name] = free
         elif isinstance(robot, tuple):
-            able[name] = tuple(str(it) for it in robot)
+            able[name] = tuple(str(it) for it in robot if it not in absent)
     return able
 
 
@@ -49,7 +52,8 @@ def open_task_findings(document: YamlDocument) -> Iterator[Finding]:
     """Refuse open tasks."""
     for name in open_tasks(document.root):
         value = document.root["tasks"][name]["robot"]
-        words = f"expected the name of a robot, got {shown(value)}: cellplan assign chooses who does an open task"
+        kind = "a robot" if isinstance(value, tuple) or value == ANY else "an available robot"
+        words = f"expected the name of {kind}, got {shown(value)}: cellplan assign chooses who does an open task"
         yield document.finding(("tasks", name, "robot"), words)
 
 
@@ -62,4 +66,6 @@ def unknown_robot_findings(document: YamlDocument) -> Iterator[Finding]:
                 words = f"expected one of {listed(known)}, got {shown(robot)}{did_you_mean(robot, known)}"
                 yield document.finding(("tasks", name, "robot", index), words)
         if not robots:
-            yield document.finding(("tasks", name, "robot"), "expected a robot that does not hold the part, got none")
+            yield document.finding(
+                ("tasks", name, "robot"), "expected an available robot that does not hold the part, got none"
+            )

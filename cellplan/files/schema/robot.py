@@ -247,6 +247,11 @@ class RobotEntry(Entry):
         description="Its tasks, and the marks of the program at which it waits, in their order; the order of the file, "
         "without marks, when absent. Only with program.",
     )
+    available: bool = Field(
+        default=True,
+        description="Whether it can work. One that cannot stands at its home, and its tasks are open to the others: "
+        "`cellplan assign` gives them away.",
+    )
     path: JointPathEntry | None = Field(
         default=None,
         description="Path of its joints over the common clock, for the first holder of the part only, in the mode "

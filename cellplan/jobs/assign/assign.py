@@ -53,6 +53,7 @@ class Assignment(Presented):
     )  # no program in blocks at these stations, with these modes, is shorter, in [s]; None if not known
     is_proved: bool  # whether no schedule of the block model is better than the one that was first sequenced
     greedy: float  # cycle in [s] of the nearest tasks first, by the model
+    without: Mapping[str, float | None]  # cycle in [s] by the model without each robot; None where it has to work
     rounds: int  # programs that were solved
     counts: Mapping[str, int]  # of goals, modes, certificates and refusals
 
@@ -94,7 +95,7 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
     """
     progress("table of modes", 0.0)
     search = _Search(draft, effort)
-    instance = search.instance(progress)
+    first = instance = search.instance(progress)
     counts = search.counts
     for number in range(1, ROUNDS + 1):
         progress("blocks", (number - 1) / ROUNDS)
@@ -114,6 +115,7 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
                 bound=bound,
                 is_proved=is_proved,
                 greedy=planned.greedy * instance.step,
+                without={name: search.without(first, name) for name in instance.robots},
                 rounds=number,
                 counts=counts | {"certificates": planned.examined, "refused": planned.refused},
             )
@@ -209,6 +211,17 @@ class _Search:
             examined=certifier.examined,
             refused=len(sequencer.refusals),
         )
+
+    def without(self, instance: Instance, robot: str) -> float | None:
+        """Cycle in [s] by the model if a robot did no task, its transfers straight; None where a task is its alone."""
+        others = instance.without(robot)
+        if others.tasks != instance.tasks:
+            return None
+        schedule = improved(others, greedy_schedule(others))
+        if is_installed():
+            least = least_transfer(others)
+            schedule = solve_blocks(others, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
+        return Sequencer(others).ordered(schedule).steps * others.step
 
     def _with_direction(self, goal: TaskGoal) -> TaskGoal:
         """The goal, reversible only where its path is written as points and its direction is free."""
@@ -320,17 +333,7 @@ def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Sol
                 modes[keys[0]] = left
             elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):
                 del modes[keys[0]]
-    return Instance(
-        goals=instance.goals,
-        robots=instance.robots,
-        modes=modes,
-        stations=instance.stations,
-        used=instance.used,
-        conflicts=frozenset(conflicts),
-        homes=instance.homes,
-        bounds=instance.bounds,
-        step=instance.step,
-    )
+    return replace(instance, modes=modes, conflicts=frozenset(conflicts))
 
 
 def _passed(run: Run) -> bool:

@@ -52,7 +52,11 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "greedy_cycle_s": number(assignment.greedy),
         "binding": _binding(assignment, blocks),
         "blocks": blocks,
-        "robots": {name: _use(blocks, name, cycle) for name in instance.robots},
+        "robots": {
+            name: _use(blocks, name, cycle)
+            | {"cycle_without_s": None if (it := assignment.without[name]) is None else number(it)}
+            for name in instance.robots
+        },
         "only_one_robot": {
             task: robots[0]
             for task in instance.tasks
@@ -146,9 +150,11 @@ def assign_lines(record: Record) -> list[str]:
     ]
     for name, use in record["robots"].items():
         busiest = " (busiest)" if name == binding["busiest_robot"] else ""
-        lines.append(
-            f"  {name}: {use['tasks']} tasks, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
-        )
+        work = f"{use['tasks']} tasks, {use['work_s']:g} s at work, {use['use_percent']:.3g} %{busiest}"
+        without = "has tasks that no other robot can do"
+        if use["cycle_without_s"] is not None:
+            without = f"without it about {use['cycle_without_s']:g} s"
+        lines.append(f"  {name}: {work}; {without}")
     if only:
         lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
     for block in record["blocks"]:

@@ -1,10 +1,10 @@
 """The instance that a schedule is made for: few stations, the free modes at them, times in whole steps, conflicts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 
@@ -71,6 +71,14 @@ class Instance:
     def stations_of(self, task: str) -> set[int]:
         """Stations at which a task can be done."""
         return {station for _, station in self.options[task]}
+
+    def without(self, robot: str) -> Self:
+        """The same with a robot that does no task."""
+        return replace(
+            self,
+            modes={key: modes for key, modes in self.modes.items() if key[1] != robot},
+            conflicts=frozenset(it for it in self.conflicts if all(key[1] != robot for key in it)),
+        )
 
     def steps(self, task: str) -> int:
         """Whole steps of a task."""

@@ -21,6 +21,20 @@ def test_any_stands_for_all_robots_that_do_not_hold_the_part() -> None:
     assert open_tasks(root) == {"a": ("west", "east"), "b": ("east", "west")}
 
 
+def test_tasks_of_a_robot_that_is_not_available_are_open() -> None:
+    root = {
+        "robots": {"west": {"available": False}, "east": {}, "north": {}},
+        "tasks": {
+            "a": {"robot": "west"},
+            "b": {"robot": "any"},
+            "c": {"robot": ("west", "north")},
+            "d": {"robot": "east"},
+        },
+    }
+
+    assert open_tasks(root) == {"a": ("east", "north"), "b": ("east", "north"), "c": ("north",)}
+
+
 def test_a_robot_may_be_called_any() -> None:
     assert open_tasks({"robots": {"any": {}}, "tasks": {"a": {"robot": "any"}}}) == {}
 

@@ -44,6 +44,26 @@ def test_the_written_cell_keeps_its_words_and_gives_the_program_again(assignment
     assert sorted(tasks) == sorted(task.name for task in assignment.draft.tasks)
 
 
+def test_a_robot_less_is_never_faster(assignment: Assignment) -> None:
+    instance = assignment.instance
+
+    for robot, cycle in assignment.without.items():
+        alone = {task for task in instance.tasks if {by for by, _ in instance.options[task]} == {robot}}
+        assert (cycle is None) == bool(alone)
+        assert cycle is None or cycle >= (assignment.bound or 0.0)
+
+
+def test_a_robot_that_is_not_available_stands_at_its_home(tmp_path: Path) -> None:
+    text = OPEN.read_text().replace("  west:\n", "  west:\n    available: false\n", 1)
+    text = text.replace("tilt_deg: [-90, 90, 30]", "tilt_deg: [-90, 90, 15]")
+    (tmp_path / "cell.yaml").write_text(text)
+
+    alone = assign(AssignmentDraft.load(tmp_path / "cell.yaml"), effort=1)
+
+    assert alone.passed
+    assert {task.robot for task in alone.cell.tasks} == {"east"}
+
+
 def test_the_same_cell_gives_the_same_record(assignment: Assignment) -> None:
     assert assign_record(assign(AssignmentDraft.load(OPEN), effort=1)) == assign_record(assignment)
 
