@@ -127,6 +127,19 @@ class NoSolutionError(CellplanError):
     status = ExitStatus.NO_SOLUTION
 
 
+class ImpossibleTasksError(NoSolutionError):
+    """Tasks that no robot can do.
+
+    Attributes:
+        findings: One line for each of them.
+    """
+
+    def __init__(self, findings: list[str]) -> None:
+        """Join the findings, one per line."""
+        super().__init__("\n".join(findings))
+        self.findings = findings
+
+
 class StartNotFoundError(NoSolutionError):
     """No start posture was found that reaches the task within limits and without collision."""
 

@@ -7,7 +7,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 
-from cellplan.errors import CellplanError, ExitStatus, InvalidFileError, NotVerifiedError
+from cellplan.errors import CellplanError, ExitStatus, ImpossibleTasksError, InvalidFileError, NotVerifiedError
 
 DEBUG_VARIABLE = "CELLPLAN_DEBUG"  # set to 1 to see the traceback of an internal error
 DETAIL = "  "  # before a detail of the finding before it
@@ -44,7 +44,7 @@ def error_lines(error: BaseException) -> list[str]:
     """The findings, one per line, details indented; a finding about a line of a file begins with ``FILE:LINE:``."""
     if isinstance(error, KeyboardInterrupt):
         return ["interrupted: no incomplete run folder was left behind"]
-    if isinstance(error, InvalidFileError | NotVerifiedError):
+    if isinstance(error, ImpossibleTasksError | InvalidFileError | NotVerifiedError):
         return [_indented(str(finding)) for finding in error.findings]
     if isinstance(error, CellplanError):
         line = _one_line(str(error))

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cellplan.errors import NoSolutionError
+from cellplan.errors import ImpossibleTasksError, NoSolutionError
 from cellplan.files.cell.write import in_file_units
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
@@ -233,7 +233,7 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
     """Refuse tasks that no robot can do at any pose of the part, each with the filter that dropped it.
 
     Raises:
-        NoSolutionError: One line for each of them.
+        ImpossibleTasksError: One line for each of them.
     """
     lines = []
     for goal in goals:
@@ -246,7 +246,7 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
                 f"left after the filter '{dropped}'; give more poses of the part, other robots or bases"
             )
     if lines:
-        raise NoSolutionError("\n".join(lines))
+        raise ImpossibleTasksError(lines)
 
 
 def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:

@@ -144,8 +144,8 @@ def assign_lines(record: Record) -> list[str]:
     lines = [
         f"{record['cell']}: {record['status']}, {record['cycle_time_s']:g} s",
         bound,
-        f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; the part "
-        f"moves for {record['part_moves_s']:g} s between {record['stations']} poses",
+        f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; "
+        + _part_words(record),
         f"  the nearest tasks first would take {record['greedy_cycle_s']:g} s",
     ]
     for name, use in record["robots"].items():
@@ -161,6 +161,13 @@ def assign_lines(record: Record) -> list[str]:
         tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
         lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}")
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]
+
+
+def _part_words(record: Record) -> str:
+    """How long the part moves."""
+    if not record["part_moves_s"]:
+        return "the part rests"
+    return f"the part moves for {record['part_moves_s']:g} s over {record['stations']} poses"
 
 
 # Page
