@@ -61,6 +61,7 @@ def seam(kind: str, side: int, rng: np.random.Generator) -> dict[str, Any]:
         "path": {"polyline": {"points_mm": points}},
         "tool_axis": axis,
         "tool_x": "+x" if along == 0 else "+y",
+        "torch": {"within_deg": 50},
         "approach_mm": 80,
         "retract_mm": 80,
         "approach_s": 0.6,
@@ -104,7 +105,6 @@ def generated_cell(seams: int, arms: int, seed: int) -> dict[str, Any]:
         "program": {},
         "assign": {
             "stations": {"tilt_deg": [-90, 90, 15], "turn_deg": [-180, 150, 30]},
-            "torch_within_deg": 50,
         },
         "checks": {"clearance_mm": 5},
     }

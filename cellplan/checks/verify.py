@@ -27,6 +27,7 @@ from cellplan.checks.tools.between_checks import (
 from cellplan.checks.tools.conditioning import conditioning
 from cellplan.checks.tools.speeds import check_tool_speeds, robot_speed
 from cellplan.checks.tools.tracking import check_accuracy, check_closure
+from cellplan.checks.tools.weld_position import check_weld_positions
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.measures.joint_use import joint_uses
@@ -108,7 +109,7 @@ def verify_motion(
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += check_payload(loads)
+    checks += [*check_payload(loads), *check_weld_positions(schedule, scene.chains, q, X_WP)]
     return Report(
         cell=cell.name,
         mode=str(cell.motion.mode),

@@ -66,4 +66,4 @@ def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, 
 def _mode(task: str, robot: str, station: int, rng: np.random.Generator) -> TaskMode:
     begin = rng.uniform(-1.5, 1.5, 2)
     q: Array = np.array([begin, begin + rng.uniform(-0.3, 0.3, 2)])
-    return TaskMode(task=task, robot=robot, station=station, spin=0.0, q=q, margin=0.1)
+    return TaskMode(task=task, robot=robot, station=station, spin=0.0, q=q, margin=0.1, directions=(False,))

@@ -28,6 +28,8 @@ from cellplan.model.settings.task import (
     MOST_CYCLES,
     ProcessEntry,
     ToleranceEntry,
+    TorchEntry,
+    WeldPositionEntry,
 )
 from cellplan.model.settings.units import Deg, Mm, Within
 
@@ -219,6 +221,12 @@ class TaskEntry(Entry):
         description="Smallest and largest distance of the tool tip from the part along the path, below the surface to "
         "tool_depth_mm: along the tool's axis, or to the nearest point where the smallest is 0. When absent a tip with "
         "a process is within 2 mm of the part.",
+    )
+    torch: TorchEntry | None = Field(
+        default=None, description="How the tool is held to gravity along the path; anyhow when absent."
+    )
+    weld_position: WeldPositionEntry | None = Field(
+        default=None, description="How the weld lies to gravity along the path; anyhow when absent."
     )
     off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = Field(
         default=(),

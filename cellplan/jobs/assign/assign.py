@@ -36,7 +36,7 @@ from cellplan.search.assign.transfers import TransferCertifier
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
-LOOKED_FOR: Final = ("demanded direction of the tool", "reach", "joint limits", "path", "collisions")
+LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "collisions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -153,13 +153,12 @@ class _Search:
         """
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
-        goals = task_goals(cell, draft.robots)
+        goals = [self._with_direction(goal) for goal in task_goals(cell, draft.robots)]
         table = ModeSearch(
             cell=cell,
             goals=goals,
             stations=stations,
             spins=draft.spins(),
-            most_lean=settings.torch_within_deg.si,
         ).table()
         progress("stations", 0.0)
         clearance = AssignmentClearance(
@@ -171,7 +170,7 @@ class _Search:
         columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
         bounds = transfer_retimer(self._scene).bounds
         instance = Instance(
-            goals={goal.name: self._with_direction(goal) for goal in goals},
+            goals={goal.name: goal for goal in goals},
             robots=draft.operators,
             modes=modes,
             stations=stations,

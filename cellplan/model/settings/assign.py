@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field, Tag
 
-from cellplan.model.settings.entry import Angle, Entry, by_kind
+from cellplan.model.settings.entry import Entry, by_kind
 from cellplan.model.settings.units import Deg, Mm, Within
 
 STATION_LIMIT: Final = 40  # poses of the part in use
@@ -36,9 +36,6 @@ class AssignEntry(Entry):
     )
     spin_step_deg: Annotated[Deg, Within(ge=5.0, le=360.0)] = Field(
         default=Deg(60.0), description="Step of the turns of the tool about its axis that are compared."
-    )
-    torch_within_deg: Annotated[Angle, Within(gt=0.0, le=180.0)] = Field(
-        default=Deg(180.0), description="Largest angle between the axis of every tool along its path and gravity."
     )
     most_stations: Annotated[int, Field(ge=1, le=STATION_LIMIT)] = Field(
         default=8, description="Number of poses of the part that are in use at most."

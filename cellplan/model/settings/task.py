@@ -2,9 +2,9 @@
 
 from typing import Annotated, Final, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from cellplan.model.settings.entry import Entry, SlidingSpeed
+from cellplan.model.settings.entry import Entry, SlidingSpeed, rule
 from cellplan.model.settings.units import Deg, Mm, Within
 
 FARTHEST_STAND_OFF_MM: Final = 5_000.0  # no tool backs off farther
@@ -42,6 +42,49 @@ class ToleranceEntry(Entry):
     def between(self) -> tuple[float, float]:
         """Largest position error in [m] and orientation error in [rad] between the rows."""
         return (self.between_rows_mm or self.position_mm).si, (self.between_rows_deg or self.orientation_deg).si
+
+
+class TorchEntry(Entry):
+    """How a tool is held to gravity."""
+
+    within_deg: Annotated[Deg, Within(gt=0.0, le=180.0)] = Field(
+        description="Largest angle between the axis of the tool and gravity along the path."
+    )
+
+
+Range = tuple[Annotated[Deg, Within(ge=-180.0, le=180.0)], Annotated[Deg, Within(ge=-180.0, le=180.0)]]
+
+
+class WeldPositionEntry(Entry):
+    """How a weld lies to gravity, by the angles of ISO 6947."""
+
+    slope_deg: Range = Field(
+        default=(Deg(-90.0), Deg(90.0)),
+        description="Smallest and largest angle of the weld axis, along the direction of travel, above the horizontal.",
+    )
+    rotation_deg: Range = Field(
+        default=(Deg(-180.0), Deg(180.0)),
+        description="Smallest and largest angle by which the weld face is turned about that axis from where it looks "
+        "up. The face looks against the tool.",
+    )
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Self:
+        """The smaller angle first."""
+        for key, (low, high) in (("slope_deg", self.slope_deg), ("rotation_deg", self.rotation_deg)):
+            if low > high:
+                raise rule(f"expected [low, high], got [{low:g}, {high:g}]: the smaller angle comes first", key)
+        return self
+
+    @property
+    def slope(self) -> tuple[float, float]:
+        """Smallest and largest slope in [rad]."""
+        return self.slope_deg[0].si, self.slope_deg[1].si
+
+    @property
+    def rotation(self) -> tuple[float, float]:
+        """Smallest and largest rotation in [rad]."""
+        return self.rotation_deg[0].si, self.rotation_deg[1].si
 
 
 class ProcessEntry(Entry):

@@ -8,7 +8,7 @@ import numpy as np
 
 from cellplan.geometry.transforms import Array
 from cellplan.model.origin import Origin
-from cellplan.model.settings.task import ProcessEntry, ToleranceEntry
+from cellplan.model.settings.task import ProcessEntry, ToleranceEntry, TorchEntry, WeldPositionEntry
 
 TIME_TOLERANCE: Final = 1e-9  # [s] times nearer than this are the same: rounding of sums of durations
 
@@ -219,6 +219,8 @@ class Task:
         standoff: Smallest and largest distance in [m] of the tool tip from the part along the path, measured along the
             tool's axis, or to the nearest point where the smallest is zero; None where it is not stated.
         off_part: Stretches of the path on which the tip may be elsewhere.
+        torch: How the tool is held to gravity along the path; None for anyhow.
+        weld_position: How the weld lies to gravity along the path; None for anyhow.
         after: Names of the tasks of any robots that must be done before it begins.
         start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
             if the task is its first one, and for one that is to be searched otherwise.
@@ -252,6 +254,8 @@ class Task:
     tool_depth: float = 1e-3
     standoff: tuple[float, float] | None = None
     off_part: tuple[OffPart, ...] = ()
+    torch: TorchEntry | None = None
+    weld_position: WeldPositionEntry | None = None
     after: tuple[str, ...] = ()
     spin: float = 0.0
     start_posture: Array | None = None

@@ -6,15 +6,18 @@ from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.arrays import Array
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
+from cellplan.measures.weld_position import torch_angles, weld_angles
 from cellplan.model.cell.cell import Cell
+from cellplan.model.settings.task import TorchEntry, WeldPositionEntry
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SAMPLES: Final = 7  # [-] poses along a path; twice as many, less one, along a closed one
+ROUNDING: Final = 1e-9  # [rad]
 STRAIGHT: Final = 1e-6  # [-] cosine of the angle between tool axis and path: below it the tool neither pushes nor drags
 
 
@@ -28,6 +31,8 @@ class TaskGoal:
     steps: int  # whole steps from the begin of the approach to the end of the retraction
     is_reversible: bool  # whether it may be done from its end to its begin with the same tool poses
     after: tuple[str, ...] = ()  # tasks that must be done before it begins
+    torch: TorchEntry | None = None  # how its tool is held to gravity
+    weld_position: WeldPositionEntry | None = None  # how its weld lies to gravity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +42,26 @@ class Stations:
     holder: str | None  # robot that brings the part there; None where it is fixed
     q: Array  # configurations of the holder in [rad] or [m], shape (K, n); one without joints for a fixed part
     X_WP: Array  # the part, shape (K, 4, 4)
+
+    def allowed(self, goal: TaskGoal) -> dict[bool, Flags]:
+        """Stations at which a task may be done as it is written, and backwards, to gravity, shape (K,) each."""
+        X_WT = self.X_WP[:, None] @ goal.X_PT[None, 1:-1]
+        rows, samples = X_WT.shape[:2]
+        torch = torch_angles(X_WT.reshape(-1, 4, 4)).reshape(rows, samples)
+        is_upright = torch.max(axis=1) <= (np.pi if goal.torch is None else goal.torch.within_deg.si) + ROUNDING
+        if goal.weld_position is None:
+            return {False: is_upright, True: is_upright}
+        steps = np.gradient(X_WT[..., :3, 3], axis=1)
+        travel = (steps / np.linalg.norm(steps, axis=-1, keepdims=True)).reshape(-1, 3)
+        is_allowed = {}
+        for is_reversed, sign in ((False, 1.0), (True, -1.0)):
+            angles = weld_angles(X_WT.reshape(-1, 4, 4), sign * travel)
+            ranges = goal.weld_position.slope, goal.weld_position.rotation
+            keeps = [
+                (low - ROUNDING <= it) & (it <= high + ROUNDING) for it, (low, high) in zip(angles, ranges, strict=True)
+            ]
+            is_allowed[is_reversed] = is_upright & np.all(np.logical_and(*keeps).reshape(rows, samples), axis=1)
+        return is_allowed
 
     @classmethod
     def of(cls, cell: Cell, q: Array) -> "Stations":
@@ -75,6 +100,8 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
                 steps=int(np.ceil(clocked[task.name].over / cell.motion.step - 1e-9)),
                 is_reversible=is_reversible(toolpath, on_path),
                 after=task.after,
+                torch=task.torch,
+                weld_position=task.weld_position,
             )
         )
     return goals

@@ -86,8 +86,7 @@ class Instance:
 
     def ends(self, task: str, robot: str, station: int) -> list[End]:
         """All modes in all directions."""
-        directions = (False, True) if self.goals[task].is_reversible else (False,)
-        return [End(mode=mode, is_reversed=it) for mode in self.modes[task, robot, station] for it in directions]
+        return [End(mode=mode, is_reversed=it) for mode in self.modes[task, robot, station] for it in mode.directions]
 
     def transfer_steps(self, robot: str, first: Array, second: Array) -> Indices:
         """Whole steps of straight moves from rest to rest, broadcast over configurations of shape (..., n)."""

@@ -1,12 +1,12 @@
 """The table of modes: how each robot can do each task at each pose of the part.
 
 A mode is one branch of the arm followed along approach, path and retraction, at one spin of the tool. Filters come in
-the order of their cost: the demanded direction of the tool, reach, joint limits, the continuation along the path.
+the order of their cost: torch and weld position, reach, joint limits, the continuation along the path.
 Collisions come last and elsewhere, as they cost most.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -44,6 +44,7 @@ class TaskMode:
     spin: float  # turn of the tool about its axis beside that of the task in [rad]
     q: Array  # configurations before, along and after the path in [rad] or [m], shape (S + 2, n)
     margin: float  # smallest distance from a joint limit in [rad] or [m]
+    directions: tuple[bool, ...] = (False, True)  # whether it may be done as written, and from its end to its begin
 
 
 @dataclass(slots=True, kw_only=True, eq=False)
@@ -71,7 +72,6 @@ class ModeSearch:
     goals: Sequence[TaskGoal]
     stations: Stations
     spins: Array  # turns of the tool about its axis beside those of the tasks in [rad], shape (S,)
-    most_lean: float = np.pi  # largest angle in [rad] between the tool's axis and gravity
 
     def table(self) -> ModeTable:
         """The table of all robots."""
@@ -86,21 +86,24 @@ class ModeSearch:
         """Add the modes of one robot."""
         follower = BranchFollower.of(robot)
         for goal in goals:
-            places = np.flatnonzero(self._leaning(goal))
-            table.note("demanded direction of the tool", [goal.name] * (len(places) * len(self.spins)))
+            allowed = self.stations.allowed(goal)
+            places = np.flatnonzero(allowed[False] | (allowed[True] & goal.is_reversible))
+            table.note("torch and weld position", [goal.name] * (len(places) * len(self.spins)))
             for places_now in np.array_split(places, max(1, -(-len(places) * len(self.spins) // AT_ONCE))):
-                self._follow(table, follower, goal, places_now)
+                self._follow(table, follower, goal, places_now, allowed)
         for key, modes in table.modes.items():
             if key[1] == robot.name:
                 table.modes[key] = _distinct(sorted(modes, key=lambda mode: -mode.margin))[:MOST_MODES]
 
-    def _leaning(self, goal: TaskGoal) -> Flags:
-        """Stations at which the tool keeps the demanded direction all along a task, shape (K,)."""
-        down = -(self.stations.X_WP[:, :3, :3] @ goal.X_PT[:, :3, 2].T)[:, 2]
-        return np.min(down, axis=1) >= np.cos(self.most_lean) - 1e-9
-
-    def _follow(self, table: ModeTable, follower: "BranchFollower", goal: TaskGoal, places: Indices) -> None:
-        """Add what can be followed of one task at some stations."""
+    def _follow(
+        self,
+        table: ModeTable,
+        follower: "BranchFollower",
+        goal: TaskGoal,
+        places: Indices,
+        allowed: Mapping[bool, Flags],
+    ) -> None:
+        """Add what can be followed of one task at some stations; in which directions it may be done there is given."""
         turns = np.tile(np.eye(4), (len(self.spins), 1, 1))
         turns[:, :3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), self.spins)
         X = self.stations.X_WP[places, None, None] @ goal.X_PT[None, None] @ turns[None, :, None]
@@ -111,7 +114,13 @@ class ModeSearch:
         for row, q, margin in zip(result.rows.tolist(), result.q, result.margins.tolist(), strict=True):
             place, spin = int(places[row // len(self.spins)]), float(self.spins[row % len(self.spins)])
             mode = TaskMode(
-                task=goal.name, robot=follower.robot.name, station=place, spin=spin, q=q, margin=float(margin)
+                task=goal.name,
+                robot=follower.robot.name,
+                station=place,
+                spin=spin,
+                q=q,
+                margin=float(margin),
+                directions=tuple(it for it in (False, True) if allowed[it][place] and (goal.is_reversible or not it)),
             )
             table.modes.setdefault((goal.name, follower.robot.name, place), []).append(mode)
 

@@ -83,7 +83,7 @@ def test_without_the_solver_there_is_a_program_and_no_bound(
 
 def test_a_task_that_nobody_can_do_is_named_with_its_filter(tmp_path: Path) -> None:
     text = OPEN.read_text().replace("[[-300, -150, 40], [-160, -150, 40]]", "[[-300, -150, 2040], [-160, -150, 2040]]")
-    text = text.replace("torch_within_deg: 50", "torch_within_deg: 5")
+    text = text.replace("within_deg: 50", "within_deg: 5")
     (tmp_path / "cell.yaml").write_text(text)
 
     with pytest.raises(NoSolutionError) as refused:
@@ -91,7 +91,7 @@ def test_a_task_that_nobody_can_do_is_named_with_its_filter(tmp_path: Path) -> N
 
     lines = str(refused.value).splitlines()
     assert any("tasks.top_1: none of west, east can do it at any pose" in line for line in lines)
-    assert any("'demanded direction of the tool'" in line for line in lines)
+    assert any("'torch and weld position'" in line for line in lines)
 
 
 def test_the_command_writes_the_folder_and_solve_refuses_the_draft(tmp_path: Path) -> None:

@@ -154,6 +154,8 @@ def build_task(
         tool_depth=(document.checks.tool_depth_mm if entry.tool_depth_mm is None else entry.tool_depth_mm).si,
         standoff=None if entry.standoff_mm is None else (entry.standoff_mm[0].si, entry.standoff_mm[1].si),
         off_part=tuple(OffPart(name) for name in entry.off_part),
+        torch=entry.torch,
+        weld_position=entry.weld_position,
         after=entry.preceding,
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),

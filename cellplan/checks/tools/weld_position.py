@@ -1,0 +1,71 @@
+"""Tools and welds to gravity along their paths: the angle of a torch, and the position of a weld."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.measures.weld_position import position_name, torch_angles, weld_angles
+from cellplan.model.motion.motion import Schedule, TaskSchedule
+from cellplan.model.report.report import Check
+from cellplan.scene.kinematics.screw_chain import ScrewChain
+
+MOVES = 1e-9  # [m/s] of a tool along its path: below it there is no direction of travel
+
+
+def check_weld_positions(
+    schedule: Schedule, chains: Mapping[str, ScrewChain], q: Mapping[str, Array], X_WP: Array
+) -> Iterator[Check]:
+    """Whether torches and welds keep what their tasks demand, while the tools travel along their paths.
+
+    Args:
+        q: Positions of each robot in [rad] or [m], shape (N, n).
+        X_WP: The part, shape (N, 4, 4) or (1, 4, 4).
+    """
+    for scheduled in schedule.tasks:
+        task = scheduled.task
+        if task.torch is None and task.weld_position is None:
+            continue
+        rows = _travelled_rows(scheduled, schedule.times)
+        if not len(rows):
+            continue
+        X_WT = chains[task.robot].tool_poses(q[task.robot][rows])
+        R_WP = np.broadcast_to(X_WP, (len(schedule.times), 4, 4))[rows, :3, :3]
+        velocity = (R_WP @ scheduled.V_PT_P[rows, :3, None])[..., 0]
+        slope, rotation = weld_angles(X_WT, velocity / np.linalg.norm(velocity, axis=1, keepdims=True))
+        times = schedule.times[rows]
+        if task.torch is not None:
+            yield _within("torch_angle", task.name, torch_angles(X_WT), (-np.inf, task.torch.within_deg.si), times)
+        if task.weld_position is not None:
+            yield _within("weld_slope", task.name, slope, task.weld_position.slope, times)
+            names = sorted({position_name(*angles) for angles in zip(slope.tolist(), rotation.tolist(), strict=True)})
+            yield _within("weld_rotation", task.name, rotation, task.weld_position.rotation, times, ", ".join(names))
+
+
+def _travelled_rows(scheduled: TaskSchedule, times: Array) -> Indices:
+    """Rows in which a tool travels along its path, shape (M,)."""
+    is_on_path = (times >= scheduled.begin) & (times <= scheduled.end)
+    return np.flatnonzero(is_on_path & (np.linalg.norm(scheduled.V_PT_P[:, :3], axis=1) > MOVES))
+
+
+def _within(
+    name: str, task: str, angles: Array, limits: tuple[float, float], times: Array, position: str = ""
+) -> Check:
+    """The check of an angle of one task against its limits in [rad]."""
+    low, high = limits
+    worst = int(np.argmax(np.maximum(low - angles, angles - high)))
+    value, limit = float(angles[worst]), high if angles[worst] - high >= low - angles[worst] else low
+    what = {"torch_angle": "angle of the tool from gravity", "weld_slope": "slope of the weld"}
+    allowed = f"at most {np.degrees(high):g}" if np.isinf(low) else f"{np.degrees(low):g} to {np.degrees(high):g}"
+    named = f", position {position}" if position else ""
+    return Check(
+        name=name,
+        subject=task,
+        passed=bool(low <= value <= high),
+        value=float(np.degrees(value)),
+        limit=float(np.degrees(limit)),
+        unit="deg",
+        at_s=float(times[worst]),
+        message=f"{what.get(name, 'rotation of the weld')} of task '{task}': {np.degrees(value):.4g} deg at "
+        f"{times[worst]:.3f} s{named}, allowed {allowed} deg",
+    )
