@@ -291,7 +291,7 @@ def add_kind(copy: Path) -> None:
     (copy / "jobs" / "travels.html").write_text(KIND_PAGE, encoding="utf-8")
     (copy / "cli" / "improve" / "travels.py").write_text(KIND_COMMAND, encoding="utf-8")
     insert(copy / "cli" / "main.py", "import sweep\n", "from cellplan.cli.improve.travels import travels\n")
-    insert(copy / "cli" / "main.py", '"sweep": sweep, ', '"travels": travels, ')
+    insert(copy / "cli" / "main.py", '"sweep": sweep,\n', '        "travels": travels,\n')
     kinds = copy / "jobs" / "present" / "kinds.py"
     insert(kinds, "import STUDY\n", "from cellplan.jobs.travels import TRAVELS\n")
     insert(kinds, "OF_JOBS: Final = (", "TRAVELS, ")

@@ -113,8 +113,8 @@ class TaskEntry(Entry):
     """One operator's work on the part."""
 
     robot: OneRobot = Field(
-        description="Robot that does the task; without program a robot has at most one. With any, or a list of robots, "
-        "the task is open: `cellplan assign` chooses one of them, or of all that do not hold the part."
+        description="Robot that does the task, or any, or a list of robots for `cellplan assign` to choose from; "
+        "without program a robot has at most one."
     )
     relative_to: Literal["part", "world"] = Field(
         default="part",

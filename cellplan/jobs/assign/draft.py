@@ -64,8 +64,10 @@ class AssignmentDraft:
         holder = self.cell.robot(self.cell.positioners[0])
         given = self.settings.stations if "station" in self.settings.free else None
         if given is None:
-            postures = [task.holder_posture for task in self.cell.tasks if task.holder_posture is not None]
-            return Stations.of(self.cell, np.unique([*postures, *([] if postures else [_start(holder)])], axis=0))
+            configurations = [task.holder_posture for task in self.cell.tasks if task.holder_posture is not None]
+            return Stations.of(
+                self.cell, np.unique([*configurations, *([] if configurations else [_start(holder)])], axis=0)
+            )
         where = self.cell.origin.at("assign.stations")
         return Stations.of(
             self.cell, _grid(holder, given, where) if isinstance(given, Mapping) else _listed(holder, given, where)
@@ -112,19 +114,18 @@ def _start(holder: Robot) -> Array:
     return np.zeros(len(holder.model.joints)) if start is None else start
 
 
-def _listed(holder: Robot, postures: Sequence[Sequence[float]], where: str) -> Array:
-    """Postures in a list, in [rad] or [m], shape (K, n)."""
+def _listed(holder: Robot, configurations: Sequence[Sequence[float]], where: str) -> Array:
+    """Configurations in a list, in [rad] or [m], shape (K, n)."""
     count = len(holder.model.joints)
-    for index, posture in enumerate(postures):
-        if len(posture) != count:
-            raise InputError(
-                f"{where}[{index}]: expected {count} values, one for each joint of '{holder.name}', got {len(posture)}"
-            )
-    return np.array([configuration_in_si(holder.model, posture) for posture in postures])
+    for index, configuration in enumerate(configurations):
+        if len(configuration) != count:
+            values = f"{count} values, one for each joint of '{holder.name}'"
+            raise InputError(f"{where}[{index}]: expected {values}, got {len(configuration)}")
+    return np.array([configuration_in_si(holder.model, configuration) for configuration in configurations])
 
 
 def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
-    """All postures of a grid, in [rad] or [m], shape (K, n)."""
+    """All configurations of a grid, in [rad] or [m], shape (K, n)."""
     keys = start_keys(holder.model)
     for key, (first, last, step) in ranges.items():
         if key not in keys:
@@ -135,7 +136,9 @@ def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> A
             )
     count = np.prod([np.floor((ranges[key][1] - ranges[key][0]) / ranges[key][2] + 1e-9) + 1 for key in ranges])
     if count > POSTURE_LIMIT:
-        raise InputError(f"{where}: expected at most {POSTURE_LIMIT} postures, got {count:.0f}: take longer steps")
+        raise InputError(
+            f"{where}: expected at most {POSTURE_LIMIT} configurations, got {count:.0f}: take longer steps"
+        )
     start = _start(holder)
     values = []
     for column, key in enumerate(keys):
@@ -145,8 +148,8 @@ def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> A
             values.append([float(configuration_in_si(holder.model, [it] * len(keys))[column]) for it in written])
         else:
             values.append([float(start[column])])
-    postures = np.array(list(product(*values)))
-    inside = np.all((postures >= holder.model.lower) & (postures <= holder.model.upper), axis=1)
+    configurations = np.array(list(product(*values)))
+    inside = np.all((configurations >= holder.model.lower) & (configurations <= holder.model.upper), axis=1)
     if not inside.any():
-        raise InputError(f"{where}: expected a posture within the joint limits of '{holder.name}', got none")
-    return postures[inside]
+        raise InputError(f"{where}: expected a configuration within the joint limits of '{holder.name}', got none")
+    return configurations[inside]

@@ -52,7 +52,7 @@ class SphericalWristArm:
         return cls(axes=axes, points=points)
 
     def configurations(self, D: Array) -> Array:
-        """Configurations that give the last link some displacements; joint limits are not looked at.
+        """Configurations that give the last link some displacements; joint limits do not count.
 
         Args:
             D: Displacements of the last link from its place at the reference configuration, in the base frame, shape

@@ -1,6 +1,6 @@
 """Which modes are free of collisions by themselves, and which two cannot be at work at the same time.
 
-Both are looked at in few configurations with a reserve, as an assignment needs many; what it chooses is certified
+Both are examined in few configurations with a reserve, as an assignment needs many; what it chooses is certified
 when it is solved.
 """
 
@@ -19,7 +19,7 @@ from cellplan.scene.scene import Scene
 from cellplan.search.assign.goals import Stations
 from cellplan.search.assign.table import TaskMode
 
-LOOKED_AT: Final = 5  # configurations of a mode that are looked at, those before and after its path among them
+LOOKED_AT: Final = 5  # configurations of a mode that are examined, those before and after its path among them
 MET: Final = 4  # configurations of each of two modes that are combined
 RESERVE: Final = 0.007  # [m] beyond the demand, of bodies of different robots, the part and the surroundings
 WITHIN_ROBOT: Final = 0.0005  # [m] likewise of bodies of one robot, whose design often sets the distance
@@ -34,7 +34,7 @@ class AssignmentClearance:
         scene: The scene of the cell, with all tools at work.
         home: Stacked homes of all robots in [rad] or [m], shape (nq,).
         conflict: Distance in [m] that two robots at work are to keep.
-        examined: Numbers of modes, and of pairs of modes, that were looked at.
+        examined: Numbers of modes, and of pairs of modes, that were examined.
     """
 
     scene: Scene

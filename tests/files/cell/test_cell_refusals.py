@@ -222,7 +222,7 @@ Refuse = Callable[..., list[str]]
             "environment:",
             "enviroment: {}\nenvironment:",
             "c:22: enviroment: unknown key, did you mean 'environment'?; allowed: cellplan, name, robots, controllers, "
-            "part, tasks, environment, motion, program, acceleration, solver, checks, layout",
+            "part, tasks, environment, motion, program, assign, acceleration, solver, checks, layout",
         ),
     ],
 )

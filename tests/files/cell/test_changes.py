@@ -129,7 +129,8 @@ def test_the_digest_of_the_file_stays_that_of_the_file(cell: Cell) -> None:
             {"motoin.duration_s": 1},
             [
                 "c with motoin.duration_s = 1: motoin: unknown key, did you mean 'motion'?; allowed: cellplan, name, "
-                "robots, controllers, part, tasks, environment, motion, program, acceleration, solver, checks, layout"
+                "robots, controllers, part, tasks, environment, motion, program, assign, acceleration, solver, checks, "
+                "layout"
             ],
         ),
         (

@@ -14,8 +14,8 @@ Refuse = Callable[..., list[str]]
         (
             "    robot: worker\n",
             "",
-            "c:17: tasks.ring.robot: missing, expected robot that does the task; without program a robot has at most "
-            "one",
+            "c:17: tasks.ring.robot: missing, expected robot that does the task, or any, or a list of robots for "
+            "`cellplan assign` to choose from; without program a robot has at most one",
         ),
         (
             "tool_axis: normal",

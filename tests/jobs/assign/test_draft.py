@@ -39,7 +39,7 @@ def test_cells_of_which_no_assignment_is_made(tmp_path: Path, old: str, new: str
     assert words in str(refused.value)
 
 
-def test_the_grid_has_all_postures_from_first_to_last(tmp_path: Path) -> None:
+def test_the_grid_has_all_configurations_from_first_to_last(tmp_path: Path) -> None:
     stations = draft(tmp_path).stations()
 
     assert stations.holder == "table"
@@ -70,7 +70,7 @@ def test_what_is_not_free_is_not_compared(tmp_path: Path) -> None:
         ("{tilt: [0, 90, 45]}", "assign.stations.tilt: expected a joint of 'table': tilt_deg, turn_deg"),
         ("{tilt_deg: [90, 0, 45]}", "assign.stations.tilt_deg: expected [first, last, step] with a step above 0"),
         ("[[0, 10, 20]]", "assign.stations[0]: expected 2 values, one for each joint of 'table', got 3"),
-        ("{tilt_deg: [-90, 90, 1], turn_deg: [-180, 150, 1]}", "expected at most 1000 postures, got 59911"),
+        ("{tilt_deg: [-90, 90, 1], turn_deg: [-180, 150, 1]}", "expected at most 1000 configurations, got 59911"),
     ],
 )
 def test_stations_that_the_holder_cannot_take(tmp_path: Path, stations: str, words: str) -> None:

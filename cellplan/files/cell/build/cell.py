@@ -122,14 +122,13 @@ def build_task(
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
-    path = _path(name, entry.path, read_targets)
     process = entry.process
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     corners = entry.corners or motion.corners
     return Task(
         name=name,
         robot=entry.robot,
-        path=path,
+        path=_path(name, entry.path, read_targets),
         project=None if entry.path.project is None else direction(entry.path.project),
         plane_offset=(entry.path.offset_mm or Mm(0.0)).si,
         tool_axis=None if tool_axis is None else direction(tool_axis),
