@@ -86,7 +86,7 @@ def refuse_unless_assignable(cell: Cell) -> None:
         InputError: With what is wrong, where, and the cure.
     """
     at, program = cell.origin.at, cell.program
-    if program is None:
+    if not program.is_home_to_home:
         raise InputError(
             f"{at('program')}: missing, expected program: {{}}, as an assignment is made from home to home"
         )

@@ -26,8 +26,8 @@ class AssignEntry(Entry):
     stations: StationChoice | None = Field(
         default=None,
         description="Poses of the part that are compared, as configurations of its first holder: a list of them, one "
-        "value per joint, or a grid of its joints, [first, last, step] for each key (tilt_deg, rail_mm); a joint without "
-        "a key stays at its start. When absent those that the tasks and the start of the holder give.",
+        "value per joint, or a grid of its joints, [first, last, step] for each key (tilt_deg, rail_mm); a joint "
+        "without a key stays at its start. When absent those that the tasks and the start of the holder give.",
     )
     free: tuple[FreeWord, ...] = Field(
         default=("direction", "spin", "station"),
