@@ -41,21 +41,34 @@ LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path",
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Assignment(Presented):
-    """Who does which task, in which order, at which pose of the part; and what is proved of it."""
+    """Who does which task, in which order, at which pose of the part; and what is proved of it.
 
-    draft: Cell  # each open task with the first of its robots
-    cell: Cell  # the program, with nothing open
-    solution: Solution  # it, solved and verified
-    instance: Instance  # what was chosen from
+    Attributes:
+        draft: The cell that was given, each open task with the first of its robots.
+        cell: The program, with nothing open.
+        solution: The program, solved and verified.
+        instance: What was chosen from.
+        sequenced: The blocks in their order, with a mode of every task.
+        bound: No program in blocks at these stations, with these modes, is shorter, in [s]; None where that is not
+            known, as OR-Tools is not installed.
+        is_proved: Whether no schedule of the block model is better than the one that was first sequenced.
+        greedy: Cycle in [s] of the nearest tasks first, by the model.
+        without: Cycle in [s] by the model without each robot; None where it has to work.
+        rounds: Number of programs that were solved.
+        counts: Numbers of goals, modes, certificates and refusals.
+    """
+
+    draft: Cell
+    cell: Cell
+    solution: Solution
+    instance: Instance
     sequenced: SequencedBlocks
-    bound: (
-        float | None
-    )  # no program in blocks at these stations, with these modes, is shorter, in [s]; None if not known
-    is_proved: bool  # whether no schedule of the block model is better than the one that was first sequenced
-    greedy: float  # cycle in [s] of the nearest tasks first, by the model
-    without: Mapping[str, float | None]  # cycle in [s] by the model without each robot; None where it has to work
-    rounds: int  # programs that were solved
-    counts: Mapping[str, int]  # of goals, modes, certificates and refusals
+    bound: float | None
+    is_proved: bool
+    greedy: float
+    without: Mapping[str, float | None]
+    rounds: int
+    counts: Mapping[str, int]
 
     @property
     def passed(self) -> bool:

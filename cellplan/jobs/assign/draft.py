@@ -20,10 +20,16 @@ RESTS = (Mode.SEMI_COORDINATED, Mode.PART_AT_REST)  # modes in which the part re
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AssignmentDraft:
-    """A cell in which somebody has to be found for every task."""
+    """A cell with open tasks.
 
-    cell: Cell  # each open task with the first of its robots
-    robots: Mapping[str, Sequence[str]]  # robots that may do each open task
+    Attributes:
+        cell: Each open task with the first of its robots.
+        robots: Robots that may do each open task.
+        file: The file that it was read from.
+    """
+
+    cell: Cell
+    robots: Mapping[str, Sequence[str]]
     file: Path
 
     @classmethod

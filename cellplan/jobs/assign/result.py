@@ -231,6 +231,7 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
     It holds ``assign.json``, ``assign.html``, ``best.yaml`` with the files that it names, and its run.
 
     Args:
+        assignment: As ``assign`` returns it.
         given: The cell file that it was made from.
         folder: The folder; an earlier one is replaced.
         progress: Called with the stage and the fraction done.
