@@ -133,8 +133,10 @@ def certify_growth(scene: Scene, q: Array, *, with_minimum: bool = False) -> Gro
 def sampled_growth(scene: Scene, q: Array, *, near: Sequence[int], moved: Collection[int]) -> Growth:
     """As ``certify_growth``, for a search: pairs that come apart are measured at few moments, and nothing is proved.
 
-    ``near`` has the pairs that do not keep their demand in the first row, ``moved`` those that the motion changes; the
-    others are not asked.
+    Args:
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+        near: Pairs that do not keep their demand in the first row.
+        moved: Pairs that the motion changes; the others are not asked.
     """
     bound = certify(scene_of_rows(scene, sorted({*moved} - {*near})), q, with_minimum=False)
     return Growth.of(bound, [_Separation(scene, row, q, is_sampled=True) for row in near] if bound.is_met else [])

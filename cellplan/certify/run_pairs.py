@@ -36,10 +36,14 @@ def scene_of_rows(scene: Scene, rows: Sequence[int]) -> Scene:
 def with_straight_move(scene: Scene, times: Array, q: Array) -> tuple[Scene, Array, Array]:
     """The scene with the pairs of its straight move, each with the rows between which it is watched.
 
-    A row, with its time in [s] and stacked joint positions in [rad] or [m], is added wherever a pair begins or ends to
-    be watched between two rows: joints move linearly.
-
     Where a pair begins or ends to be watched between two rows, a row is added there: joints move linearly.
+
+    Args:
+        times: Times of the rows in [s], shape (N,).
+        q: Stacked joint positions in [rad] or [m], shape (N, nq).
+
+    Returns:
+        The scene, and the times and positions with the added rows.
     """
     move = scene.straight
     if move is None:

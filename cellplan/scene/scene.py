@@ -160,9 +160,11 @@ class Scene:
         return above - body.looseness
 
     def touching(self, q: Array, *, among: Flags | None = None) -> tuple[str, str] | None:
-        """Names of the first two bodies that must not touch but do, at a stacked configuration, shape (nq,), or None.
+        """Names of the first two bodies that must not touch but do, or None.
 
-        ``among`` says which of ``pairs`` are examined, shape (len(pairs),); all when None.
+        Args:
+            q: Stacked joint positions in [rad] or [m], shape (nq,).
+            among: Which of ``pairs`` are examined, shape (len(pairs),); all when None.
         """
         examined = np.ones(len(self.pairs), dtype=bool) if among is None else among
         poses = self.body_poses(q[None])

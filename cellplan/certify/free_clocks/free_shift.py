@@ -203,7 +203,10 @@ def _largest(rows: Array, times: Array) -> Array:
 def _shift_within(motion: FreeMotion, times: Array, bodies: Indices, most: tuple[float, float]) -> float:
     """Largest shift in [s] within which one of two bodies makes no way longer than it may, anywhere.
 
-    The rows have times in [s], shape (N,); ``most`` is the largest way in [m], and the largest shift in [s].
+    Args:
+        times: Times of the rows in [s], shape (N,).
+        bodies: The two bodies of the engine, shape (2,).
+        most: Largest way in [m], and largest shift in [s].
     """
     margin, high = most
     low = 0.0

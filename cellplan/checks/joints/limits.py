@@ -1,4 +1,4 @@
-"""Positions and velocities of joints that were read back, against their limits."""
+"""Positions and velocities of the joints of a written motion, against their limits."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -10,11 +10,11 @@ from cellplan.model.cell.cell import Robot
 from cellplan.model.cell.doubts import doubt_about_velocity
 from cellplan.model.report.report import Check, JointUse
 
-SHOWN_TOL: Final = 1e-9  # [rad] sums of rounded positions
+SHOWN_TOL: Final = 1e-9  # [rad] or [m] sums of rounded positions
 
 
 def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Check]:
-    """Position and speed of every joint."""
+    """Two checks of each joint of one robot: position and speed."""
     checks = []
     for index, use in enumerate(uses):
         alike = [it.velocity_limit for it in uses if it is not use and it.is_revolute == use.is_revolute]
@@ -23,7 +23,7 @@ def check_joints(uses: tuple[JointUse, ...], times: Array, q: Array) -> list[Che
 
 
 def check_shown(robot: Robot, times: Array, q: Array) -> list[Check]:
-    """Positions that a controller shows, against the limits that are stated of these: of coupled axes too.
+    """Positions that a controller shows, against the controller's limits, which may be on coupled axes.
 
     Args:
         times: Times in [s], shape (N,).

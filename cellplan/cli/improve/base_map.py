@@ -1,4 +1,4 @@
-"""``cellplan map``: the base plane of one robot, coloured by what becomes of the whole job at each place."""
+"""``cellplan map``: the base plane of one robot, coloured by whether the whole job passes at each place."""
 
 from dataclasses import dataclass
 from pathlib import Path

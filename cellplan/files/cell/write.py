@@ -62,7 +62,9 @@ def written_document(cell: Cell, starts: Mapping[str, Array] | None = None) -> d
 
 
 def as_written(model: RobotModel, q: Array) -> Array:
-    """The configuration, in [rad] or [m], that is read back after ``q`` was written; within a unit in the last place.
+    """The configuration that is read back after ``q``, shape (n,), in [rad] or [m], was written.
+
+    It is at most a unit in the last place away from ``q``.
 
     Not every number of radians is the image of a number of degrees. A solver that starts from this configuration can be
     repeated from the written cell to the last bit.

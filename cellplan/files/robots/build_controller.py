@@ -22,9 +22,12 @@ PARALLEL: Final = 0.999  # [-] cosine of two axes that count as parallel: 2.6 de
 
 
 def with_zero_of_file(model: RobotModel, path: Path, *, file: str) -> tuple[RobotModel, str]:
-    """The robot with the counting that a file of its own states, with the keys of ``controller`` in a joint-axis table.
+    """The robot with the counting that a separate file states, with the keys of ``controller`` in a joint-axis table.
 
-    Its own file does not state it. The SHA-256 of that file comes second; an ``InputError`` has all findings about it.
+    The model file does not state it. The SHA-256 of the separate file comes second.
+
+    Raises:
+        InputError: All findings about the separate file at once.
     """
     document = read_yaml(path, file=file)
     entry, findings = validate(ControllerZeroEntry, document)

@@ -10,7 +10,10 @@ from cellplan.model.settings.cell_errors import ErrorsDocument
 
 
 def json_schema(models: Iterable[str] = ()) -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of the cell file; editors offer some names as the model of a robot."""
+    """JSON Schema (draft 2020-12) of the cell file.
+
+    ``models`` are the names that editors offer as the model of a robot.
+    """
     schema = _finished(CellDocument.model_json_schema(), "cellplan cell file, version 1")
     if names := list(models):
         model = schema["$defs"]["RobotEntry"]["properties"]["model"]

@@ -99,7 +99,7 @@ def read_yaml(path: Path, *, file: str) -> YamlDocument:
 
 
 def parse_yaml(data: bytes, *, file: str) -> YamlDocument:
-    """Read the bytes of such a file, within the limits on nodes and depth."""
+    """Read the bytes of a file of UTF-8 whose outermost value is a mapping, within the limits on nodes and depth."""
     if len(data) > SIZE_LIMIT:
         raise InputError(f"{file}: expected a file of at most {SIZE_LIMIT / 1e6:g} MB, got a larger one")
     text = _decoded(data, file)

@@ -32,7 +32,7 @@ class UniformBSpline:
         return np.concatenate([0.0 * ends, self.inner_knots, ends])
 
     def basis(self, shares: Array, derivative: int = 0) -> Array:
-        r"""Values of all basis functions at shares in 0..1, or their derivatives by the share, shape (N, count).
+        r"""Values of all basis functions at shares in 0..1, (N,), or their derivatives by the share, shape (N, count).
 
         By the recursion of Cox and de Boor, :math:`B_{i,p} = w_{i,p} B_{i,p-1} + (1 - w_{i+1,p}) B_{i+1,p-1}` with
         :math:`w_{i,p}(x) = (x - t_i) / (t_{i+p} - t_i)`; the derivative of :math:`B_{i,p}` is :math:`p` times the

@@ -159,7 +159,9 @@ class ProjectedCurve:
 
 
 def patches_facing(shape: Box | Cylinder | Sphere, X: Array, direction: Array) -> tuple[Patch, ...]:
-    """Patches of a solid, placed by the pose ``X``, that can be seen from a unit direction, shape (3,).
+    """Patches of a solid that can be seen from a unit direction, shape (3,).
+
+    ``X`` is the pose of the solid in the frame of the points, shape (4, 4).
 
     A line meets a convex solid on one facing patch only, so a hit that lies within a patch's border is the first one.
     """

@@ -10,12 +10,13 @@ from cellplan.geometry.transforms import Array
 
 
 def tessellate(shape: Solid, segments: int = 48) -> Mesh:
-    """Closed mesh, of at least 4 sides all round, round a solid; every point of the solid lies inside or on it.
+    """Closed mesh round a solid; every point of the solid lies inside or on it. A mesh is returned unchanged.
 
     Distances measured to the mesh are therefore never above the true ones; they are below by at most
     ``radius (1/cos(pi/segments)^2 - 1)``, about.
 
-    Meshes come back as they are.
+    Args:
+        segments: Sides round the circumference of a round body, at least 4.
     """
     if segments < 4:
         raise ValueError(f"a round body needs at least 4 segments, got {segments}")

@@ -124,7 +124,12 @@ def requested_cell(request: MapRequest) -> Cell:
 
 
 def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
-    """Refuse what is no operator, no usable grid, or no synchronous pseudo-inverse motion; call it early."""
+    """Refuse a map that cannot be made; call it early, before any long work.
+
+    Raises:
+        InputError: The robot is not an operator, the grid is not usable, or the job is not one synchronous
+            pseudo-inverse motion.
+    """
     operators = [task.robot for task in cell.tasks if task.robot not in cell.positioners]
     if name not in operators:
         raise InputError(

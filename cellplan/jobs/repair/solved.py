@@ -35,7 +35,7 @@ class SolvedCell:
 
     @property
     def failed(self) -> list[Check]:
-        """Checks that failed; a margin only where its joint is within its limits."""
+        """Checks that failed; margin checks of joints already beyond a limit are left out."""
         checks = [check for check in self.checks if not check.passed]
         beyond = {check.subject for check in checks if check.name == "joint_position"}
         return [check for check in checks if check.name != MARGIN or check.subject not in beyond]
@@ -52,7 +52,7 @@ class SolvedCell:
 
     @property
     def figures(self) -> dict[str, Any]:
-        """Plain figures."""
+        """Margins, checks, cycle and clearance for the record."""
         cell = self.solution.cell
         names = [f"{robot.name}/{joint}" for robot in cell.robots for joint in robot.model.joint_names]
         turning = np.array([joint.is_revolute for robot in cell.robots for joint in robot.model.joints])
@@ -110,12 +110,12 @@ def demanded_margin(cell: Cell) -> Array:
 
 
 def required_time(failed: Iterable[Mapping[str, Any]]) -> float:
-    """How many times as long the motion must last for failed checks, as records, that a slower motion passes."""
+    """Factor on the duration that makes the failed checks, as records, pass, as far as a slower motion does that."""
     factors = (CHECK_KINDS[check["name"]].more_time(check["value"], check["limit"]) for check in failed)
     return max(factors, default=1.0)
 
 
 def required_step(failed: Iterable[Mapping[str, Any]], step: float) -> float:
-    """Time between rows in [s], halved until failed checks, as records, pass: an error grows with its square."""
+    """Time between rows in [s], halved until failed checks, as records, pass: the error grows with the step squared."""
     ratio = max((check["value"] / check["limit"] for check in failed if check["name"] in PASSED_BY_STEP), default=1.0)
     return step / 2.0 ** math.ceil(0.5 * math.log2(max(1.0, MORE_ERROR * ratio)))

@@ -65,7 +65,10 @@ class JointSpline:
 
 
 def basis(shares: Array, count: int, degree: int, derivative: int = 0) -> Array:
-    """What each coefficient of a joint spline contributes at shares of the clock in 0..1, shape (N, count)."""
+    """What each coefficient of a joint spline contributes at shares of the clock in 0..1, shape (N, count).
+
+    ``shares`` has shape (N,).
+    """
     values = _functions(count, degree).basis(shares, derivative)
     first, last = values[:, :REPEATED].sum(axis=1), values[:, -REPEATED:].sum(axis=1)
     return np.column_stack([first, values[:, REPEATED:-REPEATED], last])

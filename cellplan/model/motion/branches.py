@@ -14,16 +14,16 @@ class Branches:
     digest: str  # SHA-256 of its manifest
     starts: Mapping[str, Array]  # start posture by robot
     homes: Mapping[str, Array]  # home by robot
-    tasks: Mapping[str, Array]  # where its robot begins it, by task or straight move of a holder
+    tasks: Mapping[str, Array]  # configuration at the start of each task (or of a holder's straight move), by its name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovedStart:
-    """A start that was the seed of the one that was used."""
+    """A start posture that was corrected onto its path or grasp."""
 
     robot: str  # name of the robot
     task: str  # task or grasp that it begins at
-    position: float  # how far its tool was from there in [m]
+    position: float  # how far off the path or grasp its tool was in [m]
     orientation: float  # likewise in [rad]
     joint: str  # joint that was moved most
     moved: float  # by how much in [rad] or [m]

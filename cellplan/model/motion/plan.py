@@ -153,11 +153,17 @@ class Plan:
         raise KeyError(task)
 
     def gaps(self, sigma: Array) -> dict[int, str]:
-        """Name of what is not part of the program, by the first row after it; rows at increasing times in [s]."""
+        """Name of what is not part of the program, by the first row after it.
+
+        ``sigma`` are the nominal times of the rows in [s], increasing, shape (N,).
+        """
         return {int(np.searchsorted(sigma, phase.end)): phase.name for phase in self.phases if not phase.in_program}
 
 
 def rows_of(phase: Phase, sigma: Array) -> slice:
-    """Rows of a program, at increasing nominal times in [s], that belong to a phase of the clock, both ends too."""
+    """Rows of a program that belong to a phase of the clock, both ends included.
+
+    ``sigma`` are the nominal times of the rows in [s], increasing, shape (N,).
+    """
     first = int(np.searchsorted(sigma, phase.begin))
     return slice(first, int(np.searchsorted(sigma, phase.end, side="right")))

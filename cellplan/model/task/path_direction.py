@@ -31,7 +31,7 @@ def plane_axes(plane: PlaneName) -> tuple[Array, Array, Array]:
 def outside_of(task: Task, normal: Array) -> Array:
     """Direction that a path is seen from: the side of its projection, else against the tool axis, else ``normal``.
 
-    This is the normal of the plane that the path lies in, shape (3,).
+    ``normal`` is that of the plane that the path lies in, shape (3,).
     """
     if task.project is not None:
         return task.project

@@ -23,7 +23,9 @@ class _NoConvergenceError(NoSolutionError):
 
 
 def closed_path(run: AccurateRun, problem: TrackingProblem) -> CollocatedPath | None:
-    """A path that closes in every cycle; None where collocation does not converge. Open paths and cycles are refused.
+    """A path that closes in every cycle; None where collocation does not converge.
+
+    A path that is open, or a cycle that does not close, is refused.
 
     Each cycle gets a drift of its own, in one direction and at rest at both ends. Where the targets of a cycle are
     those of the one before, it repeats its motion: a drift alone would let rounding grow from cycle to cycle, as the

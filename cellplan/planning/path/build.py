@@ -128,7 +128,10 @@ def refuse_path_in_metres(curve: Curve, *, task: Task, part: Part) -> None:
 
 
 def refuse_unlikely_path(tip: Curve, arc: ArcLength, *, task: Task, part: Part) -> None:
-    """Refuse a path that is shorter than anybody works, or far from the part that it is given on."""
+    """Refuse a path that is shorter than anybody works, or far from the part that it is given on.
+
+    ``tip`` has the positions of the tool in P; of a task in the world only the length is judged.
+    """
     if not isinstance(task.path, TimedPath) and arc.total < SHORTEST:
         raise InputError(
             f"{task.where('path')}: expected a path of at least {length(SHORTEST)} mm, got {length(arc.total)} mm; "

@@ -8,16 +8,16 @@ from cellplan.planning.tracking.problem import TrackingProblem
 
 
 def nearest_to_singular(problem: TrackingProblem, k: int, q: Array) -> NearestSingular | None:
-    """The robot whose own Jacobian, with the rows that its task or grasp constrains, is nearest to losing a row.
+    """The robot whose own Jacobian, with the rows that its task or grasp constrains, is nearest to losing rank.
 
-    Joints that stand still are left out; so are robots that cannot move. Units are mixed:
-    metres and radians.
+    Joints that move nothing are left out; so are robots that cannot move. Units are mixed: metres and radians.
 
     Args:
+        k: Sample.
         q: Stacked configuration, shape (nq,), in [rad] or [m].
 
     Returns:
-        The robot with the smallest singular values; None where nothing moves or a joint position is no number.
+        The robot with the smallest singular value; None where nothing moves or a joint position is no number.
     """
     if not np.all(np.isfinite(q)):
         return None

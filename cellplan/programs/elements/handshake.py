@@ -23,7 +23,11 @@ class HandshakeStep(NamedTuple):
 
 
 def handshake_steps(frame: ExportFrame, robot: str) -> tuple[HandshakeStep, ...]:
-    """Instructions of a robot at a mark, at which all robots of the cell meet; none in a cell of one robot."""
+    """Instructions of a robot at a mark, at which all robots of the cell meet; none in a cell of one robot.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
+    """
     leader, *others = [robot.name for robot in frame.cell.robots]
     if not others:
         return ()
@@ -41,6 +45,9 @@ def lowering_step(frame: ExportFrame, robot: str) -> HandshakeStep:
     """The instruction before the first motion of a program with marks: the output of the robot is lowered.
 
     A program that was aborted at a mark may have left it raised, which would release others at the next start.
+
+    Raises:
+        InputError: A signal is not stated in the cell.
     """
     return next(step for step in reversed(handshake_steps(frame, robot)) if not step.waits)
 

@@ -100,7 +100,7 @@ def line_error(file: str, line: int, expected: str, got: str) -> InputError:
 
 
 def mismatch_error(file: str, line: int, expected: str, actual: str) -> InputError:
-    """The error that something else, in words, was found at a line of a file."""
+    """The error that something else was found at a line of a file; ``actual`` names it in words."""
     return InputError(f"{file}:{line}: expected {expected}, got {actual}")
 
 

@@ -110,7 +110,7 @@ class NothingFitsError(NotVerifiedError):
 
 
 def refuse_unfit_run(run: ReadRun, formats: Mapping[str, bool], choice: Choice, *, folder: Path) -> None:
-    """Refuse an export to a folder of which, as the files of the run say already, none of the formats can be.
+    """Refuse an export to a folder where, as the files of the run say already, none of the formats can be written.
 
     Raises:
         InputError: There is no such robot; or the only format needs something that is not stated, or does not fit.

@@ -37,7 +37,13 @@ ORIENTATION: Final = ErrorKind(
 
 
 def error_panels(times: Array, error: Array, *, allowed: float, kind: ErrorKind) -> list[PlotPanel]:
-    """The length of an error, shape (N, 3) in SI, with its tolerance, and the error by axis; the times in [s]."""
+    """The length of an error with its tolerance, and the error by axis.
+
+    Args:
+        times: Times of the samples in [s], shape (N,).
+        error: In SI units, shape (N, 3).
+        allowed: Its tolerance in SI units.
+    """
     total = np.linalg.norm(error, axis=1)
     unit, scale = kind.units[0]
     worst = int(total.argmax())

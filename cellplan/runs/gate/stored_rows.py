@@ -1,4 +1,4 @@
-"""The rows of a stored program: tables and clock, compared with the plan of the cell before anything is computed."""
+"""The rows of a stored program: tables and clock, checked against the cell's plan before verification."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -245,7 +245,7 @@ def _columns(
 
 
 def _gap_findings(gaps: Mapping[int, str], clock: ProgramClock, place: Callable[[int], str]) -> Iterator[str]:
-    """Gaps of a table that the plan has not, and gaps of the plan that the table has not."""
+    """Marked gaps that only the table or only the plan has, or whose names differ."""
     demanded = clock.gaps
     for row in sorted({*gaps, *demanded}):
         if gaps.get(row) != demanded.get(row):

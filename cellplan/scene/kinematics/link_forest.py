@@ -57,11 +57,16 @@ class LinkForest:
         return WORLD if robot is None else self._first[robot] + 1 + link
 
     def displacements(self, q: Array, X_WB: Array) -> Array:
-        """Displacements of links, shape (links, K, 4, 4), see ``ScrewChain``; all that comes is finite.
+        """Displacements of all links from their places at the reference configuration, shape (links, K, 4, 4).
+
+        See ``ScrewChain``.
 
         Args:
             q: Stacked joint positions in [rad] or [m], shape (K, nq).
             X_WB: Bases of the robots in the world, shape (robots, 4, 4), or of each configuration (robots, K, 4, 4).
+
+        Raises:
+            ValueError: A joint position or a base is not finite.
         """
         if not (np.all(np.isfinite(q)) and np.all(np.isfinite(X_WB))):
             raise ValueError("links: a joint position or a base is not finite")

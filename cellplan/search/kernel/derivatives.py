@@ -5,9 +5,9 @@ With :math:`J \dot q = \dot x_d` and :math:`W \dot q = J^T \lambda` a change of 
 .. math:: d\dot q = J^\# \left( -dJ \, \dot q - J k \right) + k, \qquad k = W^{-1} (dJ^T \lambda - dW \, \dot q)
 
 Both :math:`dJ \, \dot q` and :math:`dJ^T \lambda` are sums of Lie brackets of screws, so that no second derivative of
-any pose is needed. Tools stay on their paths: :math:`J \, dq = -(\beta + \tau)` for displacements of bases and tools.
-What remains is a linear differential equation along the motion, integrated by the multistep rule of ``run``; so these
-are derivatives of what ``run`` gives, not of its limit.
+any pose is needed. Tools stay on their paths: :math:`J \, dq = -(\beta + \tau)` for base (:math:`\beta`) and tool
+(:math:`\tau`) displacement twists. What remains is a linear differential equation along the motion, integrated by the
+multistep rule of ``run``; so these are derivatives of what ``run`` gives, not of its limit.
 """
 
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ def differentiate(job: Job, layout: Layouts, q: Array, qd: Array, directions: Di
     for node, (taking, adding) in enumerate(zip(rates.by_joints, rates.by_layout, strict=True)):
         np.matmul(taking, at, out=states[node])
         states[node] += adding
-        if node and begins[node - 1]:  # as in ``run``: once more with the mean of both rates
+        if node and begins[node - 1]:  # as in ``run``: trapezoidal (Heun) corrector
             at = states[node - 1, :nq] + 0.5 * (job.times[node] - job.times[node - 1]) * states[
                 node - 1 : node + 1, nq:
             ].sum(axis=0)
@@ -83,8 +83,8 @@ class _Rates:
     """The variational equations at all nodes.
 
     Attributes:
-        by_joints: Change of joints and speeds by a change of the joints that was predicted: what of it keeps the tools
-            where they are, and what that does to the speeds, shape (N, 2 nq, nq).
+        by_joints: Null-space projection of the predicted joint change, which keeps the tools where they are, and the
+            change of the speeds by it, shape (N, 2 nq, nq).
         by_layout: Their change in the directions otherwise, shape (N, 2 nq, p).
     """
 

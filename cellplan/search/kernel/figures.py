@@ -127,7 +127,10 @@ class MotionFigures:
 
 
 def refuse_not_finite(name: str, values: Array, joint_names: Callable[[int], tuple[str, str]]) -> None:
-    """Refuse figures of joints that are no numbers, or infinite, with the joint of the first; infinite margins pass."""
+    """Refuse figures of joints, shape (K, nq), that are no numbers, or infinite, with the joint of the first.
+
+    Figures are negative where margin is left, so an infinite margin is -inf and passes.
+    """
     bad = ~(values < np.inf)
     if bad.any():
         place, column = np.argwhere(bad)[0].tolist()

@@ -49,7 +49,13 @@ class SingularValues:
         return tuple(self.job.relations[place].robot for place in arms(self.job))
 
     def derivatives(self, nodes: Indices, subjects: Indices, by: Array) -> Array:
-        """Derivatives of some arms at some nodes, shape (M, n), from those of the joints, shape (N, nq, n)."""
+        """Derivatives of some singular values, shape (M, n), from those of the joints.
+
+        Args:
+            nodes: Their nodes, shape (M,).
+            subjects: Which arm each is of, shape (M,).
+            by: Derivatives of the joints, shape (N, nq, n).
+        """
         used, place = np.unique(nodes, return_inverse=True)
         by_joints, by_layout = self._partial(used.astype(np.intp))
         derivatives: Array = (by_joints[place, subjects][:, None] @ by[nodes])[:, 0]

@@ -33,11 +33,11 @@ ADDED: Final = 8  # [-] scenarios that a round adds at most
 WITHIN: Final = 0.003  # [m] beyond the demand: of pairs that are this near in a corner the room is known
 MORE_LENGTH: Final = 0.0003  # [m] asked for beyond what a corner missed
 MOST_LENGTH: Final = 0.006  # [m] asked for at once
-MORE_REACH: Final = 0.003  # [m] likewise of the singular values of arms: 0.01
-LONGER: Final = 1e-3  # [-] share by which a corner may last longer than the scenarios and be none
+MORE_REACH: Final = 0.003  # [m] more of singular values of arms, where a corner has no motion; counts as 0.01 of these
+LONGER: Final = 1e-3  # [-] share by which a corner may last longer than the scenarios and not become a scenario
 NEAR: Final = 0.02  # [-] share of the cycle within which a scenario is kept on more nodes
 NEAR_ANGLE: Final = float(np.radians(1.0))  # [rad] or [m] of a margin, likewise
-ANGLE: Final = 0.1  # [rad] or [m] of a margin that a corner misses that weigh as much as twice the cycle
+ANGLE: Final = 0.1  # [rad] or [m] of a missed margin that counts like doubling the cycle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,7 +51,7 @@ class Robust:
     nominal: float  # shortest cycle in [s] of the layout in place
     cycle: float  # shortest cycle in [s] in which the layout and all its corners keep their limits
     problem: GuardedProblem  # the job, with the displacements as its variables
-    displacements: BaseDisplacements  # these
+    displacements: BaseDisplacements  # base displacements of this layout
 
     @property
     def is_met(self) -> bool:
@@ -206,7 +206,7 @@ def _missed(corner: Corner, most: float) -> float:
 
 
 def _rank(robust: Robust, demands: Demands) -> tuple[bool, int, float]:
-    """What makes one better than another."""
+    """Sort key, best first."""
     is_late = demands.duration is not None and robust.cycle > demands.duration
     return is_late or not robust.is_met, len(robust.corners) - robust.passing, robust.cycle
 

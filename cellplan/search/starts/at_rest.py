@@ -47,7 +47,10 @@ class Pool:
 
 
 def settings(problem: StartProblem, rng: np.random.Generator, count: int) -> tuple[list[Setting], Counter[str]]:
-    """At most ``count`` places for the part at rest, best reached by operators first, and by what draws failed."""
+    """At most ``count`` places for the part at rest, and by what draws failed.
+
+    The places that operators reach best come first.
+    """
     cell, drops = problem.cell, Counter[str]()
     if cell.carrier is None:
         return _part_settings(problem, rng, count), drops

@@ -14,22 +14,25 @@ WEIGHT_DIGITS: Final = 6  # significant ones
 
 
 def written_number(variable: VaryRange, number: float) -> float:
-    """A length or an angle as the file has it: millimetres or degrees."""
+    """A length in [m] or an angle in [rad] in file units ([mm] or [deg]), rounded."""
     return written_quantity(number, is_angle=variable.is_angle)
 
 
 def written_weight(weight: float) -> float:
-    """A joint weight as the file has it."""
+    """A joint weight, rounded to the digits that are written."""
     return float(f"{weight:.{WEIGHT_DIGITS}g}")
 
 
 def written_quantity(value: float, *, is_angle: bool) -> float:
-    """A length in [m] or an angle in [rad] as the file has it."""
+    """A length in [m] or an angle in [rad] in file units ([mm] or [deg]), rounded."""
     return round(DEG * value, ANGLE_DIGITS) if is_angle else round(MM * value, LENGTH_DIGITS)
 
 
 def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[str, Any]:
-    """Start postures, shape (nq,), of all robots at work, by address; that of a holder that has one stays."""
+    """Start postures, shape (nq,), of all robots at work, by address.
+
+    A holder's given start is left as it is, unless it is varied.
+    """
     working = {task.robot for task in cell.tasks} | set(cell.positioners)
     given = {name for name in cell.positioners[:1] if cell.robot(name).start is not None}
     given -= {variable.name for variable in settings.ranges if variable.kind is VariableKind.START}
@@ -41,7 +44,7 @@ def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[s
 
 
 def written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
-    """The start posture of a robot under the key that its file uses, or that suits its joints."""
+    """The start posture of a robot: `start_deg` if all joints turn and no `start` is given, else `start`."""
     joints = robot.model.joints
     numbers = [_within_limits(value, joint) for value, joint in zip(start.tolist(), joints, strict=True)]
     entry: Any = cell.origin.document["robots"]
@@ -54,7 +57,7 @@ def written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
 
 
 def _within_limits(value: float, joint: Joint) -> float:
-    """A joint position as the file has it, rounded towards the inside where it is at a limit."""
+    """A joint position in file units, rounded; towards the inside where it is at a limit."""
     written, unit = written_quantity(value, is_angle=joint.is_revolute), DEG if joint.is_revolute else MM
     digits = ANGLE_DIGITS if joint.is_revolute else LENGTH_DIGITS
     if joint.lower <= value <= joint.upper and not joint.lower <= written / unit <= joint.upper:

@@ -93,7 +93,11 @@ def load_urdf(path: Path, options: UrdfOptions | None = None) -> UrdfRobot:
     The root link is the base frame B. Joints between base and flange are driven; mimic joints follow them; every other
     movable joint must be locked. A link without collision elements is represented by its visual ones.
 
-    An ``InputError`` has file and line of anything that cannot be taken over faithfully.
+    Args:
+        options: What the cell adds; None adds nothing.
+
+    Raises:
+        InputError: With file and line, for anything that cannot be taken over faithfully.
     """
     options = options or UrdfOptions()
     tree = build_tree(with_moveit_limits(read_document(path, options.xacro), options.moveit))

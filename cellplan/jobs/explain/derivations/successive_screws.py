@@ -1,4 +1,4 @@
-"""Cooperation Jacobian by successive screw displacements: one walk from the part over the world to each tool."""
+"""Cooperation Jacobian by successive screw displacements: a walk from the part through the world frame to each tool."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ from cellplan.model.task.task import Frame
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ScrewStep:
-    """One axis on the walk, at the reference configuration, expressed in the part frame P."""
+    """One axis on the walk, at the reference configuration, expressed in P, or in W for a task in the world."""
 
     s_P: Array  # unit direction, shape (3,): against the table's direction where the axis is passed from tip to base
     s0_P: Array  # A point on the axis in [m], shape (3,)
@@ -68,7 +68,8 @@ def screw_cooperation_jacobian(cell: Cell, q: Array) -> Array:
 
     Returns:
         Twists of the tools relative to the part, linear part first, expressed in P, shape (tasks + further holders, 6,
-        nq): the grasps of further holders follow the tasks (4.5). Of a task in the world, relative to and in W.
+        nq): the grasps of further holders follow the tasks (4.5). The twist of a task in the world is relative to W and
+        expressed in W.
 
     Raises:
         InputError: The configuration does not fit the cell, or a fixed part has no pose.
@@ -94,7 +95,8 @@ def displaced_screws(steps: list[ScrewStep]) -> tuple[Array, Array]:
     ([Ribeiro2010]_ Eqs. B.15, B.16), each moved by the displacements of the steps before it (B.73).
 
     Returns:
-        Screws, shape (6, steps), expressed in P about its origin; displacement, shape (4, 4).
+        Screws, shape (6, steps), expressed in P, or in W for a task in the world, about its origin; displacement, shape
+        (4, 4).
     """
     screws = np.zeros((6, len(steps)))
     D = np.eye(4)
@@ -107,7 +109,7 @@ def displaced_screws(steps: list[ScrewStep]) -> tuple[Array, Array]:
 
 
 def _steps(cell: Cell, robot: Robot, q: Array, *, X_PB: Array) -> list[ScrewStep]:
-    """Axes of one robot from base to flange, brought from B to P."""
+    """Axes of one robot from base to flange, brought from B to P, or to W for a task in the world."""
     columns = cell.columns(robot.name)
     chain = chain_to_flange(robot.model)
     return [

@@ -24,6 +24,12 @@ def nearest_to_origin(A: Array, *, lower: Array, upper: Array) -> Array:
         A: Rows, shape (k, n).
         lower: Lower bounds, shape (k,); may be -inf.
         upper: Upper bounds, shape (k,); may be +inf.
+
+    Returns:
+        The nearest point, shape (n,).
+
+    Raises:
+        NoSolutionError: The engine gave up, or its answer breaks the bounds.
     """
     n = A.shape[1]
     y, _, flag, _ = daqp.solve(

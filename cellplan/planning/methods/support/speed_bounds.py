@@ -41,7 +41,7 @@ class JointBounds:
         self._acceleration = np.where(np.isinf(limits.acceleration), by_ramp, limits.acceleration)
 
     def refuse_outside(self, q: Array) -> None:
-        """Refuse a configuration outside of the position limits, from which no bounded speed is right."""
+        """Refuse a configuration, shape (nq,), outside of the position limits, from which no bounded speed is right."""
         for index, (name, position) in enumerate(zip(self._names, q, strict=True)):
             lower, upper = self._lower[index], self._upper[index]
             if not lower <= position <= upper:

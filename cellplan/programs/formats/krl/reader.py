@@ -23,7 +23,7 @@ def read_krl(
 ) -> tuple[ProgramRows, ...]:
     """Read the files of an export back, strictly: positions and marks; these programs state neither times nor process.
 
-    A main module has its path without ending by program and robot. An ``InputError`` has file and line.
+    ``paths``: path of each main module without its ending, by program and robot. An ``InputError`` has file and line.
     """
     return read_programs(frame, files, paths, _rows, ending=".src")
 

@@ -67,8 +67,9 @@ def rows_of(unit: RapidUnit, moves: Sequence[RapidMove], marks: tuple[int, ...])
 def _rounding(unit: RapidUnit, moves: Sequence[RapidMove], q: Array, p: Array) -> Array:
     """Share of the shorter neighbouring segment within which each row is rounded, shape (N,).
 
-    Rows ``q`` are NaN at targets on the part, shape (N, n); the tool ``p`` on the part in [m] at all others, shape (N,
-    3).
+    Args:
+        q: Positions in [rad] or [m], shape (N, n); those of the arm are NaN at targets on the part.
+        p: Position of the tool on the part in [m], shape (N, 3); NaN at all other targets.
     """
     tool, turns, slides = (np.array([move.zone[place] for move in moves]) for place in range(3))
     if not unit.has_tool:

@@ -38,7 +38,7 @@ Node = Statement | Loop
 
 
 def read_code(code: Val3Element, counters: Collection[str]) -> tuple[list[Node], Statement]:
-    """Statements of a program between ``begin`` and ``end``, whose loops use these counters, and its ``end``."""
+    """Statements of a program between ``begin`` and ``end``, whose loops use ``counters``, and its ``end``."""
     texts = (line.partition("//")[0].strip() for line in code.text.split("\n"))
     lines = [Statement(code.file, line, text) for line, text in enumerate(texts, start=code.text_line) if text]
     first, last = (lines[0], lines[-1]) if lines else [Statement(code.file, code.line, "")] * 2

@@ -94,7 +94,10 @@ class PairMotion:
         return min(along_a, along_b, float(self._bends.reach[step])) + ROUNDING_TOL
 
     def displacement(self, sample: int, others: slice | Indices) -> tuple[Array, Array]:
-        """Farthest that a point of either body moved, seen from the other, in [m]: the second's, the first's."""
+        """Farthest that a point of either body moved, seen from the other, between a sample and m others.
+
+        Of the second body, then of the first, in [m], shape (m,) each.
+        """
         turn = _turns(self._R_AB[others] - self._R_AB[sample])
         return self._b_in_A.displacement(sample, others, turn), self._a_in_B.displacement(sample, others, turn)
 

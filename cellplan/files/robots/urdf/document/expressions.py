@@ -25,7 +25,11 @@ LONGEST: Final = 10_000  # characters of an expression
 
 
 def evaluated(text: str, symbols: dict[str, Any], local: Mapping[str, Any] | None = None) -> Any:
-    """Value of an expression from symbols, to which access to attributes is added, and local ones, which come first.
+    """Value of an expression.
+
+    Args:
+        symbols: Values by name; the access to attributes is added.
+        local: Values by name that come first; None for none.
 
     Raises:
         InputError: The expression does what none in a robot file has to do.

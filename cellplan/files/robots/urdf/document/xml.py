@@ -82,12 +82,20 @@ class Element:
 
 
 def read_xml(path: Path) -> Element:
-    """Read the root element of an XML file without document type, entities or anything else that reaches out."""
+    """Read the root element of an XML file without document type, entities or anything else that reaches out.
+
+    Raises:
+        InputError: The file cannot be read, is too large, is not well-formed or declares a document type.
+    """
     return parse_xml(read_regular_file(path, file=path.name, limit=MAX_BYTES), path.name)
 
 
 def parse_xml(data: bytes, file: str) -> Element:
-    """The same of the bytes of a file."""
+    """The same of the bytes of a file.
+
+    Raises:
+        InputError: They are not well-formed or declare a document type.
+    """
     return _Builder(file).parse(data)
 
 
