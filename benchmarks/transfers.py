@@ -227,7 +227,7 @@ class Outcome:
     Attributes:
         model: Name of the arm.
         seconds: Processor time in [s].
-        found: The transfer; None where it was refused.
+        move: The transfer; None where it was refused.
         reason: Why it was refused.
         contact: Two bodies that touch by brute force.
     """

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from cellplan.geometry.arrays import first_peak
 from cellplan.geometry.transforms import Array
 from cellplan.measures.tool_errors import relative_to_task_frame
 from cellplan.model.cell.acceleration import STEADY_FRACTION, ProcessSpeed
@@ -25,13 +26,14 @@ def robot_speed(robot: Robot, chain: ScrewChain, times: Array, q: Array) -> Robo
     tool = _speeds(chain.tool_poses(q)[:, :3, 3], times)
     axes = _speeds(chain.axis_points(q), times)
     fastest = int(np.argmax(tool))
-    instant, joint = np.unravel_index(int(np.argmax(axes)), axes.shape)
+    joint = first_peak(axes.max(axis=0))  # axes that meet in a wrist have one speed
+    instant = first_peak(axes[:, joint])
     return RobotSpeed(
         tool_peak=float(tool[fastest]),
         tool_peak_at_s=float(times[fastest + 1]),
         share_above_reduced=float(np.mean(tool > REDUCED_SPEED)),
-        axis_peak=float(axes[instant, joint]),
-        axis=robot.model.joint_names[int(joint)],
+        axis_peak=float(axes.max()),
+        axis=robot.model.joint_names[joint],
         axis_peak_at_s=float(times[instant + 1]),
     )
 

@@ -16,7 +16,7 @@ def test_transfers_of_real_arms_are_found_and_touch_nothing() -> None:
     outcomes = [outcome(case) for case in cases]
 
     assert [outcome.contact for outcome in outcomes if outcome.contact is not None] == []
-    assert sum(outcome.found is not None for outcome in outcomes) >= FEWEST
+    assert sum(outcome.move is not None for outcome in outcomes) >= FEWEST
 
 
 @pytest.mark.slow
@@ -26,5 +26,5 @@ def test_arms_that_are_walled_in_are_refused_with_what_is_in_the_way() -> None:
 
     outcomes = [outcome(case) for case in cases]
 
-    assert [outcome.model for outcome in outcomes if outcome.found is not None] == []
+    assert [outcome.model for outcome in outcomes if outcome.move is not None] == []
     assert all("'block'" in outcome.reason for outcome in outcomes)
