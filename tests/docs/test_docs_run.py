@@ -118,7 +118,8 @@ RUNNABLE = [pytest.param(page, marks=pytest.mark.slow if page.name in LONG else 
 
 @pytest.mark.parametrize("page", RUNNABLE, ids=page_name)
 def test_every_block_of_a_page_runs(page: Path, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "cells", tmp_path / "cells")
+    for folder in ("cells", "examples"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
     output = ""
     for block in blocks(page):
         if block.mark.startswith("file: "):
