@@ -10,6 +10,7 @@ from typing import Any, Final
 MARK: Final = '"schema": "cellplan.'  # stands in the first lines of every report.json and rehearsal.json
 MARK_WITHIN: Final = 200  # [bytes]
 LIST_LIMIT: Final = 5_000_000  # [bytes] of a file that lists others
+ASSIGNMENT: Final = "assign.json"  # who does which task, in the folder of the cell that says so
 RECOVERY: Final = "recovery.json"  # what a recovery does, in the folder that holds its tables
 REPORTS: Final = (
     "report.json",
@@ -18,6 +19,7 @@ REPORTS: Final = (
     "fastest.json",
     "map.json",
     "advice.json",
+    ASSIGNMENT,
     RECOVERY,
 )
 REHEARSAL: Final = "rehearsal"  # folder of a rehearsal, inside the run folder of its cell
@@ -88,9 +90,9 @@ def _holds_listed(name: str, listed: frozenset[str] | None) -> bool:
 
 
 def _listed(run: Path) -> frozenset[str] | None:
-    """The files that a run or an export lists, the lists themselves among them; None when it lists none."""
+    """The files that a run or another result lists, the lists themselves among them; None when it lists none."""
     names: set[str] = set()
-    for name in (MANIFEST, EXPORT, RECOVERY):
+    for name in (MANIFEST, EXPORT, RECOVERY, ASSIGNMENT):
         files = _files_of(run / name)
         if files is not None:
             names |= {name, *files}

@@ -166,7 +166,7 @@ class _Search:
         """
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
-        goals = [self._with_direction(goal) for goal in task_goals(cell, draft.robots)]
+        goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
         table = ModeSearch(
             cell=cell,
             goals=goals,
@@ -235,10 +235,21 @@ class _Search:
             schedule = solve_blocks(others, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
         return Sequencer(others).ordered(schedule).steps * others.step
 
-    def _with_direction(self, goal: TaskGoal) -> TaskGoal:
-        """The goal, reversible only where its path is written as points and its direction is free."""
-        is_free = "direction" in self.draft.settings.free and written_points(self.draft.cell, goal.name) is not None
-        return replace(goal, is_reversible=goal.is_reversible and is_free)
+    def _as_given(self, goal: TaskGoal) -> TaskGoal:
+        """The goal with what its task states, and with what is not free: direction, spin, station and start."""
+        cell, free = self.draft.cell, self.draft.settings.free
+        task, holder = cell.task(goal.name), cell.positioners[:1]
+        station = task.holder_posture
+        if station is None and holder and "station" not in free:
+            station = self.draft.holder_start
+        is_free = "direction" in free and task.start_posture is None and written_points(cell, goal.name) is not None
+        return replace(
+            goal,
+            is_reversible=goal.is_reversible and is_free,
+            holder_q=station,
+            start_q=task.start_posture,
+            is_spin_free=f"tasks.{goal.name}.spin_deg" not in cell.origin.lines,
+        )
 
 
 def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:
@@ -291,8 +302,9 @@ def _task_values(
     spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
     if end.mode.spin:
         values[f"{place}.spin_deg"] = spin
-    values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)
-    if holder is not None:
+    if task.start_posture is None:
+        values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)
+    if holder is not None and task.holder_posture is None:
         values |= _configuration(f"{place}.holder", cell.robot(holder[0]).model, holder[1])
     if after := tuple(dict.fromkeys((*task.after, *before))):
         values[f"{place}.after"] = after
@@ -320,7 +332,7 @@ def _configuration(address: str, model: RobotModel, q: Array) -> dict[str, objec
 def _solved(cell: Cell, progress: Progress) -> Solution | str:
     """The program, solved and verified; why there is none."""
     try:
-        return solve(cell, is_reported=False, progress=progress)
+        return solve(cell, progress=progress)
     except NoSolutionError as error:
         return str(error)
 

@@ -41,6 +41,11 @@ class AssignmentDraft:
         """
         cell, robots = load_open_cell(file, allow_dirs=allow_dirs)
         refuse_unless_assignable(cell)
+        for task in cell.tasks:
+            if task.name in robots and task.start_posture is not None:
+                raise InputError(
+                    f"{task.where('start_deg')}: unexpected key of an open task, whose robot is not known yet"
+                )
         return cls(cell=cell, robots=robots, file=Path(file))
 
     @property
@@ -67,17 +72,21 @@ class AssignmentDraft:
         """
         if not self.cell.positioners:
             return Stations.of(self.cell, np.zeros((1, 0)))
-        holder = self.cell.robot(self.cell.positioners[0])
-        given = self.settings.stations if "station" in self.settings.free else None
-        if given is None:
-            configurations = [task.holder_posture for task in self.cell.tasks if task.holder_posture is not None]
-            return Stations.of(
-                self.cell, np.unique([*configurations, *([] if configurations else [_start(holder)])], axis=0)
-            )
-        where = self.cell.origin.at("assign.stations")
-        return Stations.of(
-            self.cell, _grid(holder, given, where) if isinstance(given, Mapping) else _listed(holder, given, where)
-        )
+        holder, written = self.cell.robot(self.cell.positioners[0]), self.settings.stations
+        where, is_free = self.cell.origin.at("assign.stations"), "station" in self.settings.free
+        if written is None or not is_free:
+            compared = self.holder_start[None]
+        elif isinstance(written, Mapping):
+            compared = _grid(holder, written, where)
+        else:
+            compared = _listed(holder, written, where)
+        given = [task.holder_posture for task in self.cell.tasks if task.holder_posture is not None]
+        return Stations.of(self.cell, np.unique([*compared, *given], axis=0))
+
+    @property
+    def holder_start(self) -> Array:
+        """Start of the holder in [rad] or [m], shape (n,), or its home."""
+        return _start(self.cell.robot(self.cell.positioners[0]))
 
     def spins(self) -> Array:
         """Turns of the tools about their axes that are compared, beside those of the tasks, in [rad], shape (S,)."""

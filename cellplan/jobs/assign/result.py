@@ -1,13 +1,16 @@
 """An assignment as record, text and page: what is shown, and in which order."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+from cellplan.files.cell.load import CellFile, load_cell
 from cellplan.files.run.folder import RunFolder
 from cellplan.jobs.assign.assign import Assignment
-from cellplan.jobs.layout.result_file import file_records, result_files
+from cellplan.jobs.layout.result_file import BEST, result_files
+from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.report import CAUTION
 from cellplan.report.page.figures import figure
@@ -16,7 +19,8 @@ from cellplan.report.page.render import template
 from cellplan.report.plots.palette import ROBOTS
 from cellplan.report.record.common import Record, as_json, number
 from cellplan.report.record.rows import Tables, columns_of, flat
-from cellplan.runs.solution import Run
+from cellplan.runs.solution import Run, Solution
+from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
 
 SCHEMA: Final = "cellplan.assignment/1"
@@ -242,17 +246,38 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
     Raises:
         InputError: The folder cannot be written, or holds something that cellplan did not write.
     """
-    record = assign_record(assignment)
+    record, source = assign_record(assignment), assignment.cell.origin.source
+    allowed = (given.parent, *(source.allow_dirs if isinstance(source, CellFile) else ()))
     head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s from home to home."
     with RunFolder(folder) as target:
         files = result_files(assignment.cell, given, folder, head=head)
         for name, content in files.items():
             target.write_bytes(name, content)
-        record["files"] = file_records(files)
-        target.write_text("assign.json", as_json(record))
         target.write_text("assign.html", assign_page(record))
-        write_run(assignment.solution, target.within("run"), progress=progress)
+        record["files"] = {name: sha256 for name, (_, sha256) in target.written.items()}
+        target.write_text("assign.json", as_json(record))
+        best = load_cell(target.within(BEST), allow_dirs=allowed)
+        write_run(read_from(assignment.solution, best, folder / BEST), target.within("run"), progress=progress)
     return record
+
+
+def read_from(solution: Solution, cell: Cell, file: Path) -> Solution:
+    """A solution as that of a cell file which says the same in place of the one that it was changed from.
+
+    Args:
+        cell: The cell of the file.
+        file: Where the file will stand.
+    """
+    origin = replace(cell.origin, file=str(file))
+
+    def renamed(whole: Cell) -> Cell:
+        return replace(whole, origin=origin, inputs=cell.inputs)
+
+    solved, runs = renamed(solution.cell), solution.runs
+    program = with_verdict(solved, solution.program, [run.phase for run in runs], [run.report for run in runs])
+    scenes = [replace(run.scene, cell=renamed(run.cell)) for run in runs]
+    named = (replace(run, scene=scene, program=program) for run, scene in zip(runs, scenes, strict=True))
+    return replace(solution, cell=solved, runs=tuple(named))
 
 
 ASSIGNMENT: Final = ResultKind(

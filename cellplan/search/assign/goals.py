@@ -17,7 +17,7 @@ from cellplan.planning.timing.schedule import clock_paths
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 SAMPLES: Final = 7  # [-] poses along a path; twice as many, less one, along a closed one
-ROUNDING: Final = 1e-9  # [rad]
+ROUNDING: Final = 1e-9  # [rad, m]
 STRAIGHT: Final = 1e-6  # [-] cosine of the angle between tool axis and path: below it the tool neither pushes nor drags
 
 
@@ -33,6 +33,9 @@ class TaskGoal:
     after: tuple[str, ...] = ()  # tasks that must be done before it begins
     torch: TorchEntry | None = None  # how its tool is held to gravity
     weld_position: WeldPositionEntry | None = None  # how its weld lies to gravity
+    holder_q: Array | None = None  # given configuration of the holder in [rad] or [m], shape (n,); None for any station
+    start_q: Array | None = None  # given start of its robot likewise; None for any
+    is_spin_free: bool = True  # whether the tool may be turned about its axis beside what is written
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,11 +47,16 @@ class Stations:
     X_WP: Array  # the part, shape (K, 4, 4)
 
     def allowed(self, goal: TaskGoal) -> dict[bool, Flags]:
-        """Stations at which a task may be done as it is written, and backwards, to gravity, shape (K,) each."""
+        """Stations at which a task may be done as it is written, and backwards, as given and to gravity, shape (K,)."""
+        is_given = np.ones(len(self.q), dtype=bool)
+        if goal.holder_q is not None:
+            is_given = np.all(np.abs(self.q - goal.holder_q) <= ROUNDING, axis=1)
         X_WT = self.X_WP[:, None] @ goal.X_PT[None, 1:-1]
         rows, samples = X_WT.shape[:2]
         torch = torch_angles(X_WT.reshape(-1, 4, 4)).reshape(rows, samples)
-        is_upright = torch.max(axis=1) <= (np.pi if goal.torch is None else goal.torch.within_deg.si) + ROUNDING
+        is_upright = is_given & (
+            torch.max(axis=1) <= (np.pi if goal.torch is None else goal.torch.within_deg.si) + ROUNDING
+        )
         if goal.weld_position is None:
             return {False: is_upright, True: is_upright}
         steps = np.gradient(X_WT[..., :3, 3], axis=1)

@@ -27,6 +27,7 @@ FOLLOWING: Final = 4  # Newton moves from one pose of a mode to the next
 SEARCHING: Final = 30  # likewise from a seed
 SEEDS: Final = 24  # configurations that branches are searched from where there is no closed form
 ARRIVED: Final = 1e-6  # [m, rad] errors of a mode's poses
+NEAR_START: Final = 0.02  # [rad, m] a mode that begins so near to a given start is the one that is meant
 ALIKE: Final = 0.15  # [rad] modes that begin nearer to each other count as one
 MOST_MODES: Final = 6  # of one robot for one task at one station
 AT_ONCE: Final = 20_000  # goals: 60 MB
@@ -88,8 +89,9 @@ class ModeSearch:
         for goal in goals:
             allowed = self.stations.allowed(goal)
             places = np.flatnonzero(allowed[False] | (allowed[True] & goal.is_reversible))
-            table.note("torch and weld position", [goal.name] * (len(places) * len(self.spins)))
-            for places_now in np.array_split(places, max(1, -(-len(places) * len(self.spins) // AT_ONCE))):
+            spins = self.spins if goal.is_spin_free else np.zeros(1)
+            table.note("torch and weld position", [goal.name] * (len(places) * len(spins)))
+            for places_now in np.array_split(places, max(1, -(-len(places) * len(spins) // AT_ONCE))):
                 self._follow(table, follower, goal, places_now, allowed)
         for key, modes in table.modes.items():
             if key[1] == robot.name:
@@ -104,22 +106,27 @@ class ModeSearch:
         allowed: Mapping[bool, Flags],
     ) -> None:
         """Add what can be followed of one task at some stations; in which directions it may be done there is given."""
-        turns = np.tile(np.eye(4), (len(self.spins), 1, 1))
-        turns[:, :3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), self.spins)
+        spins = self.spins if goal.is_spin_free else np.zeros(1)
+        turns = np.tile(np.eye(4), (len(spins), 1, 1))
+        turns[:, :3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), spins)
         X = self.stations.X_WP[places, None, None] @ goal.X_PT[None, None] @ turns[None, :, None]
         result = follower.follow(X.reshape(-1, *X.shape[2:]))
         for name, rows in (("reach", result.reaches), ("joint limits", result.begins)):
             table.note(name, [goal.name] * int(rows.sum()))
-        table.note("path", [goal.name] * len(result.q))
-        for row, q, margin in zip(result.rows.tolist(), result.q, result.margins.tolist(), strict=True):
-            place, spin = int(places[row // len(self.spins)]), float(self.spins[row % len(self.spins)])
+        is_given = np.ones(len(result.q), dtype=bool)
+        if goal.start_q is not None:
+            is_given = np.abs(result.q[:, 0] - goal.start_q).max(axis=1) < NEAR_START
+        table.note("path", [goal.name] * int(is_given.sum()))
+        for index in np.flatnonzero(is_given).tolist():
+            row = int(result.rows[index])
+            place, spin = int(places[row // len(spins)]), float(spins[row % len(spins)])
             mode = TaskMode(
                 task=goal.name,
                 robot=follower.robot.name,
                 station=place,
                 spin=spin,
-                q=q,
-                margin=float(margin),
+                q=result.q[index],
+                margin=float(result.margins[index]),
                 directions=tuple(it for it in (False, True) if allowed[it][place] and (goal.is_reversible or not it)),
             )
             table.modes.setdefault((goal.name, follower.robot.name, place), []).append(mode)

@@ -2,15 +2,17 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from builders.commands import run_command
 
-from cellplan.errors import NoSolutionError
-from cellplan.files.cell.load import load_cell
+from cellplan.errors import InputError, NoSolutionError
+from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.jobs.assign.assign import Assignment, assign
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.result import assign_record, write_assignment
 from cellplan.runs.solve import solve
+from cellplan.runs.write_run import write_run
 from cellplan.search.assign.schedule import refuse_impossible
 
 OPEN = Path(__file__).resolve().parents[3] / "examples" / "open_tasks" / "open_frame.yaml"
@@ -30,18 +32,48 @@ def test_the_program_passes_within_its_bound(assignment: Assignment) -> None:
     assert assignment.cycle < assignment.greedy
 
 
-def test_the_written_cell_keeps_its_words_and_gives_the_program_again(assignment: Assignment, tmp_path: Path) -> None:
+def test_the_run_is_the_one_that_solving_the_written_cell_gives(assignment: Assignment, tmp_path: Path) -> None:
     record = write_assignment(assignment, OPEN, tmp_path / "out")
 
-    text = (tmp_path / "out" / "best.yaml").read_text()
-    again = solve(load_cell(tmp_path / "out" / "best.yaml"))
+    best = tmp_path / "out" / "best.yaml"
+    text, cell = best.read_text(), load_cell(best)
+    write_run(solve(cell), tmp_path / "again")
+    files = sorted(path.relative_to(tmp_path / "again") for path in (tmp_path / "again").rglob("*") if path.is_file())
+    assert [
+        it for it in files if (tmp_path / "again" / it).read_bytes() != (best.parent / "run" / it).read_bytes()
+    ] == []
+    assert len(files) > 10
     assert "# Eight seams on a plate" in text
-    assert "robot: any  #" not in text.replace("# was robot: any", "")
-    assert again.passed
-    assert sum(run.report.cycle_time for run in again.runs) == pytest.approx(record["cycle_time_s"])
-    assert {name for block in record["blocks"] for name in block["tasks"]} <= {"west", "east"}
+    assert text.count("# was robot: any") == len(cell.tasks)
     tasks = [it["task"] for block in record["blocks"] for it in block["tasks"].values()]
     assert sorted(tasks) == sorted(task.name for task in assignment.draft.tasks)
+    write_assignment(assignment, OPEN, tmp_path / "out")  # replaces the earlier one
+    (best.parent / "mine.txt").touch()
+    with pytest.raises(InputError, match=r"holds 'mine\.txt', which cellplan did not write"):
+        write_assignment(assignment, OPEN, tmp_path / "out")
+
+
+def test_what_a_task_states_is_kept(assignment: Assignment, tmp_path: Path) -> None:
+    """One seam at its given pose of the part and spin, one of a given robot in its given start."""
+    top, edge = (assignment.cell.task(name) for name in ("top_2", "edge_1"))
+    assert top.holder_posture is not None
+    assert edge.start_posture is not None
+    holder, start = (np.degrees(q).round(3).tolist() for q in (top.holder_posture, edge.start_posture))
+    text = OPEN.read_text()
+    text = text.replace("  top_2:\n", f"  top_2:\n    holder_deg: {holder}\n    spin_deg: {np.degrees(top.spin):.3f}\n")
+    text = text.replace("  edge_1:\n    robot: any\n", f"  edge_1:\n    robot: {edge.robot}\n    start_deg: {start}\n")
+    (tmp_path / "cell.yaml").write_text(text)
+
+    result = assign(AssignmentDraft.load(tmp_path / "cell.yaml"), effort=1)
+
+    written, given = result.cell.origin.source, load_open_cell(tmp_path / "cell.yaml")[0].origin.source
+    assert written is not None
+    assert given is not None
+    for name, keys in (("top_2", ("holder_deg", "spin_deg")), ("edge_1", ("robot", "start_deg"))):
+        assert [written.written["tasks"][name][key] for key in keys] == [
+            given.written["tasks"][name][key] for key in keys
+        ]
+    assert result.passed
 
 
 def test_a_robot_less_is_never_faster(assignment: Assignment) -> None:
