@@ -1,7 +1,7 @@
 """Assignments of generated cells: ``python benchmarks/assign.py --cells 8:2:1 12:3:3 20:3:0``.
 
 Each cell, SEAMS:ARMS:SEED, is a plate on a table that tilts and turns, with seams on its top, along its edges and on
-its sides, and arms round it. Printed are the cycles of the nearest tasks first, of the model and of the certified
+its sides, and arms round it. Printed are the cycles of the greedy schedule, of the model and of the certified
 program, the lower bound, and processor seconds. Exit status 1 where a program fails a check.
 """
 

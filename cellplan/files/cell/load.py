@@ -1,6 +1,6 @@
 """Loading of a cell file and of the files that it names; all findings at once."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -128,17 +128,20 @@ def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tupl
     """
     path = Path(path)
     document = read_yaml(path, file=str(path))
-    raise_findings(str(path), list(unknown_robot_findings(document)))
     allowed, first = tuple(Path(folder) for folder in allow_dirs), with_first_robots(document)
     source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed)
-    return _read(source), open_tasks(document.root)
+    return _read(source, unknown_robot_findings(document)), open_tasks(document.root)
 
 
-def _read(source: CellFile) -> Cell:
-    """The cell of a document, after all rules were applied to it and to the files that it names."""
+def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
+    """The cell of a document, after all rules were applied to it and to the files that it names.
+
+    Args:
+        known: Findings that are known already.
+    """
     document, file = with_first_robots(source.document), source.document.file
     valid, findings = read_valid_entries(document)
-    findings += [*document.findings, *open_task_findings(source.document)]
+    findings += [*document.findings, *open_task_findings(source.document), *known]
     if valid.is_too_large:
         raise_findings(file, findings)
     findings += program_findings(valid, document)

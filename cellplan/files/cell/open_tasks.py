@@ -37,13 +37,14 @@ def open_tasks(root: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 
 def with_first_robots(document: YamlDocument) -> YamlDocument:
-    """The document with the first robot of each open task, so that everything else in it can be read."""
-    opened = {name: robots for name, robots in open_tasks(document.root).items() if robots}
+    """The document with a robot for each open task, the first of its own, so that all else in it can be read."""
+    opened = open_tasks(document.root)
     if not opened:
         return document
+    names = list(document.root["robots"])
+    first = {name: next((it for it in robots if it in names), names[-1]) for name, robots in opened.items()}
     tasks = {
-        name: {**task, "robot": opened[name][0]} if name in opened else task
-        for name, task in document.root["tasks"].items()
+        name: {**task, "robot": first[name]} if name in first else task for name, task in document.root["tasks"].items()
     }
     return replace(document, root={**document.root, "tasks": tasks})
 

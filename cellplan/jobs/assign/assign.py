@@ -52,7 +52,7 @@ class Assignment(Presented):
         bound: No program in blocks at these stations, with these modes, is shorter, in [s]; None where that is not
             known, as OR-Tools is not installed.
         is_proved: Whether no schedule of the block model is better than the one that was first sequenced.
-        greedy: Cycle in [s] of the nearest tasks first, by the model.
+        greedy: Cycle in [s] of the greedy schedule, scarce tasks first, by the model.
         without: Cycle in [s] by the model without each robot; None where it has to work.
         rounds: Number of programs that were solved.
         counts: Numbers of goals, modes, certificates and refusals.

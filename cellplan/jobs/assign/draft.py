@@ -46,7 +46,9 @@ class AssignmentDraft:
                 raise InputError(
                     f"{task.where('start_deg')}: unexpected key of an open task, whose robot is not known yet"
                 )
-        return cls(cell=cell, robots=robots, file=Path(file))
+        draft = cls(cell=cell, robots=robots, file=Path(file))
+        draft.stations()  # which are refused before anything is searched
+        return draft
 
     @property
     def settings(self) -> AssignEntry:

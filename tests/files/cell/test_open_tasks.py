@@ -61,7 +61,10 @@ def test_a_cell_with_open_tasks_is_read_for_an_assignment_alone() -> None:
 
 def test_a_list_with_an_unknown_robot_is_refused(tmp_path: Path) -> None:
     text = OPEN.read_text().replace("robot: any", "robot: [north, east]", 1)
-    (tmp_path / "cell.yaml").write_text(text)
+    (tmp_path / "cell.yaml").write_text(text.replace("step_s: 0.02", "step_s: -1"))
 
+    with pytest.raises(InputError, match=r"motion\.step_s: expected a positive number") as refused:
+        load_open_cell(tmp_path / "cell.yaml")
+    assert len(str(refused.value).splitlines()) == 2  # all findings at once
     with pytest.raises(InputError, match=r"tasks\.top_1\.robot\[0\]: expected one of table, west, east, got 'north'"):
         load_open_cell(tmp_path / "cell.yaml")

@@ -75,6 +75,6 @@ def test_what_is_not_free_is_not_compared(tmp_path: Path) -> None:
 )
 def test_stations_that_the_holder_cannot_take(tmp_path: Path, stations: str, words: str) -> None:
     with pytest.raises(InputError) as refused:
-        draft(tmp_path, (STATIONS, stations)).stations()
+        draft(tmp_path, (STATIONS, stations))
 
     assert words in str(refused.value)
