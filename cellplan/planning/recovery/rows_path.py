@@ -66,7 +66,8 @@ def rows_along(path: RowsPath, retimer: Retimer, *, widths: tuple[float, float, 
 def retract_rows(path: RowsPath, retimer: Retimer) -> Array:
     """Rows along a short path whose parameter is a length, shape (K, nq)."""
     farthest = np.abs(np.gradient(path.q, path.sigma, axis=0)).max(axis=0) * (path.sigma[-1] - path.sigma[0])
-    return rows_along(path, retimer, widths=box_widths(farthest, retimer.bounds, least=retimer.step))
+    first, second, third = box_widths(farthest, retimer.bounds, least=retimer.step).tolist()
+    return rows_along(path, retimer, widths=(first, second, third))
 
 
 def timed_rows(path: RowsPath, retimer: Retimer) -> Array:

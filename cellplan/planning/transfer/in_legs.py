@@ -23,7 +23,7 @@ from cellplan.model.robot.robot import BASE
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.straight_time import box_widths, straight_line
+from cellplan.planning.transfer.straight_time import straight_line, straight_steps
 from cellplan.scene.scene import Scene
 
 LEGS: Final = 3
@@ -56,9 +56,9 @@ class RobotRoutes:
             limits: Limits of the joints, shape (n,) each.
             step: Time between two rows in [s].
         """
-        between = np.array([[leg_steps(b - a, limits, step) for b in stops] for a in stops], dtype=np.intp)
-        places = np.array(routes, dtype=np.intp)
-        return cls(stops=np.array(stops), routes=places, steps=between[places[:, :-1], places[:, 1:]])
+        at, places = np.array(stops), np.array(routes, dtype=np.intp)
+        between = straight_steps(at - at[:, None], limits, step)
+        return cls(stops=at, routes=places, steps=between[places[:, :-1], places[:, 1:]])
 
     def going(self, leg: int, ends: Ends) -> Flags:
         """Which routes have given ends of a leg, shape (K,)."""
@@ -118,17 +118,6 @@ def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[s
     ]
     named = [names for one in carriers if (names := {name for name in one if name in movers})]
     return min(named, key=lambda names: (len(names), sorted(names)), default=set(movers))
-
-
-def leg_steps(move: Array, bounds: JointLimitsInTime, step: float) -> int:
-    """Whole steps of the fastest straight move from rest to rest of one robot; zero where it stands.
-
-    Args:
-        move: Changes of its joints in [rad] or [m], shape (n,).
-        bounds: Limits of its joints, shape (n,) each.
-        step: Time between two rows in [s].
-    """
-    return int(np.ceil(sum(box_widths(move, bounds, least=step)) / step)) if np.any(move) else 0
 
 
 def _routes_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotRoutes:

@@ -8,11 +8,12 @@ convolution of three boxes of widths :math:`T_1 \ge T_2 + T_3`, :math:`T_2 \ge T
 and it takes :math:`T_1 + T_2 + T_3`; the least of these sums is the jerk-limited optimum from rest to rest.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
-from cellplan.geometry.transforms import Array
+from cellplan.geometry.arrays import Array, Indices
 from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 
 NEAR: Final = 1.02  # [-] factor of time up to which the law is slowed as a whole; above, its top speed is lowered
@@ -41,7 +42,7 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
         goal: Likewise, not the same.
     """
-    widths = box_widths(goal - start, retimer.bounds, least=retimer.step)
+    widths: list[float] = box_widths(goal - start, retimer.bounds, least=retimer.step).tolist()
     count = int(np.ceil(sum(widths) / retimer.step))
     q = np.array([start, goal])
     for _ in range(TRIES):
@@ -52,32 +53,50 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
         if factor <= 1.0:
             break
         if factor > NEAR:
-            widths = (widths[0] * factor, *widths[1:])
+            widths = [widths[0] * factor, *widths[1:]]
             factor = sum(widths) / (count * retimer.step)
         count = max(count + 1, int(np.ceil(count * factor)))
     return q
 
 
-def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float) -> tuple[float, float, float]:
-    """Widths of the three boxes in [s], none below ``least``, the widest first."""
+def straight_steps(move: Array, bounds: JointLimitsInTime, step: float) -> Indices:
+    """Whole steps of the fastest straight moves from rest to rest, shape (...); zero where nothing moves.
+
+    Args:
+        move: Changes of the joints in [rad] or [m], shape (..., n).
+        bounds: Limits of the joints, shape (n,) each.
+        step: Time between two rows in [s].
+    """
+    first, second, third = np.moveaxis(box_widths(move, bounds, least=step), -1, 0)
+    return np.where(np.any(move, axis=-1), np.ceil((first + second + third) / step), 0.0).astype(np.intp)
+
+
+def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float) -> Array:
+    """Widths of the three boxes in [s], none below ``least``, the widest first, shape (..., 3).
+
+    Args:
+        move: Changes of the joints in [rad] or [m], shape (..., n).
+        bounds: Limits of the joints, shape (n,) each.
+        least: The smallest width in [s].
+    """
     length = np.abs(move)
-    moved = length > 0.0
-    limits = (bounds.velocity, bounds.acceleration, bounds.jerk)
-    v, a, j = (float((limit[moved] / length[moved]).min()) for limit in limits)
-    third = min(a / j, np.sqrt(v / j)) if np.isfinite(j) else 0.0
-    third = max(least, third)
-    second = max(third, v / a if np.isfinite(a) else 0.0)
-    first = 1.0 / v
-    if first < second + third:  # the top speed is not reached
-        product = 1.0 / a if np.isfinite(a) else 0.0
-        second = max(third, 0.5 * (np.sqrt(third * third + 4.0 * product) - third))
-        if np.isfinite(j) and second <= third:  # nor the full acceleration
-            second = third = max(least, float(np.cbrt(0.5 / j)))
-        first = second + third
-    return first, float(second), float(third)
+    with np.errstate(divide="ignore", invalid="ignore"):  # joints that stand, and limits that do not exist
+        v, a, j = (
+            np.where(length > 0.0, limit / length, np.inf).min(axis=-1)
+            for limit in (bounds.velocity, bounds.acceleration, bounds.jerk)
+        )
+        third = np.maximum(least, np.where(np.isfinite(j), np.minimum(a / j, np.sqrt(v / j)), 0.0))
+        second = np.maximum(third, np.where(np.isfinite(a), v / a, 0.0))
+        first, product = 1.0 / v, 1.0 / a
+    is_short = first < second + third  # the top speed is not reached
+    half = np.maximum(third, 0.5 * (np.sqrt(third * third + 4.0 * product) - third))
+    is_jerky = is_short & np.isfinite(j) & (half <= third)  # nor the full acceleration
+    third = np.where(is_jerky, np.maximum(least, np.cbrt(0.5 / j)), third)
+    second = np.where(is_jerky, third, np.where(is_short, half, second))
+    return np.stack([np.where(is_short, second + third, first), second, third], axis=-1)
 
 
-def shares(at: Array, widths: tuple[float, float, float]) -> Array:
+def shares(at: Array, widths: Sequence[float]) -> Array:
     """Share of the way at shares of the time, shape (N,): the integral of the convolution of the three boxes."""
     first, second, third = widths
     t = at * (first + second + third)

@@ -10,6 +10,7 @@ import numpy as np
 
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.planning.timing.retime import JointLimitsInTime
+from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import Stations, TaskGoal
 from cellplan.search.assign.table import Key, ModeTable, TaskMode
@@ -99,35 +100,6 @@ class Instance:
             return 0
         a, b = (self.homes[holder] if it is None else self.stations.q[it] for it in (first, second))
         return int(self.transfer_steps(holder, a, b))
-
-
-def straight_steps(move: Array, bounds: JointLimitsInTime, step: float) -> Indices:
-    """Whole steps of the fastest straight moves from rest to rest, see ``planning.transfer.straight_time``.
-
-    Args:
-        move: Changes of the joints of one robot in [rad] or [m], shape (..., n).
-        bounds: Limits of its joints, shape (n,) each.
-        step: Time between two rows in [s].
-
-    Returns:
-        Shape (...); zero where nothing moves.
-    """
-    length = np.abs(move)
-    with np.errstate(divide="ignore"):
-        v, a, j = ((limit / length).min(axis=-1) for limit in (bounds.velocity, bounds.acceleration, bounds.jerk))
-    moves = length.max(axis=-1) > 0.0
-    v, a, j = (np.where(moves, it, 1.0) for it in (v, a, j))
-    third = np.maximum(step, np.where(np.isfinite(j), np.minimum(a / j, np.sqrt(v / j)), 0.0))
-    second = np.maximum(third, np.where(np.isfinite(a), v / a, 0.0))
-    first = 1.0 / v
-    short = first < second + third
-    half = np.maximum(third, 0.5 * (np.sqrt(third**2 + np.where(np.isfinite(a), 4.0 / a, 0.0)) - third))
-    is_jerky = short & np.isfinite(j) & (half <= third)
-    second = np.where(short, half, second)
-    third = np.where(is_jerky, np.maximum(step, np.cbrt(0.5 / j)), third)
-    second = np.where(is_jerky, third, second)
-    total = np.where(short, second + third, first) + second + third
-    return np.where(moves, np.ceil(total / step), 0.0).astype(np.intp)
 
 
 def least_transfer(instance: Instance) -> int:

@@ -10,10 +10,10 @@ from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import Retimer
-from cellplan.planning.transfer.in_legs import leg_steps, legs_of, refusing_robots
+from cellplan.planning.transfer.in_legs import legs_of, refusing_robots
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.straight_time import straight_line
+from cellplan.planning.transfer.straight_time import straight_line, straight_steps
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, relocations
 from cellplan.search.assign.schedule import BlockSchedule
@@ -104,15 +104,15 @@ class TransferCertifier:
 
     def _steps_of(self, ends: list[Array]) -> int:
         """Steps of straight legs of all robots."""
-        return sum(leg_steps(b - a, self.retimer.bounds, self.retimer.step) for a, b in pairwise(ends))
+        return int(straight_steps(np.diff(ends, axis=0), self.retimer.bounds, self.retimer.step).sum())
 
     def _one_by_one(self, query: TransferQuery) -> int:
         """Steps of all robots straight, one after the other."""
-        moves = [np.zeros_like(query.start) for _ in query.movers]
+        moves = np.zeros((len(query.movers), len(query.start)))
         for move, name in zip(moves, query.movers, strict=True):
             at = self.scene.cell.columns(name)
             move[at] = query.goal[at] - query.start[at]
-        return sum(leg_steps(move, self.retimer.bounds, self.retimer.step) for move in moves)
+        return int(straight_steps(moves, self.retimer.bounds, self.retimer.step).sum())
 
     def _stacked(self, sequencer: Sequencer, stop: Stop, *, leaves: bool) -> Array:
         """Stacked configuration in which all robots leave a stop, or come to it, shape (nq,)."""

@@ -8,11 +8,11 @@ from builders.transfer_cells import gantry, retimer_of, scene_of
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.arrays import Array
-from cellplan.planning.transfer.in_legs import LEGS, leg_steps, legs_of
+from cellplan.planning.transfer.in_legs import LEGS, legs_of
 from cellplan.planning.transfer.plan import Rung, plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
-from cellplan.planning.transfer.straight_time import straight_line, straight_rows
+from cellplan.planning.transfer.straight_time import straight_line, straight_rows, straight_steps
 from cellplan.scene.scene import Scene
 
 RADIUS, CLEARANCE, ROUNDED = 0.1, 0.005, 1e-9  # [m]
@@ -27,7 +27,7 @@ def steps_of(ends: list[Array], scene: Scene) -> int:
     """Steps of legs whose robots wait for the slowest one."""
     bounds = retimer_of(scene).bounds
     assert np.ptp(bounds.velocity) == np.ptp(bounds.acceleration) == 0.0  # so a stacked move is as long as its longest
-    return sum(leg_steps(b - a, bounds, STEP) for a, b in pairwise(ends))
+    return int(straight_steps(np.diff(ends, axis=0), bounds, STEP).sum())
 
 
 def fastest_by_enumeration(scene: Scene, start: Array, goal: Array) -> int | None:

@@ -7,9 +7,9 @@ import pytest
 from builders.assignments import STEP, small_instance
 
 from cellplan.planning.timing.retime import JointLimitsInTime
-from cellplan.planning.transfer.straight_time import box_widths
+from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.greedy import greedy_schedule
-from cellplan.search.assign.instance import End, Instance, least_transfer, straight_steps
+from cellplan.search.assign.instance import End, Instance, least_transfer
 from cellplan.search.assign.order import Refusal, Sequencer, relocations
 from cellplan.search.assign.schedule import BlockSchedule, in_order
 
@@ -64,14 +64,16 @@ def test_a_refused_transfer_is_avoided_or_costs_what_it_takes() -> None:
 
 
 @pytest.mark.parametrize("jerk", [np.inf, 40.0, 4000.0])
-def test_straight_steps_are_those_of_the_planner_of_transfers(jerk: float) -> None:
+def test_steps_of_many_moves_are_those_of_each_alone_and_grow_with_its_length(jerk: float) -> None:
     rng = np.random.default_rng(4)
     bounds = JointLimitsInTime(velocity=rng.uniform(1, 4, 6), acceleration=rng.uniform(3, 20, 6), jerk=np.full(6, jerk))
     moves = rng.normal(size=(40, 6)) * rng.choice([0.01, 0.3, 2.0], (40, 1))
 
     steps = straight_steps(moves, bounds, STEP)
 
-    assert steps.tolist() == [int(np.ceil(sum(box_widths(move, bounds, least=STEP)) / STEP)) for move in moves]
+    assert steps.tolist() == [int(straight_steps(move, bounds, STEP)) for move in moves]
+    assert np.all(straight_steps(2.0 * moves, bounds, STEP) >= steps)
+    assert np.all(steps * STEP >= (np.abs(moves) / bounds.velocity).max(axis=1))
     assert straight_steps(np.zeros((2, 6)), bounds, STEP).tolist() == [0, 0]
 
 
