@@ -59,7 +59,7 @@ class PlannedProgram:
 
     cell: Cell  # the solved cell: starts, homes and the starts of all tasks filled in
     scenes: StageScenes
-    stages: tuple[PlannedStage, ...]  # the stages in their order, each beginning where the one before ends
+    stages: tuple[PlannedStage, ...]  # in their order: all, each beginning where the one before ends; or with tasks
     remarks: tuple[str, ...]  # notes on starts that were found, where no trial was without fault
     moved: Mapping[str, tuple[MovedStart, ...]]  # how far starts were moved, by the name of the phase
 
@@ -70,6 +70,17 @@ def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress
     Raises:
         InputError: The tasks cannot be worked with, or in no order.
         NoSolutionError: No start or home was found, a tool lost its path, or a robot finds no way.
+    """
+    work = plan_work(cell, near=near, progress=progress)
+    return replace(work, stages=tuple(_joined(work.cell, work.scenes, work.stages, progress=progress)))
+
+
+def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = silent) -> PlannedProgram:
+    """Plan the stages with tasks alone, in the cell with all starts and homes; nothing leads from one to the next.
+
+    Raises:
+        InputError: The tasks cannot be worked with, or in no order.
+        NoSolutionError: No start or home was found, or a tool lost its path.
     """
     _refuse_other_paths(cell)
     scenes = StageScenes.of(cell)
@@ -88,10 +99,17 @@ def plan_program(cell: Cell, *, near: Branches | None = None, progress: Progress
     solved = _with_all_homes(with_homes(started, homes, given=cell))
     if depends_on_homes(started, runs):
         runs = _Worked(solved, scenes, progress, near).runs()
-    stages = _joined(solved, scenes, runs, progress=progress)
+    worked_on = [stage for stage in program_stages(solved) if stage.phase.tasks]
+    stages = (_worked(scenes, stage, run) for stage, run in zip(worked_on, runs, strict=True))
     return PlannedProgram(
         cell=solved, scenes=scenes, stages=tuple(stages), remarks=tuple(search.remarks), moved=search.moved
     )
+
+
+def _worked(scenes: StageScenes, stage: Stage, run: PlannedRun) -> PlannedStage:
+    """A stage with tasks, its idle robots at their homes."""
+    motion = replace(run.motion, q=standing(stage.cell, stage.phase, run.motion.q))
+    return PlannedStage(stage=stage, scene=scenes.of_stage(stage), schedule=run.schedule, motion=motion, rungs={})
 
 
 def _refuse_other_paths(cell: Cell) -> None:
@@ -203,10 +221,10 @@ def _with_all_homes(cell: Cell) -> Cell:
 
 
 def _joined(
-    cell: Cell, scenes: StageScenes, runs: Sequence[PlannedRun], *, progress: Progress
+    cell: Cell, scenes: StageScenes, work: Sequence[PlannedStage], *, progress: Progress
 ) -> Iterator[PlannedStage]:
     """The stages of a solved cell, with the transfer moves and dwells between the planned ones."""
-    stages, left = program_stages(cell), list(runs)
+    stages, left = program_stages(cell), list(work)
     home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
     last = home
     for stage in stages[:1] + stages[-1:]:
@@ -214,14 +232,12 @@ def _joined(
     for number, stage in enumerate(stages):
         scene = scenes.of_stage(stage)
         if stage.phase.tasks:
-            run = left.pop(0)
-            motion = replace(run.motion, q=standing(cell, stage.phase, run.motion.q))
-            made = PlannedStage(stage=stage, scene=scene, schedule=run.schedule, motion=motion, rungs={})
+            made = left.pop(0)
         elif stage.dwell is not None:
             made = _dwelling(stage, scene, last)
         else:
             progress("planning transfer moves", number / len(stages))
-            goal = standing(cell, stages[number + 1].phase, left[0].motion.q[0]) if left else home
+            goal = left[0].motion.q[0] if left else home
             with named_transfer(stages, number):
                 made = _transferred(stage, scene, (last, goal), home, progress)
         yield made
