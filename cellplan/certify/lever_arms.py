@@ -15,7 +15,7 @@ What counts of a turning joint is the distance from its axis, not from :math:`P_
 the body, whose points keep their distance from that axis: that is its lever arm.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,6 +104,20 @@ class LeverArms:
         tip = (placed.X_WB @ placed.model.X_BF @ placed.tool.X_FT)[:3, 3]
         down = [] if seen_by is None else self._path_down(seen_by, cell.robot(seen_by).model.flange_link)
         return self._between(down, self._path_down(robot, placed.model.flange_link), _Held(tip, 0.0, tip[None], 0.0))
+
+    def flange(self, robot: str, *, radius: float) -> tuple[Chain, Array]:
+        """The joints between the ground and a ball round the flange of a robot, of a radius in [m].
+
+        By how much each axis of the chain moves per stacked joint stands in the second value, shape (m, nq); the chain
+        numbers them in that order.
+        """
+        placed = self._scene.cell.robot(robot)
+        centre = (placed.X_WB @ placed.model.X_BF)[:3, 3]
+        up = self._path_down(robot, placed.model.flange_link)
+        chain = self._between([], up, _Held(centre, radius, centre[None], radius))
+        moves = np.zeros((len(chain.axes), self._scene.cell.joint_count))
+        moves[np.arange(len(chain.axes)), self._columns[chain.axes]] = self._ratios[chain.axes]
+        return replace(chain, axes=np.arange(len(chain.axes))), moves
 
     def _chain(self, down: list[int], index: int) -> Chain:
         """The joints on the way down from one link and up to another body."""

@@ -12,8 +12,7 @@ from cellplan.geometry.transforms import Array
 from cellplan.model.cell.cell import Obstacle, Robot
 from cellplan.model.robot.robot import RobotModel
 from cellplan.model.settings.checks import ChecksEntry
-from cellplan.planning.timing.retime import Retimer
-from cellplan.runs.plan.retiming import RowLimits, joint_bounds
+from cellplan.model.settings.program import ProgramEntry, TransferEntry
 from cellplan.scene.scene import Scene
 
 CHECKS = ChecksEntry()
@@ -32,12 +31,10 @@ def scene_of(*robots: Robot, things: Sequence[Obstacle] = (), step: float = STEP
     return Scene.from_cell(replace(cell, motion=replace(cell.motion, step=step)))
 
 
-def retimer_of(scene: Scene) -> Retimer:
-    """The limits of all joints, as the planner has them."""
-    limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
-    return Retimer(
-        bounds=limits.bounds, step=limits.step, feed_share=lambda sigma: np.zeros(len(sigma)), slower=limits.slower
-    )
+def capped(scene: Scene, **limits: float) -> Scene:
+    """The scene with limits of ``program.transfer``."""
+    program = ProgramEntry(transfer=TransferEntry.model_validate(limits))
+    return replace(scene, cell=replace(scene.cell, program=program))
 
 
 def gantry(name: str, *, radius: float = 0.1, z: float = 0.0) -> Robot:

@@ -20,6 +20,7 @@ from cellplan.jobs.recover.recover import Recovery, recover
 from cellplan.jobs.recover.result import write_recovery
 from cellplan.jobs.recover.state import RunPlaces, stopped_state
 from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.model.settings.program import TransferEntry
 from cellplan.runs.gate.open_gate import open_gate
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -92,6 +93,21 @@ def test_a_recovery_begins_at_rest_in_the_stopped_state_and_ends_off_the_start(
     off = (end[:3, 3] - start[:3, 3]) @ -start[:3, 2]
     assert off > 0.005  # along the tool at the start of the program, farther than is demanded
     np.testing.assert_allclose(end[:3, 3], start[:3, 3] - off * start[:3, 2], atol=1e-6)
+
+
+def test_all_moves_of_a_recovery_keep_the_speeds_that_are_given(pen: VerifiedRun, stopped: Recovery) -> None:
+    slow = recover(pen, at=0.73, transfer=TransferEntry(speed_percent=25.0, tcp_mm_s=100.0))
+
+    assert slow.judgement is not None
+    checks = {check.name: check for check in slow.judgement.checks}
+    assert 0.9 < checks["transfer_speed"].value / 100.0 <= 1.0
+    assert checks["transfer_joint_speed"].value <= 25.0
+    table, chain = parse_table(slow.tables["pen"], "pen"), RunPlaces.of(pen).scenes.held.chains["pen"]
+    steps = np.linalg.norm(np.diff(chain.tool_poses(table.q)[:, :3, 3], axis=0), axis=1)
+    assert steps.max() / 0.02 <= 0.1
+    assert slow.duration > stopped.duration
+    fast = {check.name for check in stopped.judgement.checks} if stopped.judgement else set()
+    assert fast == set(checks) - {"transfer_speed", "transfer_joint_speed"}
 
 
 def test_the_same_stop_gives_the_same_bytes(pen: VerifiedRun, stopped: Recovery, tmp_path: Path) -> None:

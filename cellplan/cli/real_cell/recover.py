@@ -30,6 +30,19 @@ class RecoverOptions(Options):
         ),
     ] = ()
     keep: Annotated[tuple[str, ...], option("--keep ROBOT", "This robot is to stand still; may be repeated.")] = ()
+    speed: Annotated[
+        str | None,
+        option(
+            "--speed PERCENT",
+            "Speed of all moves in percent of what joints can do, such as 25%; that of program.transfer when absent.",
+        ),
+    ] = None
+    tcp_speed: Annotated[
+        float | None,
+        option(
+            "--tcp-speed MM_S", "Largest speed of any tool tip, flange and point of a held part in mm/s, such as 250."
+        ),
+    ] = None
     output: Annotated[Path | None, option("-o, --output DIR", "Folder (default: RUN/recover).")] = None
     cell: shared.OriginalCell = None
     without_cell: shared.WithoutCell = False
@@ -52,6 +65,7 @@ def recover(options: RecoverOptions) -> Result:
 
     at, frozen, keep = options.at, frozen_times(options.frozen), options.keep
     require_choice(options.cell, without_cell=options.without_cell)
+    limits = speed_limits(options.speed, options.tcp_speed)
     folder = options.output or default_folder(options.run)
     refuse_unless_recoverable(folder, options.run)
     with progress_listener(quiet=options.quiet) as progress:
@@ -62,13 +76,34 @@ def recover(options: RecoverOptions) -> Result:
             refuse=lambda read: refuse_state(read.cell, read.motion, at=at, frozen=frozen, keep=keep),
             progress=progress,
         )
-        recovery = recovered(run, at=at, frozen=frozen, keep=keep, progress=progress)
+        transfer = run.cell.program.transfer.changed(**limits)
+        recovery = recovered(run, at=at, frozen=frozen, keep=keep, transfer=transfer, progress=progress)
         record = write_recovery(recovery, folder)
     status = ExitStatus.PASSED if recovery.succeeded else ExitStatus.NO_SOLUTION
     verdict, *lines = recovery_lines(record)
     place = f"tables: {folder / 'tables'}" if recovery.succeeded else f"reason: {folder / 'recovery.json'}"
     about = {"exit": int(status), "folder": str(folder), "remarks": list(run.remarks)}
     return Result(status, [verdict, *notes(run.remarks), *lines, place], {**record, **about})
+
+
+def speed_limits(speed: str | None, tcp_speed: float | None) -> dict[str, float]:
+    """What is given of ``program.transfer``: by a text such as ``25%``, and by a speed in mm/s."""
+    from cellplan.model.settings.entry import FASTEST_MM_S
+    from cellplan.model.settings.program import LEAST_PERCENT
+
+    limits: dict[str, float] = {}
+    if speed is not None:
+        try:
+            limits["speed_percent"] = percent = float(speed.removesuffix("%"))
+        except ValueError:
+            percent = math.nan
+        if not LEAST_PERCENT <= percent <= 100.0:
+            raise InputError(f"--speed: expected {LEAST_PERCENT:g} to 100 percent, such as 25%, got '{speed}'")
+    if tcp_speed is not None:
+        if not 0.0 < tcp_speed <= FASTEST_MM_S:
+            raise InputError(f"--tcp-speed: expected a speed above 0 up to {FASTEST_MM_S:g} mm/s, got {tcp_speed:g}")
+        limits["tcp_mm_s"] = tcp_speed
+    return limits
 
 
 def frozen_times(texts: Sequence[str]) -> dict[str, float]:

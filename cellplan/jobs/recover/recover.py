@@ -14,6 +14,7 @@ from cellplan.jobs.recover.state import RunPlaces, StoppedState, stopped_state
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
+from cellplan.model.settings.program import TransferEntry
 from cellplan.planning.timing.schedule import TIME_DECIMALS
 from cellplan.report.record.sections.rests_on import zero_text
 
@@ -23,7 +24,7 @@ class Recovery:
     """What came of a recovery.
 
     Attributes:
-        cell: The cell.
+        cell: The cell; its ``program.transfer`` says how fast the moves are at most.
         run: SHA-256 of the manifest of the run.
         state: Where the cell has stopped.
         tables: Text of the joint table of each robot, by its name; empty where no recovery was found.
@@ -62,6 +63,7 @@ def recover(
     at: float,
     frozen: Mapping[str, float] | None = None,
     keep: Collection[str] = (),
+    transfer: TransferEntry | None = None,
     progress: Progress = silent,
 ) -> Recovery:
     """Plan a recovery of a verified run and verify its tables.
@@ -75,6 +77,7 @@ def recover(
         at: Time of the program in [s], linear between rows.
         frozen: Time of the program at which a robot stands instead, by its name.
         keep: Names of the robots that are to stand still.
+        transfer: How fast all moves are at most; None for ``program.transfer`` of the cell.
         progress: Called with the stage and the fraction done.
 
     Returns:
@@ -84,14 +87,14 @@ def recover(
         InputError: A time is outside of the program, or there is no such robot.
         NotVerifiedError: A check fails on the tables that were planned.
     """
-    places = RunPlaces.of(run)
+    places = RunPlaces.of(run, transfer)
     state = stopped_state(places, at=at, frozen=frozen or {}, keep=keep)
     planner = RecoveryPlanner(places, state, progress)
     try:
         phases = planner.phases()
     except TransferNotFoundError as error:
         return Recovery(
-            cell=run.cell, run=run.digest, state=state, tables={}, judgement=None, reason=str(error), tried=()
+            cell=places.cell, run=run.digest, state=state, tables={}, judgement=None, reason=str(error), tried=()
         )
     tables = _tables(places.cell, phases, state, run=run.digest)
     progress("verifying the recovery", 0.0)
@@ -99,7 +102,7 @@ def recover(
     if not judgement.passed:
         raise NotVerifiedError([f"recovery: {check.message}" for check in judgement.checks if not check.passed])
     return Recovery(
-        cell=run.cell,
+        cell=places.cell,
         run=run.digest,
         state=state,
         tables=tables,

@@ -40,6 +40,7 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
         "run": recovery.run,
         "versions": versions(),
         "state": _state(recovery),
+        "limits": recovery.cell.program.transfer.model_dump(),
     }
     if recovery.judgement is None:
         return record | {"reason": recovery.reason, "files": {}, "caution": CAUTION}
@@ -126,7 +127,7 @@ def recovery_lines(record: Mapping[str, Any]) -> list[str]:
     if record["status"] != "found":
         return [f"{record['cell']}: no recovery from {at:g} s was found", f"  {record['reason']}"]
     lines = [f"{record['cell']}: recovery from {at:g} s, {record['duration_s']:.3f} s"]
-    lines += _state_lines(record)
+    lines += [*_state_lines(record), *_limit_lines(record["limits"])]
     for number, phase in enumerate(record["phases"], start=1):
         lines.append(f"  {number}. {phase['begin_s']:.3f} to {phase['end_s']:.3f} s  {phase['kind']}: {phase['what']}")
     nearest = record["clearance"]
@@ -153,6 +154,14 @@ def _state_lines(record: Mapping[str, Any]) -> Iterator[str]:
         held = f"{pair['depth_mm']:.2f} mm deep in" if pair["depth_mm"] > 0.0 else f"{pair['distance_mm']:.2f} mm from"
         distance = f"from {pair['kept_from_s']:.3f} s on {pair['demand_mm']:g} mm apart"
         yield f"  begins with {first} {held} {second}; {distance}"
+
+
+def _limit_lines(limits: Mapping[str, Any]) -> Iterator[str]:
+    """How fast the moves are at most, where that is less than robots can do."""
+    if limits["speed_percent"] < 100.0:
+        yield f"  no joint faster than {limits['speed_percent']:g} % of its limit"
+    if limits["tcp_mm_s"] is not None:
+        yield f"  no tool tip, flange or point of a held part faster than {limits['tcp_mm_s']:g} mm/s"
 
 
 # Files

@@ -17,7 +17,7 @@ from cellplan.model.motion.motion import Motion
 from cellplan.model.motion.plan import Phase
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.robot.robot import BASE, Body
-from cellplan.model.settings.program import PartPlaceEntry
+from cellplan.model.settings.program import PartPlaceEntry, TransferEntry
 from cellplan.model.task.task import Frame
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
@@ -41,9 +41,11 @@ class RunPlaces:
     tipped: StageScenes  # the same with a small ball at tool tips that work on the part: not all have a body there
 
     @classmethod
-    def of(cls, run: VerifiedRun) -> "RunPlaces":
-        """Those of a verified run."""
-        cell = replace(run.cell, motion=replace(run.cell.motion, cyclic=False))
+    def of(cls, run: VerifiedRun, transfer: TransferEntry | None = None) -> "RunPlaces":
+        """Those of a verified run, and how fast moves off its program may be; None for what the cell says."""
+        program = run.cell.program
+        program = program if transfer is None else program.model_copy(update={"transfer": transfer})
+        cell = replace(run.cell, program=program, motion=replace(run.cell.motion, cyclic=False))
         return cls(
             cell=cell,
             motion=run.motion,

@@ -101,6 +101,8 @@ _LISTED: Final = (  # the gravest first
     CheckKind("joint_jerk", "joint jerk within its limits", "Joint jerk too high", concern=LIMIT, time_exponent=1 / 3),
     CheckKind("part_acceleration", "acceleration of the part within its limit", "Acceleration of the part too high", time_exponent=0.5),
     CheckKind("tool_speed", "speed of the tools within its limit", "Tool too fast", time_exponent=1.0),
+    CheckKind("transfer_joint_speed", "joint speeds in transfer moves within their limit", "Joint too fast in a transfer move"),
+    CheckKind("transfer_speed", "speeds in transfer moves within their limit", "Too fast in a transfer move"),
     CheckKind("closure_position_error", "tools of co-holders on their grasps", "Co-holder off its grasp"),
     CheckKind("closure_orientation_error", "orientation of co-holders' tools", "Co-holder tilted on its grasp"),
     CheckKind("closure_position_error_between_rows", "tools of co-holders on their grasps between the rows", "Co-holder off its grasp between the rows", time_exponent=0.5, shrinks_with_step=True),

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Final
 from pydantic import Field, Tag
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.settings.entry import Entry, Name, PoseEntry, by_kind
+from cellplan.model.settings.entry import Entry, Name, PoseEntry, SlidingSpeed, by_kind
 from cellplan.model.settings.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
 from cellplan.model.settings.units import Mm, Within
 
@@ -28,6 +28,7 @@ MarkChoice = Annotated[
     by_kind(MARK_WORDS, mapping=dict),
 ]
 
+LEAST_PERCENT: Final = 1.0  # of the speed of joints: a slower move is a wrong unit
 WIDEST_REST_MM: Final = 10.0  # a part farther from what it rests on would fall
 SUPPORT_LIMIT: Final = 20
 SUPPORT_WORDS: Final = "the name of a body or a list of them"
@@ -81,6 +82,26 @@ class PartPlaceEntry(Entry):
         return (self.rests_on,) if isinstance(self.rests_on, str) else self.rests_on or ()
 
 
+class TransferEntry(Entry):
+    """How fast transfer moves are at most."""
+
+    speed_percent: Annotated[float, Field(ge=LEAST_PERCENT, le=100.0)] = Field(
+        default=100.0,
+        description="Speed of transfer moves in percent of what the joints can do, as if time ran slower: it scales "
+        "accelerations by its square, jerks by its cube.",
+    )
+    tcp_mm_s: SlidingSpeed | None = Field(
+        default=None,
+        description="Largest speed in the world of any tool tip, any flange and any point of a part that is held, in "
+        "transfer moves.",
+    )
+
+    @property
+    def share(self) -> float:
+        """The share of the speed that joints have."""
+        return self.speed_percent / 100.0
+
+
 class ProgramEntry(Entry):
     """A program from home to home: transfer moves lead from the homes to the tasks, between them, and back."""
 
@@ -102,6 +123,8 @@ class ProgramEntry(Entry):
     detach: PartPlaceEntry | None = Field(
         default=None, description="Where the part is put down after the last task; held to the end when absent."
     )
+
+    transfer: TransferEntry = Field(default=TransferEntry(), description="How fast transfer moves are at most.")
 
     @property
     def all_marks(self) -> tuple[MarkEntry, ...]:

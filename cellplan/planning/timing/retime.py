@@ -12,6 +12,7 @@ from typing import Final, Protocol, Self
 
 import numpy as np
 
+from cellplan.certify.point_speeds import PointSpeeds
 from cellplan.geometry.transforms import Array
 from cellplan.model.motion.joint_path import JointPath
 from cellplan.planning.timing.fixed_rates import (
@@ -59,6 +60,7 @@ class JointLimitsInTime:
     velocity: Array
     acceleration: Array
     jerk: Array
+    points: tuple[PointSpeeds, ...] = ()  # points of the robots of which the speed in the world is limited too
 
     def of(self, columns: slice) -> Self:
         """Those of some joints."""
@@ -67,7 +69,17 @@ class JointLimitsInTime:
             velocity=self.velocity[columns],
             acceleration=self.acceleration[columns],
             jerk=self.jerk[columns],
+            points=tuple(
+                it.among(columns)
+                for it in self.points
+                if columns.start <= it.columns.start and it.columns.stop <= columns.stop
+            ),
         )
+
+    def in_slow_motion(self, share: float) -> Self:
+        """Limits within which every motion is one within these, only that time runs at a share of its speed."""
+        rates = share * self.velocity, share**2 * self.acceleration, share**3 * self.jerk
+        return replace(self, velocity=rates[0], acceleration=rates[1], jerk=rates[2])
 
     @property
     def build_up(self) -> float:

@@ -57,7 +57,7 @@ class RobotRoutes:
             step: Time between two rows in [s].
         """
         at, places = np.array(stops), np.array(routes, dtype=np.intp)
-        between = straight_steps(at - at[:, None], limits, step)
+        between = straight_steps(at[:, None], at[None], limits, step)
         return cls(stops=at, routes=places, steps=between[places[:, :-1], places[:, 1:]])
 
     def going(self, leg: int, ends: Ends) -> Flags:

@@ -36,13 +36,13 @@ def straight_line(start: Array, goal: Array) -> Array:
 def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     """Rows of the fastest straight move, shape (N, nq).
 
-    Where limits count that are not of single joints, such as those of the tools' speeds, the top speed is lowered.
+    Where limits count that no closed form has, such as those of ``checks.tool_speed_mm_s``, the top speed is lowered.
 
     Args:
         start: Stacked joint positions in [rad] or [m], shape (nq,).
         goal: Likewise, not the same.
     """
-    widths: list[float] = box_widths(goal - start, retimer.bounds, least=retimer.step).tolist()
+    widths: list[float] = straight_widths(start, goal, retimer.bounds, step=retimer.step).tolist()
     count = int(np.ceil(sum(widths) / retimer.step))
     q = np.array([start, goal])
     for _ in range(TRIES):
@@ -59,25 +59,43 @@ def straight_rows(start: Array, goal: Array, retimer: Retimer) -> Array:
     return q
 
 
-def straight_steps(move: Array, bounds: JointLimitsInTime, step: float) -> Indices:
+def straight_steps(start: Array, goal: Array, bounds: JointLimitsInTime, step: float) -> Indices:
     """Whole steps of the fastest straight moves from rest to rest, shape (...); zero where nothing moves.
 
     Args:
-        move: Changes of the joints in [rad] or [m], shape (..., n).
+        start: Joint positions in [rad] or [m], shape (..., n).
+        goal: Likewise.
         bounds: Limits of the joints, shape (n,) each.
         step: Time between two rows in [s].
     """
-    first, second, third = np.moveaxis(box_widths(move, bounds, least=step), -1, 0)
-    return np.where(np.any(move, axis=-1), np.ceil((first + second + third) / step), 0.0).astype(np.intp)
+    first, second, third = np.moveaxis(straight_widths(start, goal, bounds, step=step), -1, 0)
+    moves = np.any(goal != start, axis=-1)
+    return np.where(moves, np.ceil((first + second + third) / step), 0.0).astype(np.intp)
 
 
-def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float) -> Array:
+def straight_widths(start: Array, goal: Array, bounds: JointLimitsInTime, *, step: float) -> Array:
+    """Widths of the three boxes of straight moves in [s], shape (..., 3), by the limits of points in the world too.
+
+    Args:
+        start: Joint positions in [rad] or [m], shape (..., n).
+        goal: Likewise.
+        bounds: Limits of the joints, shape (n,) each.
+        step: Time between two rows in [s]: the smallest width.
+    """
+    highest = np.full(np.broadcast_shapes(start.shape, goal.shape)[:-1], np.inf)
+    for points in bounds.points:
+        highest = np.minimum(highest, points.straight_rate(start, goal, step))
+    return box_widths(goal - start, bounds, least=step, highest=highest)
+
+
+def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float, highest: Array | float = np.inf) -> Array:
     """Widths of the three boxes in [s], none below ``least``, the widest first, shape (..., 3).
 
     Args:
         move: Changes of the joints in [rad] or [m], shape (..., n).
         bounds: Limits of the joints, shape (n,) each.
         least: The smallest width in [s].
+        highest: Largest rates of the share for other reasons in [1/s], shape (...).
     """
     length = np.abs(move)
     with np.errstate(divide="ignore", invalid="ignore"):  # joints that stand, and limits that do not exist
@@ -85,6 +103,7 @@ def box_widths(move: Array, bounds: JointLimitsInTime, *, least: float) -> Array
             np.where(length > 0.0, limit / length, np.inf).min(axis=-1)
             for limit in (bounds.velocity, bounds.acceleration, bounds.jerk)
         )
+        v = np.minimum(v, highest)
         third = np.maximum(least, np.where(np.isfinite(j), np.minimum(a / j, np.sqrt(v / j)), 0.0))
         second = np.maximum(third, np.where(np.isfinite(a), v / a, 0.0))
         first, product = 1.0 / v, 1.0 / a

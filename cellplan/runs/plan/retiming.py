@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from cellplan.certify.point_speeds import point_speeds
 from cellplan.errors import InputError
 from cellplan.geometry.transforms import Array
 from cellplan.measures.accelerations import jerks, joint_accelerations, part_acceleration, point_accelerations
@@ -172,7 +173,9 @@ class RowLimits:
         velocity, acceleration, jerk = (float(shares.max()) for shares in self.shares(times, q))
         feed = max([self._waits(sigma), *self.feeds(sigma, times).values()])
         tools = float(self._tool_moves(q[:-1], q[1:]).max()) / self.step
-        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, self._part_share(times, q) ** 0.5)
+        points = max((float(it.travel(q).max()) / (self.step * it.limit) for it in self.bounds.points), default=0.0)
+        part = self._part_share(times, q) ** 0.5
+        return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0), feed, tools, points, part)
 
     def feeds(self, sigma: Array, times: Array) -> dict[str, float]:
         """Largest speed of each tool along its path between rows, as a share of its feed, by task with a feed.
@@ -240,8 +243,14 @@ def row_limits(scene: Scene, schedule: Schedule) -> RowLimits:
 
 
 def transfer_retimer(scene: Scene) -> Retimer:
-    """What transfer moves are timed by: the limits of all joints, of the tools in the world and of the part."""
-    limits = RowLimits(scene, (), joint_bounds(scene.cell), scene.cell.motion.step)
+    """What transfer moves are timed by: the limits of all joints, of the tools in the world and of the part.
+
+    The limits of ``program.transfer`` are among them.
+    """
+    cap = scene.cell.program.transfer
+    bounds = joint_bounds(scene.cell).in_slow_motion(cap.share)
+    bounds = replace(bounds, points=point_speeds(scene, si_or_none(cap.tcp_mm_s)))
+    limits = RowLimits(scene, (), bounds, scene.cell.motion.step)
     return Retimer(bounds=limits.bounds, step=limits.step, feed_share=limits.feed_share, slower=limits.slower)
 
 

@@ -91,7 +91,7 @@ class Instance:
 
     def transfer_steps(self, robot: str, first: Array, second: Array) -> Indices:
         """Whole steps of straight moves from rest to rest, broadcast over configurations of shape (..., n)."""
-        return straight_steps(np.asarray(second) - np.asarray(first), self.bounds[robot], self.step)
+        return straight_steps(np.asarray(first), np.asarray(second), self.bounds[robot], self.step)
 
     def station_steps(self, first: int | None, second: int | None) -> int:
         """Whole steps that the holder takes between two stations; None stands for its home."""

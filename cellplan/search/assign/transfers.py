@@ -104,15 +104,12 @@ class TransferCertifier:
 
     def _steps_of(self, ends: list[Array]) -> int:
         """Steps of straight legs of all robots."""
-        return int(straight_steps(np.diff(ends, axis=0), self.retimer.bounds, self.retimer.step).sum())
+        at = np.array(ends)
+        return int(straight_steps(at[:-1], at[1:], self.retimer.bounds, self.retimer.step).sum())
 
     def _one_by_one(self, query: TransferQuery) -> int:
         """Steps of all robots straight, one after the other."""
-        moves = np.zeros((len(query.movers), len(query.start)))
-        for move, name in zip(moves, query.movers, strict=True):
-            at = self.scene.cell.columns(name)
-            move[at] = query.goal[at] - query.start[at]
-        return int(straight_steps(moves, self.retimer.bounds, self.retimer.step).sum())
+        return self._steps_of([query.standing(query.movers[:count]) for count in range(len(query.movers) + 1)])
 
     def _stacked(self, sequencer: Sequencer, stop: Stop, *, leaves: bool) -> Array:
         """Stacked configuration in which all robots leave a stop, or come to it, shape (nq,)."""

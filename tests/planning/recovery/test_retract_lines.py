@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from builders.transfer_cells import arm, retimer_of, scene_of
+from builders.transfer_cells import arm, scene_of
 
 from cellplan.planning.recovery.retract import STEP, Lines
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows, timed_rows
+from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
 BENT = np.array([0.2, -1.2, 1.4, 0.3, 0.8, -0.4])
@@ -48,7 +49,7 @@ def test_a_line_ends_at_a_joint_limit() -> None:
 
 def test_rows_along_a_path_keep_all_limits_and_its_ends() -> None:
     scene = scene_of(arm("arm", "ur10e"))
-    retimer = retimer_of(scene)
+    retimer = transfer_retimer(scene)
     line = Lines(scene.cell, BENT).line("arm", np.array([0.0, 0.0, 1.0]), "upwards", longest=0.1)
     assert line is not None
     path = RowsPath(line.lengths, line.q)

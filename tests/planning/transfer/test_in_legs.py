@@ -4,7 +4,7 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from builders.transfer_cells import gantry, retimer_of, scene_of
+from builders.transfer_cells import gantry, scene_of
 
 from cellplan.certify.certify import certify
 from cellplan.geometry.arrays import Array
@@ -13,6 +13,7 @@ from cellplan.planning.transfer.plan import Rung, plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line, straight_rows, straight_steps
+from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.scene.scene import Scene
 
 RADIUS, CLEARANCE, ROUNDED = 0.1, 0.005, 1e-9  # [m]
@@ -25,9 +26,9 @@ def discs(count: int) -> Scene:
 
 def steps_of(ends: list[Array], scene: Scene) -> int:
     """Steps of legs whose robots wait for the slowest one."""
-    bounds = retimer_of(scene).bounds
+    bounds = transfer_retimer(scene).bounds
     assert np.ptp(bounds.velocity) == np.ptp(bounds.acceleration) == 0.0  # so a stacked move is as long as its longest
-    return int(straight_steps(np.diff(ends, axis=0), bounds, STEP).sum())
+    return int(straight_steps(np.array(ends[:-1]), np.array(ends[1:]), bounds, STEP).sum())
 
 
 def fastest_by_enumeration(scene: Scene, start: Array, goal: Array) -> int | None:
@@ -48,7 +49,7 @@ def test_no_choice_of_legs_is_faster(seed: int) -> None:
     places = np.array([(x, y) for x in (-0.6, 0.0, 0.6) for y in (-0.5, 0.0, 0.5)])
     start, goal = (places[rng.permutation(9)[:3]].ravel() for _ in range(2))
 
-    ends = legs_of(TransferQuery.of(scene, start, goal, seed=0), retimer_of(scene), Tried())
+    ends = legs_of(TransferQuery.of(scene, start, goal, seed=0), transfer_retimer(scene), Tried())
 
     best = fastest_by_enumeration(scene, start, goal)
     assert (steps_of(ends, scene) if ends else None) == best
@@ -59,9 +60,9 @@ def test_a_disc_that_is_in_nobodys_way_waits_for_nobody() -> None:
     start = np.array([-0.5, 0.0, 0.0, -0.5, -0.8, -0.8])
     goal = np.array([0.5, 0.0, 0.0, 0.5, 0.2, -0.8])
 
-    planned = plan_transfer(TransferQuery.of(scene, start, goal, seed=0), retimer=retimer_of(scene))
+    planned = plan_transfer(TransferQuery.of(scene, start, goal, seed=0), retimer=transfer_retimer(scene))
 
-    alone = len(straight_rows(start, np.append(goal[:2], start[2:]), retimer_of(scene))) - 1
+    alone = len(straight_rows(start, np.append(goal[:2], start[2:]), transfer_retimer(scene))) - 1
     assert planned.rungs == dict.fromkeys("abc", Rung.IN_LEGS)
     legs = np.diff(planned.q, axis=0) != 0.0
     assert np.any(legs[:, 4] & (legs[:, 0] | legs[:, 3]))
@@ -79,7 +80,7 @@ def in_the_way() -> tuple[Scene, TransferQuery]:
 def test_a_robot_in_the_way_backs_off_and_goes_on(in_the_way: tuple[Scene, TransferQuery]) -> None:
     scene, query = in_the_way
 
-    planned = plan_transfer(query, retimer=retimer_of(scene))
+    planned = plan_transfer(query, retimer=transfer_retimer(scene))
 
     assert planned.rungs == {"a": Rung.IN_LEGS, "b": Rung.IN_LEGS}
     b = planned.q[:, 3]
@@ -97,5 +98,5 @@ def test_without_a_home_nobody_backs_off(in_the_way: tuple[Scene, TransferQuery]
     homeless = TransferQuery.of(scene, query.start, query.goal, seed=0)
     tried = Tried()
 
-    assert not legs_of(homeless, retimer_of(scene), tried)
+    assert not legs_of(homeless, transfer_retimer(scene), tried)
     assert tried.legs > 0

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.scene_builders import thing
-from builders.transfer_cells import gantry, retimer_of, scene_of
+from builders.transfer_cells import gantry, scene_of
 
 from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
@@ -21,6 +21,7 @@ from cellplan.geometry.transforms import Array, pose
 from cellplan.planning.transfer.best_try import Try, best_try, blocked_try
 from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
+from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.scene.scene import Scene
 
 RADIUS, CLEARANCE = 0.1, 0.005  # [m]
@@ -37,7 +38,9 @@ def wall(name: str, size: tuple[float, float], at: tuple[float, float] = (0.0, 0
 
 
 def transfer(scene: Scene, start: list[float], goal: list[float], seed: int = 0) -> PlannedTransfer:
-    return plan_transfer(TransferQuery.of(scene, np.array(start), np.array(goal), seed=seed), retimer=retimer_of(scene))
+    return plan_transfer(
+        TransferQuery.of(scene, np.array(start), np.array(goal), seed=seed), retimer=transfer_retimer(scene)
+    )
 
 
 def densely(q: Array) -> Array:
@@ -53,7 +56,7 @@ def distance_to_box(centres: Array, size: tuple[float, float]) -> Array:
 
 def assert_at_limits(scene: Scene, transfer: PlannedTransfer) -> None:
     """Rates from row to row, with rest before and after, keep the limits."""
-    bounds, step = retimer_of(scene).bounds, scene.cell.motion.step
+    bounds, step = transfer_retimer(scene).bounds, scene.cell.motion.step
     still = np.zeros((1, transfer.q.shape[1]))
     velocity = np.diff(transfer.q, axis=0) / step
     acceleration = np.diff(np.concatenate([still, velocity, still]), axis=0) / step
@@ -177,7 +180,7 @@ def test_a_search_is_left_by_ctrl_c() -> None:
     with pytest.raises(KeyboardInterrupt):
         plan_transfer(
             TransferQuery.of(scene, np.array([-0.5, 0.0]), np.array([0.5, 0.0]), seed=0),
-            retimer=retimer_of(scene),
+            retimer=transfer_retimer(scene),
             progress=interrupt,
         )
 

@@ -69,12 +69,13 @@ def test_steps_of_many_moves_are_those_of_each_alone_and_grow_with_its_length(je
     bounds = JointLimitsInTime(velocity=rng.uniform(1, 4, 6), acceleration=rng.uniform(3, 20, 6), jerk=np.full(6, jerk))
     moves = rng.normal(size=(40, 6)) * rng.choice([0.01, 0.3, 2.0], (40, 1))
 
-    steps = straight_steps(moves, bounds, STEP)
+    rest = np.zeros(6)
+    steps = straight_steps(rest, moves, bounds, STEP)
 
-    assert steps.tolist() == [int(straight_steps(move, bounds, STEP)) for move in moves]
-    assert np.all(straight_steps(2.0 * moves, bounds, STEP) >= steps)
+    assert steps.tolist() == [int(straight_steps(rest, move, bounds, STEP)) for move in moves]
+    assert np.all(straight_steps(-moves, moves, bounds, STEP) >= steps)
     assert np.all(steps * STEP >= (np.abs(moves) / bounds.velocity).max(axis=1))
-    assert straight_steps(np.zeros((2, 6)), bounds, STEP).tolist() == [0, 0]
+    assert straight_steps(moves, moves, bounds, STEP).tolist() == [0] * 40
 
 
 def test_relocated_blocks_stay_at_their_stations_and_in_order() -> None:

@@ -1,0 +1,61 @@
+"""Speeds in transfer moves, against what ``program.transfer`` allows."""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from cellplan.certify.point_speeds import point_speeds
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell.cell import stacked_positions
+from cellplan.model.motion.motion import Schedule
+from cellplan.model.report.report import Check, JointUse
+from cellplan.model.settings.units import si_or_none
+from cellplan.model.units import MM
+from cellplan.scene.scene import Scene
+
+ROUNDING: Final = 1e-9  # [-] of a speed: times of rows have 12 decimals of a second
+
+
+def check_transfer_speeds(
+    scene: Scene, schedule: Schedule, uses: Sequence[JointUse], q: Mapping[str, Array]
+) -> list[Check]:
+    """The fastest joint and the fastest point of each robot where no task is worked on, as far as they are limited.
+
+    The speed of a point is a bound that holds between the rows too.
+
+    Args:
+        q: Positions by robot in [rad] or [m], shape (N, n).
+    """
+    if schedule.tasks:
+        return []
+    limits, checks = scene.cell.program.transfer, list[Check]()
+    for robot in scene.cell.robots if limits.share < 1.0 else ():
+        shares = {use: use.peak_velocity / use.velocity_limit for use in uses if use.robot == robot.name}
+        fastest = max(shares, key=lambda use: shares[use])
+        what, at_s = f"joint {robot.name}/{fastest.joint} goes", fastest.peak_velocity_at_s
+        value = 100.0 * shares[fastest], "% of its velocity limit"
+        checks.append(_check("transfer_joint_speed", robot.name, what, value, limit=limits.speed_percent, at_s=at_s))
+    stacked, steps = stacked_positions(scene.cell, q), np.diff(schedule.times)
+    for points in point_speeds(scene, si_or_none(limits.tcp_mm_s)):
+        speeds = points.travel(stacked) / steps
+        fastest_step = int(np.argmax(speeds))
+        what, at_s = f"tool tip, flange or held part of {points.robot} may go", float(schedule.times[fastest_step])
+        value = MM * float(speeds[fastest_step]), "mm/s"
+        checks.append(_check("transfer_speed", points.robot, what, value, limit=MM * points.limit, at_s=at_s))
+    return checks
+
+
+def _check(name: str, robot: str, what: str, value: tuple[float, str], *, limit: float, at_s: float) -> Check:
+    """A largest speed, with its unit, against its limit."""
+    speed, unit = value
+    return Check(
+        name=name,
+        subject=robot,
+        passed=speed <= (1.0 + ROUNDING) * limit,
+        value=speed,
+        limit=limit,
+        unit=unit.partition(" ")[0],
+        at_s=at_s,
+        message=f"{what} at {speed:.4g} {unit} in a transfer move at {at_s:.3f} s, allowed {limit:g} {unit}",
+    )
