@@ -22,6 +22,7 @@ class AssignOptions(Options):
         Path | None, option("-o, --output DIR", "Folder (default: outputs/NAME-assign, NAME that of the cell).")
     ] = None
     effort: Annotated[int, option("--effort N", "Work of the solver: 1 quick, 2 usual, 5 very long.", min=1, max=5)] = 2
+    with_view: Annotated[bool, option("--view", "Write the 3-D page of the program too, run/view.html.")] = False
     as_json: AsJson = False
     quiet: Quiet = False
     allow_dirs: AllowDirs = ()
@@ -38,6 +39,7 @@ def assign(options: AssignOptions) -> Result:
     from cellplan.jobs.assign.assign import assign as assigned
     from cellplan.jobs.assign.draft import AssignmentDraft
     from cellplan.jobs.assign.result import assign_lines, write_assignment
+    from cellplan.jobs.view.write import write_view_of_run
 
     draft = AssignmentDraft.load(options.cell, allow_dirs=options.allow_dirs)
     folder = options.output or Path("outputs") / f"{draft.cell.name}-assign"
@@ -45,6 +47,8 @@ def assign(options: AssignOptions) -> Result:
     with progress_listener(quiet=options.quiet) as progress:
         assignment = assigned(draft, effort=options.effort, progress=progress)
         record = write_assignment(assignment, options.cell, folder, progress=progress)
+        if options.with_view:
+            write_view_of_run(folder / "run", assignment.cell, progress=progress)
     status = ExitStatus.PASSED if assignment.passed else ExitStatus.CHECK_FAILED
     about = {"exit": int(status), "folder": str(folder), "report_path": str(folder / "assign.html")}
     lines = [*assign_lines(record), f"cell: {folder / 'best.yaml'}", f"report: {folder / 'assign.html'}"]

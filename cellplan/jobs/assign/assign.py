@@ -5,7 +5,7 @@ modes, and the transfers are certified; the program is then solved as any other.
 again.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Final
@@ -30,12 +30,14 @@ from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.table import ModeSearch, ModeTable
 from cellplan.search.assign.transfers import TransferCertifier
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
+NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most
 LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "collisions")
 
 
@@ -53,6 +55,8 @@ class Assignment(Presented):
             known, as OR-Tools is not installed.
         is_proved: Whether no schedule of the block model is better than the one that was first sequenced.
         greedy: Cycle in [s] of the greedy schedule, scarce tasks first, by the model.
+        alternatives: Other schedules of the first round that are nearly as good by the model, the best one first; they
+            are not certified.
         without: Cycle in [s] by the model without each robot; None where it has to work.
         rounds: Number of programs that were solved.
         counts: Numbers of goals, modes, certificates and refusals.
@@ -66,6 +70,7 @@ class Assignment(Presented):
     bound: float | None
     is_proved: bool
     greedy: float
+    alternatives: tuple[SequencedBlocks, ...]
     without: Mapping[str, float | None]
     rounds: int
     counts: Mapping[str, int]
@@ -117,7 +122,7 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
         solution = _solved(cell, progress)
         if number == 1:
             bound = None if planned.bound is None else planned.bound * instance.step
-            is_proved = planned.is_proved
+            is_proved, others = planned.is_proved, planned.others
         if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
             return Assignment(
                 draft=draft.cell,
@@ -128,6 +133,7 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
                 bound=bound,
                 is_proved=is_proved,
                 greedy=planned.greedy * instance.step,
+                alternatives=alternatives_to(planned.sequenced, others),
                 without={name: search.without(first, name) for name in instance.robots},
                 rounds=number,
                 counts=counts | {"certificates": planned.examined, "refused": planned.refused},
@@ -146,6 +152,7 @@ class _Planned:
     bound: int | None  # [steps]
     is_proved: bool
     greedy: int  # [steps]
+    others: tuple[SequencedBlocks, ...]  # other schedules
     examined: int
     refused: int
 
@@ -214,12 +221,13 @@ class _Search:
             answer = solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=exchanged)
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
         schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
-        best = min((certifier.best(sequencer, schedule) for schedule in schedules), key=lambda it: it.steps)
+        certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
         return _Planned(
-            sequenced=best,
+            sequenced=certified[0],
             bound=answer.bound,
             is_proved=answer.is_proved,
             greedy=nearest,
+            others=(*certified[1:], *map(sequencer.ordered, answer.others)),
             examined=certifier.examined,
             refused=len(sequencer.refusals),
         )
@@ -250,6 +258,21 @@ class _Search:
             start_q=task.start_posture,
             is_spin_free=f"tasks.{goal.name}.spin_deg" not in cell.origin.lines,
         )
+
+
+def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) -> tuple[SequencedBlocks, ...]:
+    """Schedules with other robots or poses of the part, or other tasks together, that take little more time."""
+    different = {_assigned(best): best}
+    for other in sorted(others, key=lambda it: it.steps):
+        if other.steps <= NEARLY * best.steps:
+            different.setdefault(_assigned(other), other)
+    return tuple(different.values())[1:]
+
+
+def _assigned(sequenced: SequencedBlocks) -> tuple[frozenset[frozenset[str]], frozenset[tuple[str, Choice]]]:
+    """What is done together, and by whom at which station, in whatever order."""
+    schedule = sequenced.schedule
+    return frozenset(map(frozenset, schedule.blocks)), frozenset(schedule.chosen.items())
 
 
 def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:

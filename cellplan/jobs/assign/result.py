@@ -1,6 +1,6 @@
 """An assignment as record, text and page: what is shown, and in which order."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,12 +16,14 @@ from cellplan.model.report.report import CAUTION
 from cellplan.report.page.figures import figure
 from cellplan.report.page.kind import ResultKind
 from cellplan.report.page.render import template
-from cellplan.report.plots.palette import ROBOTS
+from cellplan.report.page.time_line import time_line
+from cellplan.report.plots.palette import robot_colours
 from cellplan.report.record.common import Record, as_json, number
 from cellplan.report.record.rows import Tables, columns_of, flat
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import with_verdict
 from cellplan.runs.write_run import versions, write_run
+from cellplan.search.assign.order import SequencedBlocks
 
 SCHEMA: Final = "cellplan.assignment/1"
 HOLDS_FOR: Final = (
@@ -43,6 +45,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         _block(assignment, place, run, begin)
         for place, (run, begin) in enumerate(zip(works, _begins(assignment.solution.runs), strict=True))
     ]
+    waits = _waits(instance.robots, blocks)
     return {
         "schema": SCHEMA,
         "cell": assignment.cell.name,
@@ -54,13 +57,10 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound else None,
         "is_proved": assignment.is_proved,
         "greedy_cycle_s": number(assignment.greedy),
-        "binding": _binding(assignment, blocks),
+        "binding": _binding(assignment, blocks, waits),
         "blocks": blocks,
-        "robots": {
-            name: _use(blocks, name, cycle)
-            | {"cycle_without_s": None if (it := assignment.without[name]) is None else number(it)}
-            for name in instance.robots
-        },
+        "alternatives": [_alternative(assignment, it) for it in assignment.alternatives],
+        "robots": {name: _use(assignment, blocks, waits, name) for name in instance.robots},
         "only_one_robot": {
             task: robots[0]
             for task in instance.tasks
@@ -107,25 +107,52 @@ def _block(assignment: Assignment, place: int, run: Run, begin: float) -> dict[s
     }
 
 
-def _use(blocks: Sequence[Record], robot: str, cycle: float) -> dict[str, Any]:
-    """How long a robot works, and the share of the cycle."""
-    work = sum(block["tasks"][robot]["work_s"] for block in blocks if robot in block["tasks"])
-    tasks = sum(robot in block["tasks"] for block in blocks)
-    return {"tasks": tasks, "work_s": number(work), "use_percent": number(100.0 * work / cycle)}
+def _waits(robots: Sequence[str], blocks: Sequence[Record]) -> dict[str, dict[str, float]]:
+    """How long each robot waits in blocks for the robots whose tasks are the longest there, in [s]."""
+    waits: dict[str, dict[str, float]] = {robot: {} for robot in robots}
+    for block in blocks:
+        length = block["end_s"] - block["begin_s"]
+        longest = max(block["tasks"], key=lambda robot: block["tasks"][robot]["work_s"])
+        for robot, of_robot in waits.items():
+            work = block["tasks"][robot]["work_s"] if robot in block["tasks"] else 0.0
+            if robot != longest and length > work:
+                of_robot[longest] = round(of_robot.get(longest, 0.0) + length - work, 6)
+    return waits
 
 
-def _binding(assignment: Assignment, blocks: Sequence[Record]) -> dict[str, Any]:
+def _alternative(assignment: Assignment, other: SequencedBlocks) -> dict[str, Any]:
+    """Another schedule: its figures, and the tasks that another robot does in it."""
+    chosen = assignment.sequenced.schedule.chosen
+    return {
+        "model_cycle_s": number(other.steps * assignment.instance.step),
+        "blocks": [list(block) for block in other.schedule.blocks],
+        "stations": len({station for station, _ in other.stops}),
+        "other_robots": {task: robot for task, (robot, _) in other.schedule.chosen.items() if robot != chosen[task][0]},
+    }
+
+
+def _use(assignment: Assignment, blocks: Sequence[Record], waits: Mapping[str, Record], robot: str) -> dict[str, Any]:
+    """How long a robot works, and the share of the cycle; for whom it waits, and what the cycle would be without it."""
+    tasks = [block["tasks"][robot] for block in blocks if robot in block["tasks"]]
+    work, without = sum(task["work_s"] for task in tasks), assignment.without[robot]
+    return {
+        "tasks": len(tasks),
+        "work_s": number(work),
+        "use_percent": number(100.0 * work / assignment.cycle),
+        "waits_s": waits[robot],
+        "cycle_without_s": None if without is None else number(without),
+    }
+
+
+def _binding(assignment: Assignment, blocks: Sequence[Record], waits: Mapping[str, Record]) -> dict[str, Any]:
     """What the cycle is made of."""
     work = sum(block["end_s"] - block["begin_s"] for block in blocks)
-    waits = sum(
-        block["end_s"] - block["begin_s"] - task["work_s"] for block in blocks for task in block["tasks"].values()
-    )
-    busiest = max(assignment.instance.robots, key=lambda name: _use(blocks, name, assignment.cycle)["work_s"])
+    busiest = min(waits, key=lambda robot: sum(waits[robot].values()))
     return {
         "busiest_robot": busiest,
         "blocks_s": number(work),
         "transfers_s": number(assignment.cycle - work),
-        "waiting_s": number(waits),
+        "waiting_s": number(sum(time for of_robot in waits.values() for time in of_robot.values())),
     }
 
 
@@ -158,13 +185,26 @@ def assign_lines(record: Record) -> list[str]:
         without = "has tasks that no other robot can do"
         if use["cycle_without_s"] is not None:
             without = f"without it about {use['cycle_without_s']:g} s"
-        lines.append(f"  {name}: {work}; {without}")
+        lines.append(f"  {name}: {work}; {without}{_wait_words(use['waits_s'])}")
     if only:
         lines.append("  done by one robot alone: " + ", ".join(f"{task} ({robot})" for task, robot in only.items()))
     for block in record["blocks"]:
         tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
         lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}")
+    lines += [f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"]]
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]
+
+
+def _wait_words(waits: Record) -> str:
+    """For whom a robot waits in blocks, and how long."""
+    return "; waits " + ", ".join(f"{time:.3g} s for {other}" for other, time in waits.items()) if waits else ""
+
+
+def _alternative_words(other: Record) -> str:
+    """A schedule that is nearly as good."""
+    robots = ", ".join(f"{task} by {robot}" for task, robot in other["other_robots"].items())
+    figures = f"{other['model_cycle_s']:g} s by the model in {len(other['blocks'])} blocks, {other['stations']} poses"
+    return f"{figures}; {robots or 'the same robots'}"
 
 
 def _part_words(record: Record) -> str:
@@ -177,17 +217,23 @@ def _part_words(record: Record) -> str:
 # Page
 
 
-def assign_page(record: Record) -> str:
-    """The page of an assignment."""
-    robots = list(record["robots"])
+def assign_page(record: Record, run: Record, cell: Cell) -> str:
+    """The page of an assignment.
+
+    Args:
+        record: The assignment's.
+        run: The ``report.json`` of its run.
+        cell: The program.
+    """
     return template("jobs/assign/assign.html").render(
         r=record,
         figures=[
             figure("cycle", f"{record['cycle_time_s']:g}", "s", is_bad=record["status"] != "passed"),
             *_bound_figure(record),
         ],
-        bars=_bars(record),
-        colours=dict(zip(robots, ROBOTS * len(robots), strict=False)),
+        several=True,
+        line=time_line(run, cell),
+        colours=robot_colours(cell),
         caution=CAUTION,
     )
 
@@ -197,22 +243,6 @@ def _bound_figure(record: Record) -> list[dict[str, Any]]:
     if record["bound_s"] is None:
         return []
     return [figure("lower bound", f"{record['bound_s']:g}", "s", note=record["bound_holds_for"])]
-
-
-def _bars(record: Record) -> list[tuple[str, list[tuple[float, float, str]]]]:
-    """For each robot, where its bars begin, how long they are in [%] of the cycle, and their tasks."""
-    cycle = record["cycle_time_s"]
-    return [
-        (
-            robot,
-            [
-                (100.0 * block["begin_s"] / cycle, 100.0 * it["work_s"] / cycle, it["task"])
-                for block in record["blocks"]
-                if (it := block["tasks"].get(robot))
-            ],
-        )
-        for robot in record["robots"]
-    ]
 
 
 # Tables and files
@@ -253,11 +283,12 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
         files = result_files(assignment.cell, given, folder, head=head)
         for name, content in files.items():
             target.write_bytes(name, content)
-        target.write_text("assign.html", assign_page(record))
+        best = load_cell(target.within(BEST), allow_dirs=allowed)
+        solution = read_from(assignment.solution, best, folder / BEST)
+        run = write_run(solution, target.within("run"), progress=progress)
+        target.write_text("assign.html", assign_page(record, run, solution.cell))
         record["files"] = {name: sha256 for name, (_, sha256) in target.written.items()}
         target.write_text("assign.json", as_json(record))
-        best = load_cell(target.within(BEST), allow_dirs=allowed)
-        write_run(read_from(assignment.solution, best, folder / BEST), target.within("run"), progress=progress)
     return record
 
 

@@ -29,6 +29,7 @@ class BlockAnswer:
     schedule: BlockSchedule | None  # None where none is found
     bound: int | None  # [steps] no schedule of the instance has a shorter cycle, by the model; None without a solver
     is_proved: bool  # whether none is better by the model
+    others: tuple[BlockSchedule, ...] = ()  # nearly as good by the model, the best one first
 
 
 def solve_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSchedule | None = None) -> BlockAnswer:
@@ -41,8 +42,13 @@ def solve_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSc
     """
     model = _BlockModel(instance, least)
     solved = Solved(model.model, effort, () if hint is None else model.hints(hint))
-    schedule = model.schedule(solved) if solved.is_solved else None
-    return BlockAnswer(schedule=schedule, bound=solved.bound, is_proved=solved.is_proved)
+    schedules = tuple(model.schedule(solved, answer) for answer in range(len(solved.answers)))
+    return BlockAnswer(
+        schedule=next(iter(schedules), None),
+        bound=solved.bound,
+        is_proved=solved.is_proved,
+        others=schedules[1:],
+    )
 
 
 class _BlockModel:
@@ -75,11 +81,11 @@ class _BlockModel:
         self.model.add(objective >= cost)
         self.model.minimize(objective)
 
-    def schedule(self, solved: Solved) -> BlockSchedule:
+    def schedule(self, solved: Solved, answer: int) -> BlockSchedule:
         """The blocks of an answer."""
-        chosen: dict[str, Choice] = {task: (robot, at) for task, robot, at in solved.true(self.does)}
-        blocks = {leader: [leader] for leader, _ in solved.true(self.leads)}
-        for task, leader in solved.true(self.joins):
+        chosen: dict[str, Choice] = {task: (robot, at) for task, robot, at in solved.true(self.does, answer)}
+        blocks = {leader: [leader] for leader, _ in solved.true(self.leads, answer)}
+        for task, leader in solved.true(self.joins, answer):
             blocks[leader].append(task)
         ordered = in_order(list(map(tuple, blocks.values())), self.instance.goals)
         return BlockSchedule(blocks=ordered or (), chosen=chosen)

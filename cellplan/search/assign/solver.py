@@ -5,6 +5,7 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
+POOL: Final = 4  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
 
 
@@ -21,7 +22,12 @@ def new_model() -> Any:
 
 
 class Solved:
-    """The best answer of a model that was found, and what is proved of all others."""
+    """The best answer of a model that was found, and what is proved of all others.
+
+    Attributes:
+        answers: Values of the variables in the best answer, then in others that are nearly as good; none where none
+            is known.
+    """
 
     def __init__(self, model: Any, effort: float, hints: Sequence[tuple[Any, bool]] = ()) -> None:
         """Solve a model.
@@ -38,8 +44,12 @@ class Solved:
         parameters = self._solver.parameters
         parameters.num_workers, parameters.interleave_search, parameters.random_seed = WORKERS, True, 1
         parameters.max_deterministic_time = effort
+        parameters.fill_additional_solutions_in_response, parameters.solution_pool_size = True, POOL
         status = self._solver.solve(model)
-        self.is_solved = status in (cp_model.OPTIMAL, cp_model.FEASIBLE)
+        response = self._solver.response_proto
+        pool = dict.fromkeys(tuple(it.values) for it in response.additional_solutions)
+        best = tuple(response.solution)
+        self.answers = [best, *(it for it in pool if it != best)] if best else []
         self.is_proved = status == cp_model.OPTIMAL
 
     @property
@@ -53,6 +63,7 @@ class Solved:
         bound = self._solver.best_objective_bound - ROUNDING
         return int(bound) + (bound > int(bound))
 
-    def true(self, literals: Mapping[Any, Any]) -> list[Any]:
-        """Keys of the literals that are true."""
-        return [key for key, literal in literals.items() if self._solver.value(literal)]
+    def true(self, literals: Mapping[Any, Any], answer: int = 0) -> list[Any]:
+        """Keys of the literals that are true in an answer."""
+        values = self.answers[answer]
+        return [key for key, literal in literals.items() if values[literal.index]]

@@ -53,6 +53,31 @@ def test_the_run_is_the_one_that_solving_the_written_cell_gives(assignment: Assi
         write_assignment(assignment, OPEN, tmp_path / "out")
 
 
+def test_every_robot_works_or_waits_for_another_in_every_block(assignment: Assignment) -> None:
+    record = assign_record(assignment)
+
+    for robot, use in record["robots"].items():
+        waits = use["waits_s"]
+        assert use["work_s"] + sum(waits.values()) == pytest.approx(record["binding"]["blocks_s"])
+        assert robot not in waits
+    lengths = [
+        sum(block["end_s"] - block["begin_s"] for block in record["blocks"] if block["tasks"].keys() == {name})
+        for name in record["robots"]
+    ]
+    assert record["binding"]["waiting_s"] >= sum(lengths) > 0.0
+
+
+def test_alternatives_are_other_schedules_that_take_little_longer(assignment: Assignment) -> None:
+    best = assignment.sequenced
+    schedules = [best.schedule, *(it.schedule for it in assignment.alternatives)]
+
+    for other in assignment.alternatives:
+        refuse_impossible(assignment.instance, other.schedule)
+        assert (assignment.bound or 0.0) <= other.steps * assignment.instance.step <= 1.05 * assignment.model_cycle
+    chosen = {(frozenset(map(frozenset, it.blocks)), frozenset(it.chosen.items())) for it in schedules}
+    assert len(chosen) == len(schedules) > 1
+
+
 def test_what_a_task_states_is_kept(assignment: Assignment, tmp_path: Path) -> None:
     """One seam at its given pose of the part and spin, one of a given robot in its given start."""
     top, edge = (assignment.cell.task(name) for name in ("top_2", "edge_1"))
