@@ -6,6 +6,7 @@ from pathlib import Path, PurePath
 
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
+from cellplan.checks.tools.task_rules import with_task_rules
 from cellplan.checks.verify import completed, run_clearance, verify_motion, with_clocks
 from cellplan.files.run.clock_table import render_clock
 from cellplan.files.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header
@@ -158,6 +159,7 @@ def certified(
         report = with_clocks(report, run.scene, run.schedule, is_reported=with_figures, progress=progress)
         phases.append(JudgedPhase(scene=run.scene, schedule=run.schedule, report=report))
     reports = with_joins(solution.cell, with_phase_ends(solution.cell, phases))
+    reports = with_task_rules(solution.cell, phases, reports)
     program = with_verdict(solution.cell, solution.program, [run.phase for run in solution.runs], reports)
     runs = zip(solution.runs, reports, strict=True)
     return replace(solution, runs=tuple(replace(run, report=report, program=program) for run, report in runs))

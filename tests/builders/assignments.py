@@ -7,19 +7,23 @@ import numpy as np
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.search.assign.goals import Stations, TaskGoal
-from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.instance import Instance, with_rules
+from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.table import TaskMode
 
 STEP = 0.02  # [s]
 ROBOTS = ("a", "b")
 
 
-def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, chained: bool = False) -> Instance:
+def small_instance(
+    seed: int, count: int, *, stations: int = 2, modes: int = 1, chained: bool = False, rules: TaskRules | None = None
+) -> Instance:
     """Tasks at chance places with chance conflicts.
 
     Args:
         modes: Number of modes of every robot for every task.
         chained: Whether the third task must follow the first, and the second the third.
+        rules: What holds between the tasks beside that.
     """
     rng = np.random.default_rng(seed)
     names = [f"t{k}" for k in range(count)]
@@ -48,7 +52,7 @@ def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, 
     )
     limits = JointLimitsInTime(velocity=np.full(2, 2.7), acceleration=np.full(2, 10.0), jerk=np.full(2, np.inf))
     slow = replace(limits, velocity=np.full(2, 1.4), acceleration=np.full(2, 5.0))
-    return Instance(
+    instance = Instance(
         goals=goals,
         robots=ROBOTS,
         modes=modes_by_key,
@@ -61,6 +65,7 @@ def small_instance(seed: int, count: int, *, stations: int = 2, modes: int = 1, 
         bounds={"a": limits, "b": limits, "table": slow},
         step=STEP,
     )
+    return with_rules(instance, rules or TaskRules())
 
 
 def _mode(task: str, robot: str, station: int, rng: np.random.Generator) -> TaskMode:

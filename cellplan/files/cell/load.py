@@ -33,6 +33,7 @@ from cellplan.files.cell.rules.path_rules import path_findings
 from cellplan.files.cell.rules.program_rules import posture_findings, program_findings, with_stand_offs
 from cellplan.files.cell.rules.rules import Targets, rule_findings, target_findings
 from cellplan.files.cell.rules.solver_rules import solver_findings
+from cellplan.files.cell.rules.task_rules import task_rule_findings
 from cellplan.files.cell.user_folders import user_folders
 from cellplan.files.input.files import AllowedFolders
 from cellplan.files.input.findings import Finding, KeyPath, did_you_mean, key_text, raise_findings, shown
@@ -74,6 +75,7 @@ class CellFile:
     folder: Path  # folder that the names of files start from
     allow_dirs: tuple[Path, ...]  # further folders that these files may lie in
     parts: Mapping[str, object] = field(default_factory=dict)  # of the cell as built from it, by attribute
+    robots: Mapping[str, Sequence[str]] = field(default_factory=dict)  # that may do a task which is open to several
 
     @property
     def written(self) -> Mapping[str, Any]:
@@ -129,8 +131,9 @@ def load_open_cell(path: Path | str, *, allow_dirs: Sequence[Path] = ()) -> tupl
     path = Path(path)
     document = read_yaml(path, file=str(path))
     allowed, first = tuple(Path(folder) for folder in allow_dirs), with_first_robots(document)
-    source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed)
-    return _read(source, unknown_robot_findings(document)), open_tasks(document.root)
+    robots = open_tasks(document.root)
+    source = CellFile(document=first, name=path.name, folder=path.parent, allow_dirs=allowed, robots=robots)
+    return _read(source, unknown_robot_findings(document)), robots
 
 
 def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
@@ -147,6 +150,7 @@ def _read(source: CellFile, known: Iterable[Finding] = ()) -> Cell:
     findings += program_findings(valid, document)
     valid = with_stand_offs(valid)
     findings += rule_findings(valid, document)
+    findings += task_rule_findings(valid, document, source.robots)
     allowed = (*source.allow_dirs, *user_folders(source.folder))
     sources = Sources(document, AllowedFolders(folder=source.folder, allowed=allowed))
     sources.inputs[source.name] = document.digest

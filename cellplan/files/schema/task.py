@@ -228,6 +228,9 @@ class TaskEntry(Entry):
     weld_position: WeldPositionEntry | None = Field(
         default=None, description="How the weld lies to gravity along the path; anyhow when absent."
     )
+    tack: bool = Field(
+        default=False, description="Whether it is a tack, which program.tacks_first has before all seams."
+    )
     off_part: tuple[Literal["run_in", "run_out", "cut"], ...] = Field(
         default=(),
         description="Stretches of the path on which the tip need not keep that distance: its begin, its end, and where "

@@ -28,9 +28,10 @@ from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer
+from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer, with_rules
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.schedule import Choice
+from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.table import ModeSearch, ModeTable
 from cellplan.search.assign.transfers import TransferCertifier
@@ -173,7 +174,8 @@ class _Search:
         """
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
-        goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
+        before = tasks_before(cell)
+        goals = [replace(self._as_given(it), after=before[it.name]) for it in task_goals(cell, draft.robots)]
         table = ModeSearch(
             cell=cell,
             goals=goals,
@@ -184,7 +186,8 @@ class _Search:
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
-        used, modes = choose_stations(table, goals, clearance, most=settings.most_stations)
+        rules = TaskRules.of(cell)
+        used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
         refuse_impossible_tasks(draft, goals, table, {task for task, _, _ in modes})
         progress("conflicts", 0.0)
         columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
@@ -200,6 +203,7 @@ class _Search:
             bounds={name: bounds.of(at) for name, at in columns.items()},
             step=cell.motion.step,
         )
+        instance = with_rules(instance, rules)
         self.counts = {
             "tasks": len(goals),
             "poses": len(stations.q),
@@ -237,7 +241,10 @@ class _Search:
         others = instance.without(robot)
         if others.tasks != instance.tasks:
             return None
-        schedule = improved(others, greedy_schedule(others))
+        try:
+            schedule = improved(others, greedy_schedule(others))
+        except NoSolutionError:  # the rules between tasks
+            return None
         if is_installed():
             least = least_transfer(others)
             schedule = solve_blocks(others, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule

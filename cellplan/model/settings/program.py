@@ -1,11 +1,13 @@
 """Programs from home to home: cycles, marks, and where the part lies before and after."""
 
-from typing import Annotated, ClassVar, Final
+from collections.abc import Collection, Iterable, Iterator
+from itertools import pairwise, zip_longest
+from typing import Annotated, ClassVar, Final, Self
 
-from pydantic import Field, Tag
+from pydantic import Field, Tag, model_validator
 
 from cellplan.geometry.transforms import Array
-from cellplan.model.settings.entry import Entry, Name, PoseEntry, SlidingSpeed, by_kind
+from cellplan.model.settings.entry import Entry, Name, PoseEntry, SlidingSpeed, by_kind, rule
 from cellplan.model.settings.task import FARTHEST_STAND_OFF_MM, LONGEST_S, MOST_CYCLES
 from cellplan.model.settings.units import Mm, Within
 
@@ -101,6 +103,29 @@ class TransferEntry(Entry):
         """The share of the speed that joints have."""
         return self.speed_percent / 100.0
 
+MOST_GROUPS: Final = 200
+GROUP_WORDS: Final = "the name of a task or a list of names"
+TaskGroups = Annotated[
+    tuple[
+        Annotated[
+            Annotated[Name, Tag(f"<{GROUP_WORDS}>")]
+            | Annotated[tuple[Name, ...], Field(min_length=2, max_length=MOST_GROUPS), Tag("<list>")],
+            by_kind(GROUP_WORDS, list=tuple),
+        ],
+        ...,
+    ],
+    Field(max_length=MOST_GROUPS),
+]
+
+
+class OrderEntry(Entry):
+    """An order of tasks of any robots."""
+
+    alternate: Annotated[tuple[Annotated[tuple[Name, ...], Field(min_length=1)], ...], Field(min_length=2)] = Field(
+        description="Lists of tasks that take turns: the first of each list, then the second of each, and so on. A "
+        "task begins when the one before it is done.",
+    )
+
 
 class ProgramEntry(Entry):
     """A program from home to home: transfer moves lead from the homes to the tasks, between them, and back."""
@@ -125,11 +150,52 @@ class ProgramEntry(Entry):
     )
 
     transfer: TransferEntry = Field(default=TransferEntry(), description="How fast transfer moves are at most.")
+    same_robot: TaskGroups = Field(
+        default=(), description="Tasks that one robot does: a list of them, or several such lists."
+    )
+    together: TaskGroups = Field(
+        default=(),
+        description="Tasks whose tools begin their paths at the same time, both sides of a web at once for example: a "
+        "list of them, or several such lists.",
+    )
+    order: OrderEntry | None = Field(default=None, description="Tasks that take turns; any order when absent.")
+    tacks_first: bool = Field(
+        default=False, description="Whether all tasks with tack: true are done before any other task begins."
+    )
+
+    @model_validator(mode="after")
+    def _has_groups(self) -> Self:
+        """Tasks or lists of tasks, at least two in each."""
+        for key, given in (("same_robot", self.same_robot), ("together", self.together)):
+            if len({isinstance(it, str) for it in given}) > 1:
+                raise rule("expected either tasks or lists of tasks, got both", key)
+            if len(given) == 1 and isinstance(given[0], str):
+                raise rule("expected at least two tasks, got one", key)
+        return self
+
+    def in_order(self, tacks: Collection[str], tasks: Iterable[str]) -> Iterator[tuple[str, str, str]]:
+        """Tasks of which the first is done before the second begins, with the key that says so.
+
+        Args:
+            tacks: Names of the tasks that are tacks.
+            tasks: Names of all tasks.
+        """
+        turns = [it for names in zip_longest(*(self.order.alternate if self.order else ())) for it in names if it]
+        yield from ((first, second, "order.alternate") for first, second in pairwise(turns))
+        if self.tacks_first:
+            seams = [name for name in tasks if name not in tacks]
+            yield from ((tack, seam, "tacks_first") for tack in tacks for seam in seams)
 
     @property
     def all_marks(self) -> tuple[MarkEntry, ...]:
         """The marks, those given by name only with their defaults."""
         return tuple(mark if isinstance(mark, MarkEntry) else MarkEntry(name=mark) for mark in self.marks)
+
+
+def groups_of(given: TaskGroups) -> tuple[tuple[str, ...], ...]:
+    """The lists of tasks of a rule that may be given as one list."""
+    names = tuple(it for it in given if isinstance(it, str))
+    return (names,) if names else tuple(it for it in given if not isinstance(it, str))
 
 
 class NoTransfers(ProgramEntry):

@@ -221,6 +221,7 @@ class Task:
         off_part: Stretches of the path on which the tip may be elsewhere.
         torch: How the tool is held to gravity along the path; None for anyhow.
         weld_position: How the weld lies to gravity along the path; None for anyhow.
+        is_tack: Whether it is a tack, not a seam.
         after: Names of the tasks of any robots that must be done before it begins.
         start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
             if the task is its first one, and for one that is to be searched otherwise.
@@ -256,6 +257,7 @@ class Task:
     off_part: tuple[OffPart, ...] = ()
     torch: TorchEntry | None = None
     weld_position: WeldPositionEntry | None = None
+    is_tack: bool = False
     after: tuple[str, ...] = ()
     spin: float = 0.0
     start_posture: Array | None = None

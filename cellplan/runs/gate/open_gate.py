@@ -9,6 +9,7 @@ from typing import Final
 from cellplan.cache import without_cache
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
+from cellplan.checks.tools.task_rules import with_task_rules
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.files.input.findings import listed, shown
@@ -79,6 +80,7 @@ def open_gate(
         for scene, motion in zip(scenes, motions, strict=True)
     ]
     reports = with_joins(source.cell, with_phase_ends(source.cell, phases))
+    reports = with_task_rules(source.cell, phases, reports)
     motions = tuple(replace(motion, report=report) for motion, report in zip(motions, reports, strict=True))
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)

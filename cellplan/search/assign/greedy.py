@@ -1,18 +1,28 @@
 """Schedules without a solver: station by station, the scarcest tasks first, then exchanges while they save time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations, product
 
+from cellplan.errors import NoSolutionError
 from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 
 
 def greedy_schedule(instance: Instance) -> BlockSchedule:
-    """The stations at which most tasks are left first; at each, every robot takes a task that few others can do."""
-    left = set(instance.tasks)
+    """The stations at which most tasks are left first; at each, every robot takes a task that few others can do.
+
+    Raises:
+        NoSolutionError: No choice of robots keeps the rules between tasks.
+    """
+    instance, left = _settled(instance), set(instance.tasks)
     blocks, chosen = list[tuple[str, ...]](), dict[str, Choice]()
     while left:
         station = max(instance.used, key=lambda it: (len(_here(instance, left, it)), -it))
+        if not _here(instance, left, station):
+            raise NoSolutionError(
+                f"{instance.rules.where}: no order keeps what tasks come after: {', '.join(sorted(left))}"
+            )
         while here := _here(instance, left, station):
             block = _block(instance, station, here)
             chosen |= {task: (robot, station) for robot, task in block.items()}
@@ -26,20 +36,68 @@ def improved(instance: Instance, schedule: BlockSchedule) -> BlockSchedule:
     best, shortest = schedule, schedule.work(instance)
     while True:
         shorter = (it for it in _neighbours(instance, best) if it.work(instance) < shortest)
-        ordered = ((it, in_order(it.blocks, instance.goals)) for it in shorter)
+        allowed = (it for it in shorter if instance.rules.hold_for(it.blocks, it.chosen))
+        ordered = ((it, in_order(it.blocks, instance.goals)) for it in allowed)
         better = next((replace(it, blocks=blocks) for it, blocks in ordered if blocks is not None), None)
         if better is None:
             return best
         best, shortest = better, better.work(instance)
 
 
+def _settled(instance: Instance) -> Instance:
+    """The instance in which tasks with rules have one robot only, and those that begin together one station."""
+    rules = instance.rules
+    alone = dict.fromkeys(it for group in rules.same_robot for it in group)
+    for it in (it for group in rules.together for it in group):
+        alone.pop(it, None)
+    chosen = _choice(instance, [*rules.together, *((it,) for it in alone)], {})
+    if chosen is None:
+        groups = "; ".join(", ".join(group) for group in (*rules.same_robot, *rules.together))
+        raise NoSolutionError(
+            f"{rules.where}: no choice of robots and poses of the part keeps same_robot and together of {groups}"
+        )
+
+    def is_chosen(task: str, robot: str, at: int) -> bool:
+        return task not in chosen or chosen[task] == (robot, at) or (task in alone and chosen[task][0] == robot)
+
+    return replace(instance, modes={key: modes for key, modes in instance.modes.items() if is_chosen(*key)})
+
+
+def _choice(
+    instance: Instance, units: Sequence[Sequence[str]], chosen: Mapping[str, Choice]
+) -> Mapping[str, Choice] | None:
+    """Robots and stations of units of tasks, the robots with least work first; None where none keep the rules."""
+    if not units:
+        return chosen
+
+    def most_work(trial: Mapping[str, Choice]) -> int:
+        return max(sum(instance.steps(task) for task, (by, _) in trial.items() if by == it) for it in instance.robots)
+
+    choices = product(*(instance.options.get(task, ()) for task in units[0]))
+    trials = [{**chosen, **dict(zip(units[0], it, strict=True))} for it in choices if _is_block(instance, units[0], it)]
+    for trial in sorted(trials, key=most_work):
+        robots = ({trial[task][0] for task in group if task in trial} for group in instance.rules.same_robot)
+        if all(len(it) < 2 for it in robots) and (whole := _choice(instance, units[1:], trial)) is not None:
+            return whole
+    return None
+
+
+def _is_block(instance: Instance, tasks: Sequence[str], choices: Sequence[Choice]) -> bool:
+    """Whether robots can do tasks together."""
+    keys = [(task, *choice) for task, choice in zip(tasks, choices, strict=True)]
+    return all(
+        a[1] != b[1] and a[2] == b[2] and frozenset((a, b)) not in instance.conflicts for a, b in combinations(keys, 2)
+    )
+
+
 def _here(instance: Instance, left: set[str], station: int) -> set[str]:
-    """Tasks that are left, can be done at a station and come after no other one that is left."""
-    return {
+    """Tasks that are left, can be done at a station and come after no other one that is left; whole groups only."""
+    here = {
         task
         for task in left
         if left.isdisjoint(instance.goals[task].after) and any(at == station for _, at in instance.options[task])
     }
+    return here - {task for group in instance.rules.together if not here.issuperset(group) for task in group}
 
 
 def _able(instance: Instance, task: str, station: int) -> list[str]:
@@ -48,8 +106,10 @@ def _able(instance: Instance, task: str, station: int) -> list[str]:
 
 
 def _block(instance: Instance, station: int, here: set[str]) -> dict[str, str]:
-    """One block: a task for each robot, the ones with fewest tasks first."""
-    block: dict[str, str] = {}
+    """One block: tasks that begin together, then a task for each robot, the ones with fewest tasks first."""
+    grouped = [group for group in instance.rules.together if here.issuperset(group)]
+    block = {_able(instance, task, station)[0]: task for group in grouped[:1] for task in group}
+    here = here - {task for group in grouped for task in group}
     count = {robot: sum(robot in _able(instance, task, station) for task in here) for robot in instance.robots}
     for robot in sorted(instance.robots, key=lambda name: (count[name], name)):
         free = [

@@ -13,6 +13,7 @@ from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import Stations, TaskGoal
+from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.table import Key, ModeTable, TaskMode
 
 MOST_MODES: Final = 2  # free modes of one robot for one task at one station
@@ -54,6 +55,7 @@ class Instance:
     homes: Mapping[str, Array]  # configurations in [rad] or [m] by robot, the holder's among them, shape (n,) each
     bounds: Mapping[str, JointLimitsInTime]  # limits of the joints by robot, likewise
     step: float  # time between two rows in [s]
+    rules: TaskRules = TaskRules()  # noqa: RUF009 - frozen
 
     @cached_property
     def tasks(self) -> tuple[str, ...]:
@@ -102,6 +104,15 @@ class Instance:
         return int(self.transfer_steps(holder, a, b))
 
 
+def with_rules(instance: Instance, rules: TaskRules) -> Instance:
+    """The same with rules between tasks; tasks of one robot keep the modes of robots that can do all of them."""
+    modes = dict(instance.modes)
+    for group in rules.same_robot:
+        able = set.intersection(*({by for name, by, _ in modes if name == task} for task in group))
+        modes = {key: it for key, it in modes.items() if key[0] not in group or key[1] in able}
+    return replace(instance, modes=modes, rules=rules)
+
+
 def least_transfer(instance: Instance) -> int:
     """Steps that every transfer to a block takes at least: from task to task, from home, or of the part."""
     shortest = [
@@ -123,7 +134,12 @@ def least_transfer(instance: Instance) -> int:
 
 
 def choose_stations(
-    table: ModeTable, goals: Sequence[TaskGoal], clearance: AssignmentClearance, *, most: int
+    table: ModeTable,
+    goals: Sequence[TaskGoal],
+    clearance: AssignmentClearance,
+    *,
+    most: int,
+    rules: TaskRules = TaskRules(),  # noqa: B008 - frozen
 ) -> tuple[tuple[int, ...], dict[Key, tuple[TaskMode, ...]]]:
     """Stations by greedy cover, with the free modes at them.
 
@@ -132,7 +148,12 @@ def choose_stations(
 
     Args:
         most: Number of stations at most.
+        rules: Groups of tasks that must be possible too.
     """
+
+    def meet(first: Key, second: Key) -> bool:
+        return first in modes and second in modes and clearance.meet(modes[first][0], modes[second][0])
+
     at_station: dict[int, list[Key]] = {}
     for key in table.modes:
         at_station.setdefault(key[2], []).append(key)
@@ -141,6 +162,9 @@ def choose_stations(
     used, modes = list[int](), dict[Key, tuple[TaskMode, ...]]()
     while candidates and len(used) < most:
         worth = {station: _worth(at_station[station], able) for station in sorted(candidates)}
+        covered = rules.covered(modes, meet)
+        for station in worth if covered < rules.grouped else ():
+            worth[station] += rules.covered([*modes, *at_station[station]], meet) - covered
         best = max(worth, key=lambda station: (worth[station], -station))
         if worth[best] < WORTHLESS * len(goals) and all(able.values()):
             break

@@ -50,6 +50,8 @@ def refuse_impossible(instance: Instance, schedule: BlockSchedule) -> None:
         raise ValueError("expected every task after those that it must follow")
     if sorted(done) != sorted(instance.tasks):
         raise ValueError(f"expected every task once, got {done}")
+    if not instance.rules.hold_for(schedule.blocks, schedule.chosen):
+        raise ValueError("expected one robot for tasks of the same robot, and one block for those together")
     for block in schedule.blocks:
         robots = [schedule.chosen[task][0] for task in block]
         if len(set(robots)) < len(robots) or len({schedule.chosen[task][1] for task in block}) > 1:

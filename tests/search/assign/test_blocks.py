@@ -6,11 +6,13 @@ from itertools import pairwise, permutations, product
 import pytest
 from builders.assignments import small_instance
 
+from cellplan.errors import NoSolutionError
 from cellplan.search.assign.blocks import solve_blocks
 from cellplan.search.assign.cliques import cliques_at, excludes
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.order import Sequencer
+from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.schedule import BlockSchedule, in_order, refuse_impossible
 
 LEAST = 5  # [steps] of a transfer
@@ -47,8 +49,10 @@ def model_cycle(instance: Instance, schedule: BlockSchedule) -> int:
     return schedule.work(instance) + LEAST * len(schedule.blocks) + min(tours)
 
 
-def best_by_enumeration(instance: Instance) -> int:
+def best_by_enumeration(instance: Instance) -> int | None:
     best = 10**9
+    if any(task not in instance.options for task in instance.goals):
+        return None
     for choices in product(*(instance.options[task] for task in instance.tasks)):
         chosen = dict(zip(instance.tasks, choices, strict=True))
         for split in partitions(instance.tasks):
@@ -56,7 +60,7 @@ def best_by_enumeration(instance: Instance) -> int:
             schedule = None if blocks is None else BlockSchedule(blocks=blocks, chosen=chosen)
             if schedule is not None and is_schedule(instance, schedule):
                 best = min(best, model_cycle(instance, schedule))
-    return best
+    return best if best < 10**9 else None
 
 
 @pytest.mark.parametrize(("seed", "chained"), [(0, False), (1, False), (2, True), (3, True)])
@@ -70,6 +74,58 @@ def test_the_model_is_as_good_as_enumeration(seed: int, chained: bool) -> None:
     refuse_impossible(instance, answer.schedule)
     assert answer.is_proved
     assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
+
+
+RULES = {
+    "same robot": TaskRules(same_robot=(("t0", "t1", "t3"),)),
+    "together": TaskRules(together=(("t1", "t3"),)),
+    "both": TaskRules(same_robot=(("t0", "t3"),), together=(("t2", "t3"),)),
+}
+
+
+@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
+def test_with_rules_the_model_is_as_good_as_enumeration_and_some_rules_bind(rules: TaskRules) -> None:
+    """An instance that no schedule keeps is found to be one by the model, by enumeration and without a solver."""
+    pytest.importorskip("ortools")
+    binding = 0
+    for seed in range(8):
+        instance = small_instance(seed, 4, chained=seed % 4 == 3, rules=rules)
+
+        answer, best = solve_blocks(instance, least=LEAST, effort=10.0), best_by_enumeration(instance)
+
+        if best is None:
+            assert answer.schedule is None
+            with pytest.raises(NoSolutionError, match="no choice of robots"):
+                greedy_schedule(instance)
+            continue
+        assert answer.schedule is not None
+        refuse_impossible(instance, answer.schedule)
+        assert answer.is_proved
+        assert answer.bound == model_cycle(instance, answer.schedule) == best
+        free = best_by_enumeration(small_instance(seed, 4, chained=seed % 4 == 3))
+        assert free is not None
+        assert free <= best
+        binding += free < best
+        refuse_impossible(instance, greedy_schedule(instance))
+    assert binding > 1
+
+
+@pytest.mark.parametrize("rules", RULES.values(), ids=RULES)
+@pytest.mark.parametrize("seed", range(8))
+def test_exchanges_keep_rules(rules: TaskRules, seed: int) -> None:
+    instance = small_instance(seed, 9, stations=3, chained=seed % 2 == 0, rules=rules)
+    if any(task not in instance.options for group in (*rules.same_robot, *rules.together) for task in group):
+        return
+
+    try:
+        greedy = greedy_schedule(instance)
+    except NoSolutionError:
+        return
+    exchanged = improved(instance, greedy)
+
+    refuse_impossible(instance, greedy)
+    refuse_impossible(instance, exchanged)
+    assert exchanged.work(instance) <= greedy.work(instance)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -121,8 +121,7 @@ def build_task(
 ) -> Task:
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
-    tool_axis, tool_x = tool_directions(entry)
-    process = entry.process
+    (tool_axis, tool_x), process = tool_directions(entry), entry.process
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     corners = entry.corners or motion.corners
     return Task(
@@ -155,6 +154,7 @@ def build_task(
         off_part=tuple(OffPart(name) for name in entry.off_part),
         torch=entry.torch,
         weld_position=entry.weld_position,
+        is_tack=entry.tack,
         after=entry.preceding,
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),

@@ -132,8 +132,8 @@ def changes(*, program: str = "{}", order: str = "", second: str = "", motion: s
         ({"program": "{detach: {}}"}, "c:24: program.detach.at: missing, expected pose of the part frame in the world"),
         (
             {"program": "[]"},
-            "c:24: program: expected a mapping with keys out of cycles, marks, attach, detach, transfer, "
-            "got a list of 0",
+            "c:24: program: expected a mapping with keys out of cycles, marks, attach, detach, transfer, same_robot, "
+            "together, order, tacks_first, got a list of 0",
         ),
     ],
 )

@@ -1,0 +1,75 @@
+"""Rules between tasks, kept and broken by a known amount, of programs that were written by hand."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cellplan.files.cell.load import load_cell
+from cellplan.model.report.report import Check
+from cellplan.model.settings.program import OrderEntry, ProgramEntry
+from cellplan.runs.solution import Solution
+from cellplan.runs.solve import solve
+
+FIXED = Path(__file__).resolve().parents[3] / "cells" / "fixed_part.yaml"
+VALUES: dict[str, object] = {
+    "motion": {"mode": "part_at_rest", "step_s": 0.05},
+    "tasks.ring.duration_s": 4,
+    "tasks.frame.duration_s": 5,
+    "program": {},
+}
+
+
+def solved(values: dict[str, object], **rules: Any) -> Solution:
+    """The cell with rules that are judged only, and not refused where no program keeps them."""
+    cell = load_cell(FIXED).with_values({**VALUES, **values})
+    return solve(replace(cell, program=ProgramEntry(**rules)), is_reported=False)
+
+
+def checks_of(solution: Solution, name: str) -> list[tuple[str | None, Check]]:
+    """Checks of a kind, with the phases in whose report they stand."""
+    return [(run.name, check) for run in solution.runs for check in run.report.checks if check.name == name]
+
+
+@pytest.fixture(scope="module")
+def at_once() -> Solution:
+    return solved({"tasks.ring.tack": True}, tacks_first=True, together=("ring", "frame"))
+
+
+def test_tasks_at_once_begin_together_and_not_one_after_the_other(at_once: Solution) -> None:
+    """The second begins with the first, whose path takes four seconds."""
+    [(phase, together)], [(_, order)] = checks_of(at_once, "together"), checks_of(at_once, "task_order")
+
+    assert together.passed
+    assert (phase, together.subject, together.value) == ("work-1", "ring, frame", 0.0)
+    assert not order.passed
+    assert order.value == pytest.approx(-4.0)
+    assert order.limit == 0.0
+    assert not at_once.passed
+
+
+def test_tasks_in_turn_begin_apart_by_a_path_and_what_lies_between() -> None:
+    solution = solved({"tasks.ring.after": "frame"}, together=("ring", "frame"))
+    between = sum(run.report.cycle_time for run in solution.runs[1:3])
+
+    [(phase, together)] = checks_of(solution, "together")
+
+    assert phase == "work-2"
+    assert not together.passed
+    assert together.value == pytest.approx(between)
+    assert together.at_s == pytest.approx(0.5)
+
+
+def test_turns_and_robots_are_judged_by_what_the_program_does() -> None:
+    """One alternation kept, and tasks of two robots that one should do."""
+    turns = OrderEntry(alternate=(("ring",), ("frame",)))
+    solution = solved({"tasks.frame.after": "ring"}, same_robot=("ring", "frame"), order=turns)
+
+    [(_, order)], [(_, robots)] = checks_of(solution, "task_order"), checks_of(solution, "same_robot")
+    transfer = solution.runs[2].report.cycle_time
+    assert order.passed
+    assert order.value == pytest.approx(0.5 + transfer + 0.5)
+    assert not robots.passed
+    assert (robots.value, robots.limit) == (2, 1)
+    assert "done by left, right" in robots.message
