@@ -174,8 +174,7 @@ class _Search:
         """
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
-        before = tasks_before(cell)
-        goals = [replace(self._as_given(it), after=before[it.name]) for it in task_goals(cell, draft.robots)]
+        goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
         table = ModeSearch(
             cell=cell,
             goals=goals,
@@ -260,6 +259,7 @@ class _Search:
         is_free = "direction" in free and task.start_posture is None and written_points(cell, goal.name) is not None
         return replace(
             goal,
+            after=tasks_before(cell)[goal.name],
             is_reversible=goal.is_reversible and is_free,
             holder_q=station,
             start_q=task.start_posture,

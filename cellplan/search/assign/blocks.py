@@ -11,11 +11,12 @@ the tasks of any clique, which makes the bound.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Any, Final
 
 from cellplan.search.assign.cliques import cliques_at
 from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.rule_rows import add_rule_rows
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
 
@@ -76,7 +77,7 @@ class _BlockModel:
         self._no_conflicts()
         self._cliques()
         self._in_order()
-        self._keep_rules()
+        add_rule_rows(self.model, instance, leads=self.leads, joins=self.joins, done=self._done)
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
         objective = self.model.new_int_var(0, HORIZON, "")
         self.model.add(objective >= cost)
@@ -179,24 +180,6 @@ class _BlockModel:
             self.model.add(place[task] > place[first])
         for (task, leader), join in self.joins.items():
             self.model.add(place[task] == place[leader]).only_enforce_if(join)
-
-    def _keep_rules(self) -> None:
-        """One robot does the tasks of the same robot; those that are done together lead and join blocks alike."""
-        model, rules = self.model, self.instance.rules
-        for group in rules.same_robot:
-            for first, second in pairwise(group):
-                for robot in self.instance.robots:
-                    model.add(self._done(first, robot) == self._done(second, robot))
-        for group in rules.together:
-            longest = max(group, key=self._order.__getitem__)
-            leading = sum(it for (name, _), it in self.leads.items() if name == longest)
-            for task in (name for name in group if name != longest):
-                model.add(sum(it for (name, _), it in self.leads.items() if name == task) == 0)
-                model.add(leading == self.joins.get((task, longest), 0))
-                for leader in self.instance.tasks:
-                    joins = [self.joins[it, leader] for it in (task, longest) if (it, leader) in self.joins]
-                    if leader != longest and joins:
-                        model.add(joins[0] == (joins[1] if len(joins) > 1 else 0))
 
     def _tour(self, least: int) -> Any:
         """Steps of the part from home over all stations in use and back, beyond the transfers that are counted."""
