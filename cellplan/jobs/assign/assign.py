@@ -30,8 +30,8 @@ from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer, with_rules
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
-from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.rules import TaskRules, tasks_before
+from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.table import ModeSearch, ModeTable
 from cellplan.search.assign.transfers import TransferCertifier

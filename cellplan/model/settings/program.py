@@ -103,6 +103,7 @@ class TransferEntry(Entry):
         """The share of the speed that joints have."""
         return self.speed_percent / 100.0
 
+
 MOST_GROUPS: Final = 200
 GROUP_WORDS: Final = "the name of a task or a list of names"
 TaskGroups = Annotated[

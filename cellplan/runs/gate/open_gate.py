@@ -79,8 +79,7 @@ def open_gate(
         JudgedPhase(scene=scene, schedule=motion.schedule, report=motion.report)
         for scene, motion in zip(scenes, motions, strict=True)
     ]
-    reports = with_joins(source.cell, with_phase_ends(source.cell, phases))
-    reports = with_task_rules(source.cell, phases, reports)
+    reports = with_task_rules(source.cell, phases, with_joins(source.cell, with_phase_ends(source.cell, phases)))
     motions = tuple(replace(motion, report=report) for motion, report in zip(motions, reports, strict=True))
     _refuse_failing(stored, motions)
     rows.refuse_other_starts(source.cell)
