@@ -6,7 +6,7 @@ from pathlib import Path, PurePath
 
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
-from cellplan.checks.tools.task_rules import with_task_rules
+from cellplan.checks.task_rules import with_task_rules
 from cellplan.checks.verify import completed, run_clearance, verify_motion, with_clocks
 from cellplan.files.run.clock_table import render_clock
 from cellplan.files.run.joint_tables import TableHeader, parse_table, program_digest, render_table, replace_header

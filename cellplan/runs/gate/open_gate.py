@@ -9,7 +9,7 @@ from typing import Final
 from cellplan.cache import without_cache
 from cellplan.checks.clearance.phase_ends import JudgedPhase, with_phase_ends
 from cellplan.checks.joints.joins import with_joins
-from cellplan.checks.tools.task_rules import with_task_rules
+from cellplan.checks.task_rules import with_task_rules
 from cellplan.checks.verify import verify
 from cellplan.errors import InputError, InvalidFileError, NotVerifiedError
 from cellplan.files.input.findings import listed, shown

@@ -12,7 +12,7 @@ from cellplan.model.settings.program import OrderEntry, ProgramEntry
 from cellplan.runs.solution import Solution
 from cellplan.runs.solve import solve
 
-FIXED = Path(__file__).resolve().parents[3] / "cells" / "fixed_part.yaml"
+FIXED = Path(__file__).resolve().parents[2] / "cells" / "fixed_part.yaml"
 VALUES: dict[str, object] = {
     "motion": {"mode": "part_at_rest", "step_s": 0.05},
     "tasks.ring.duration_s": 4,
