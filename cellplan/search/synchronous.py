@@ -1,4 +1,4 @@
-"""Jobs that a search can judge: one synchronous motion by the weighted pseudo-inverse."""
+"""Jobs that a search can judge: motions by the weighted pseudo-inverse, and of these one synchronous motion alone."""
 
 from collections.abc import Collection
 
@@ -8,12 +8,17 @@ from cellplan.model.cell.cell import Cell, Mode, Timing
 
 def refuse_other_jobs(cell: Cell, what: str, *, paths: Collection[str] = ()) -> None:
     """Refuse jobs for ``what`` but one synchronous pseudo-inverse motion; some robots may have a given joint path."""
-    motion, solver = cell.motion, cell.solver
-    at = cell.origin.at
+    motion, at = cell.motion, cell.origin.at
     if cell.program.is_home_to_home:
         raise InputError(f"{at('program')}: expected a cell without a program from home to home for {what}")
     if motion.mode not in {Mode.SIMULTANEOUS, Mode.PART_AT_REST}:
         raise InputError(f"{at('motion.mode')}: expected simultaneous or part_at_rest for {what}, got '{motion.mode}'")
+    refuse_other_methods(cell, what, paths=paths)
+
+
+def refuse_other_methods(cell: Cell, what: str, *, paths: Collection[str] = ()) -> None:
+    """Refuse motions for ``what`` that are none of the pseudo-inverse as written; see ``refuse_other_jobs``."""
+    motion, solver, at = cell.motion, cell.solver, cell.origin.at
     if motion.timing is not Timing.AS_WRITTEN:
         raise InputError(
             f"{at('motion.timing')}: expected as_written for {what}, got '{motion.timing}': it states the shortest "

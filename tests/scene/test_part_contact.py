@@ -15,7 +15,7 @@ from cellplan.model.report.report import Check
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import program_stages
 from cellplan.runs.plan.program_faults import refuse_hanging_parts
-from cellplan.runs.plan.sequence import _Worked
+from cellplan.runs.plan.sequence import WorkedStages
 
 FLAT = "bodies: [{cylinder: {radius_mm: 50, length_mm: 120}, at: {xyz_mm: [0, 0, 60]}}]"
 PIN = "{cylinder: {radius_mm: 8, length_mm: 120}, at: {xyz_mm: [0, 0, 60]}}"
@@ -43,7 +43,7 @@ def checks_of(text: str, folder: Path, move: str) -> list[Check]:
     file = folder / "cell.yaml"
     file.write_text(text, encoding="utf-8")
     cell = load_cell(file)
-    search = _Worked(cell, StageScenes.of(cell), silent, None)
+    search = WorkedStages(cell, StageScenes.of(cell), silent, None)
     for stage in program_stages(cell):
         if (run := search.run(stage) if stage.move is not None else None) is not None and stage.phase.name == move:
             assert run.scene is not None

@@ -13,6 +13,7 @@ import numpy as np
 from cellplan.files.cell.write import written_document
 from cellplan.files.input.files import digest
 from cellplan.files.run.folder import RunFolder
+from cellplan.geometry.arrays import Array
 from cellplan.jobs.base_map.grid import BaseGrid
 from cellplan.jobs.base_map.prepared import (
     MapRequest,
@@ -25,7 +26,7 @@ from cellplan.jobs.base_map.prepared import (
 from cellplan.jobs.base_map.result import map_files, map_record
 from cellplan.jobs.base_map.tiles import Tiles, evaluate, judged
 from cellplan.jobs.drawing import drawing
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.progress import Progress, silent
 from cellplan.model.units import DEG, MM
 from cellplan.report.plots.rendering import require_formats
@@ -35,7 +36,7 @@ from cellplan.runs.outcome import solved_outcome
 from cellplan.runs.plan.rounded import rounded
 from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
-from cellplan.search.base_map.verdicts import MapJob, PlaceVerdict, best_first
+from cellplan.search.base_map.verdicts import PlaceVerdict, best_first
 from cellplan.study.folder import RESULT, SCHEMA, write_results
 from cellplan.study.status import Best
 from cellplan.study.study import Study
@@ -72,15 +73,15 @@ def base_map(
 
     Raises:
         InputError: There is no such operator, the grid is not usable, or the cell is of a kind that is not mapped.
-        StartNotFoundError: A start posture is to be found, and there is none at the present base.
+        NoSolutionError: The other robots have no start posture, or the part cannot be gripped or put down.
     """
     ready = prepared(cell, robot, grid or BaseGrid(), progress)
     progress("finding starts", 0.0)
-    tiles = Tiles.of(ready.job, *ready.starts())
+    tiles = Tiles.of(ready.jobs, ready.starts())
     trials = []
     for place, values in enumerate(tiles.values):
         progress("judging places", place / len(tiles.values))
-        trials.append({"values": values, **judged(ready.job, values).record})
+        trials.append({"values": values, **judged(ready.jobs, values).record})
     return finished_record(ready, tiles.verdicts(trials), certify=certify, progress=progress)
 
 
@@ -112,7 +113,7 @@ def map_study(
 
     Raises:
         InputError: The cell cannot be read or mapped, or the folder cannot be used.
-        StartNotFoundError: A start posture is to be found, and there is none at the present base.
+        NoSolutionError: The other robots have no start posture, or the part cannot be gripped or put down.
         KeyboardInterrupt: It was interrupted; says how many tiles are recorded.
     """
     require_formats(request.formats)
@@ -135,7 +136,7 @@ def map_study(
             pool = opened.enter_context(Workers(workers, modules=MODULES, first=partial(prepared_request, sent)))
         ready = prepared_request(sent)
         progress("finding starts", 0.0)
-        tiles = Tiles.of(ready.job, *ready.starts())
+        tiles = Tiles.of(ready.jobs, ready.starts())
 
         def propose(finished: Sequence[StudyTrial]) -> Sequence[Mapping[str, Any]]:
             return [] if finished else tiles.values
@@ -158,20 +159,20 @@ def finished_record(
     ready: PreparedMap, verdicts: Sequence[PlaceVerdict], *, certify: int = 0, progress: Progress = silent
 ) -> Record:
     """The record of a map whose places are judged, the best ``certify`` of them solved and verified."""
-    job, cell = ready.job, ready.cell
+    cell = ready.cell
     best = best_first(verdicts)[: max(LISTED, certify)]
-    settings = [place_settings(job, verdicts[place], place) for place in best]
+    settings = [place_settings(ready, verdicts[place], place) for place in best]
     certified = []
     for done, values in enumerate(settings[:certify]):
         progress("certifying", done / certify)
         outcome = solved_outcome(partial(cell.with_values, values), _figures, file=Path(cell.origin.file))
         certified.append({"status": str(outcome.status), "reason": outcome.reason, "figures": dict(outcome.figures)})
     return map_record(
-        job,
+        ready.jobs,
         verdicts,
         best=list(zip(best, settings, strict=True)),
         certified=certified,
-        drawing=drawing(job.scene, job.start, ready.schedule),
+        drawing=_drawing(ready),
         versions=versions(),
     )
 
@@ -192,20 +193,42 @@ def write_base_map(record: Record, folder: Path, *, formats: Collection[str] = (
             target.write_bytes(name, content)
 
 
-def place_settings(job: MapJob, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
-    """Values of the cell file that put the robot to a place, with its start posture there, by address."""
-    cell, robot, places = job.scene.cell, job.scene.cell.robot(job.robot), job.places
+def _drawing(ready: PreparedMap) -> dict[str, Any]:
+    """The cell from above as the robot begins its first task, with the paths of all phases in which it works."""
+    shown = [drawing(work.scene, work.start, work.schedule) for work in ready.phases]
+    at_work = [drawn for drawn, job in zip(shown, ready.jobs, strict=True) if job.works]
+    return {**shown[ready.first], "paths": [path for drawn in at_work for path in drawn["paths"]]}
+
+
+def place_settings(ready: PreparedMap, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
+    """Values of the cell file that put the robot to a place, with its start postures there, by address.
+
+    In a program the start posture of its first task is that of the robot, unless the task has one of its own.
+    """
+    job = ready.jobs[ready.first]
+    robot, places = ready.cell.robot(job.robot), job.places
     xy, base = MM * places.X_WB[place, :2, 3], f"robots.{robot.name}.base"
     values: dict[str, Any] = {f"{base}.x_mm": number(xy[0]), f"{base}.y_mm": number(xy[1])}
     yaw = DEG * places.yaw[place]
     if abs(yaw - DEG * float(np.arctan2(robot.X_WB[1, 0], robot.X_WB[0, 0]))) > SAME_ANGLE:
         values[f"{base}.yaw_deg"] = number(yaw)
-    if verdict.start is not None:
-        started = replace(robot, start=rounded(robot, verdict.start))
-        others = tuple(started if other.name == robot.name else other for other in cell.robots)
-        entry = written_document(replace(cell, robots=others))["robots"][robot.name]
-        values |= {f"robots.{robot.name}.{key}": entry[key] for key in ("start", "start_deg") if key in entry}
+    starts = verdict.starts or ((verdict.start,) if verdict.start is not None else ())
+    for phase, start in enumerate(starts):
+        if ready.jobs[phase].works:
+            work = ready.phases[phase].scene.cell
+            task = next(task for task in work.tasks if task.robot == robot.name)
+            is_own = phase == ready.first and ready.cell.task(task.name).start_posture is None
+            where = f"robots.{robot.name}" if is_own else f"tasks.{task.name}"
+            values |= {f"{where}.{key}": value for key, value in _written_start(work, robot, start).items()}
     return values
+
+
+def _written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
+    """A start posture of a robot as the cell file has it."""
+    started = replace(robot, start=rounded(robot, start))
+    others = tuple(started if other.name == robot.name else other for other in cell.robots)
+    entry = written_document(replace(cell, robots=others))["robots"][robot.name]
+    return {key: entry[key] for key in ("start", "start_deg") if key in entry}
 
 
 def _figures(solution: Solution) -> dict[str, Any]:

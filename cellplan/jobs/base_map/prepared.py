@@ -1,4 +1,4 @@
-"""A cell made ready for a map: its job, its bodies, and the places of one base."""
+"""A cell made ready for a map: its phases of work, its bodies, and the places of one base."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -12,23 +12,21 @@ from cellplan.files.cell.load import load_cell
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.jobs.base_map.grid import BaseGrid
 from cellplan.model.cell.cell import Cell
-from cellplan.model.motion.motion import Schedule
 from cellplan.model.progress import Progress, silent
 from cellplan.model.task.task import Frame
 from cellplan.planning.modes import plan_phases
-from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.given import part_pose
-from cellplan.planning.timing.schedule import clock_paths, schedule_paths
 from cellplan.runs.overrides import with_overrides
-from cellplan.runs.plan.start import chosen_start
+from cellplan.runs.plan.work_phases import WorkPhase, work_phases
 from cellplan.scene.mounting import Mount, MountedPair
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.starts import StartGoal, starts_at
 from cellplan.search.base_map.verdicts import MapJob
-from cellplan.search.kernel.job import Job, enough_nodes
-from cellplan.search.synchronous import refuse_other_jobs
+from cellplan.search.kernel.job import MOST, Job, Layouts, enough_nodes
+from cellplan.search.kernel.run import run
+from cellplan.search.synchronous import refuse_other_methods
 
-NODES: Final = 65  # [-] of a motion: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+NODES: Final = 65  # [-] of a motion at least: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,36 +77,50 @@ class PreparedMap:
     """A cell of which a map is made."""
 
     cell: Cell  # the cell as it is asked for
-    job: MapJob  # its job and the places
-    schedule: Schedule  # the tasks on the common clock
+    phases: tuple[WorkPhase, ...]  # its phases of work at the present base
+    jobs: tuple[MapJob, ...]  # the same with the places
 
-    def starts(self) -> tuple[Array, Indices]:
-        """Start postures at all places, and the places; see ``starts_at``."""
-        job = self.job
+    @property
+    def first(self) -> int:
+        """The first phase in which the robot works."""
+        return next(phase for phase, job in enumerate(self.jobs) if job.works)
+
+    def starts(self) -> list[tuple[Array, Indices]]:
+        """For each phase start postures at all places, and the places; see ``starts_at``."""
+        return [self._starts(job) for job in self.jobs]
+
+    def _starts(self, job: MapJob) -> tuple[Array, Indices]:
+        """Those of one phase; the home everywhere while the robot is idle."""
         placed = job.scene.cell.robot(job.robot)
+        if not job.works:
+            at = np.arange(len(job.places))
+            return np.tile(job.start[job.scene.cell.columns(job.robot)], (len(at), 1)), at
         return starts_at(_goal(job), job.places, placed.model, placed.X_WB, seed=self.cell.solver.seed)
 
 
 def prepared(cell: Cell, robot: str, grid: BaseGrid, progress: Progress = silent) -> PreparedMap:
-    """The scene, the job at its nodes, the start at the present base, and the places.
+    """The scene and the job of each phase of work at its nodes, its start at the present base, and the places.
 
     Raises:
         InputError: There is no such operator, the grid is not usable, or the cell is of a kind that is not mapped.
-        StartNotFoundError: A start posture is to be found, and there is none at the present base.
+        NoSolutionError: The other robots have no start posture, or the part cannot be gripped or put down.
     """
     refuse_map(cell, robot, grid)
-    scene = Scene.from_cell(cell)
-    paths = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks])
-    start = chosen_start(scene, paths, progress=progress).start
-    robots = tuple(replace(robot, start=start[cell.columns(robot.name)]) for robot in cell.robots)
-    placed = replace(cell, robots=robots)
-    phase = plan_phases(placed).program[0]
-    schedule = schedule_paths(placed, [paths[name] for name in phase.tasks])
-    job = Job.of(placed, schedule, moving=phase.moving, nodes=enough_nodes(schedule, NODES))
-    places = grid.places(placed.robot(robot), _part_at(placed)[:3, 3])
-    scene = replace(scene, cell=placed, mounted=_standing(scene, robot))
-    map_job = MapJob(job=job, scene=scene, robot=robot, start=start, places=places)
-    return PreparedMap(cell=cell, job=map_job, schedule=schedule)
+    phases = tuple(work_phases(cell, robot, progress))
+    first = next(work for work in phases if robot not in work.phase.idle)
+    places = grid.places(cell.robot(robot), _part_at(first.scene.cell)[:3, 3])
+    jobs = [
+        MapJob(
+            name=work.name,
+            job=_job(work),
+            scene=replace(work.scene, mounted=_standing(work.scene, robot)),
+            robot=robot,
+            start=work.start,
+            places=places,
+        )
+        for work in phases
+    ]
+    return PreparedMap(cell=cell, phases=phases, jobs=tuple(jobs))
 
 
 @lru_cache(maxsize=1)
@@ -127,8 +139,8 @@ def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
     """Refuse a map that cannot be made; call it early, before any long work.
 
     Raises:
-        InputError: The robot is not an operator, the grid is not usable, or the job is not one synchronous
-            pseudo-inverse motion.
+        InputError: The robot is not an operator, the grid is not usable, or the motion is none of the pseudo-inverse
+            as written.
     """
     operators = [task.robot for task in cell.tasks if task.robot not in cell.positioners]
     if name not in operators:
@@ -136,8 +148,22 @@ def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:
             f"--robot: expected a robot with a task that does not hold the part "
             f"({', '.join(dict.fromkeys(operators)) or 'there is none'}), got '{name}'"
         )
-    refuse_other_jobs(cell, "a map of bases")
+    refuse_other_methods(cell, "a map of bases")
+    if not cell.program.is_home_to_home:
+        plan_phases(cell)  # refuses modes that need a program, and robots with two tasks at once
     grid.refuse(cell.robot(name))
+
+
+def _job(work: WorkPhase) -> Job:
+    """The job of a phase, its nodes doubled until its present motion is followed, or lost at the same time again."""
+    cell, nodes, lost_before = work.scene.cell, enough_nodes(work.schedule, NODES), np.nan
+    while True:
+        job = Job.of(cell, work.schedule, moving=work.phase.moving, nodes=nodes)
+        lost_at = float(run(job, Layouts.of([cell], work.start[None])).lost_at[0])
+        is_certain = lost_at == lost_before or abs(lost_at - lost_before) <= job.times[-1] / nodes
+        if is_certain or np.isposinf(lost_at) or nodes >= MOST:
+            return job
+        nodes, lost_before = 2 * nodes - 1, lost_at
 
 
 def _standing(scene: Scene, robot: str) -> tuple[MountedPair, ...]:

@@ -57,7 +57,7 @@ TITLES: Final = {
 
 
 def map_record(
-    job: MapJob,
+    jobs: Sequence[MapJob],
     verdicts: Sequence[PlaceVerdict],
     *,
     best: Sequence[tuple[int, Mapping[str, Any]]],
@@ -71,6 +71,7 @@ def map_record(
         best: The best places with their settings, best first.
         certified: What came of the first of them when they were solved.
     """
+    job = jobs[0]
     cell, places = job.scene.cell, job.places
     base = cell.robot(job.robot).X_WB
     listed = []
@@ -82,7 +83,8 @@ def map_record(
         "schema": SCHEMA,
         "cell": cell.name,
         "robot": job.robot,
-        "duration_s": number(float(job.job.times[-1])),
+        "phases": [phase.name for phase in jobs if phase.name],
+        "duration_s": number(sum(float(phase.job.times[-1]) for phase in jobs)),
         "present": {
             "x_mm": number(MM * base[0, 3]),
             "y_mm": number(MM * base[1, 3]),
@@ -93,34 +95,38 @@ def map_record(
         "y_mm": [number(y) for y in places.y.tolist()],
         "counts": {str(verdict): count for verdict, count in counts(verdicts).items()},
         "best": listed,
-        "places": [_place(job, verdict, place) for place, verdict in enumerate(verdicts)],
+        "places": [_place(jobs, verdict, place) for place, verdict in enumerate(verdicts)],
         "drawing": dict(drawing),
         "inputs": dict(cell.inputs),
         "versions": dict(versions),
     }
 
 
-def _place(job: MapJob, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
+def _place(jobs: Sequence[MapJob], verdict: PlaceVerdict, place: int) -> dict[str, Any]:
     """One place."""
-    places = job.places
+    job, places = jobs[verdict.phase], jobs[0].places
+    reason = _reason(job, verdict)
     return {
         "x_mm": number(MM * places.X_WB[place, 0, 3]),
         "y_mm": number(MM * places.X_WB[place, 1, 3]),
         "yaw_deg": number(round(DEG * places.yaw[place], FINE)),
         "verdict": str(verdict.verdict),
-        "reason": _reason(job, verdict),
-        "start": _start(job, verdict),
+        "reason": f"{job.name}: {reason}" if job.name and reason else reason,
+        "start": _start(jobs, verdict),
         "figures": _figures(job, verdict),
     }
 
 
-def _start(job: MapJob, verdict: PlaceVerdict) -> list[float] | None:
+def _start(jobs: Sequence[MapJob], verdict: PlaceVerdict) -> list[float] | None:
     """Start posture of the robot in [deg], of sliding joints in [mm]; None where there is none."""
-    if verdict.start is None:
+    first = next(phase for phase, job in enumerate(jobs) if job.works)
+    start = verdict.starts[first] if verdict.starts else verdict.start
+    if start is None:
         return None
+    job = jobs[0]
     joints = job.scene.cell.robot(job.robot).model.joints
     scales = [joint_unit(is_revolute=joint.is_revolute).scale for joint in joints]
-    return [round(scale * value, START) + 0.0 for scale, value in zip(scales, verdict.start.tolist(), strict=True)]
+    return [round(scale * value, START) + 0.0 for scale, value in zip(scales, start.tolist(), strict=True)]
 
 
 def _figures(job: MapJob, verdict: PlaceVerdict) -> dict[str, Any]:
@@ -181,6 +187,11 @@ def map_lines(record: Record, folder: Path) -> list[str]:
     lines = [
         f"{record['cell']}, {record['robot']}: {counts['passes']} of {len(record['places'])} places pass; {others}"
     ]
+    if record["phases"]:
+        lines.append(
+            f"  in {len(record['phases'])} phases of work; transfers and homes are judged where a place is solved: "
+            "--certify N"
+        )
     for place_of_base in record["best"][:1]:
         place = record["places"][place_of_base["place"]]
         figures, options = place["figures"], " ".join(f"--set '{option}'" for option in place_of_base["options"])

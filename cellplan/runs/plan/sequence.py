@@ -15,6 +15,7 @@ from cellplan.model.motion.branches import Branches, MovedStart
 from cellplan.model.motion.motion import Motion, Schedule
 from cellplan.model.motion.plan import Hold, Phase
 from cellplan.model.progress import Progress, silent
+from cellplan.model.task.clocked_path import ClockedPath
 from cellplan.planning.modes import standing
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.sequence.near_starts import near_start
@@ -87,7 +88,7 @@ def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = 
     refuse_sunk_parts(scenes)
     refuse_hanging_parts(scenes)
     refuse_unnamed_supports(scenes)
-    search = _Worked(cell, scenes, progress, near)
+    search = WorkedStages(cell, scenes, progress, near)
     runs = search.runs()
     started = search.cell
     at_home = _everyone_at_home(started, runs[0])
@@ -98,7 +99,7 @@ def plan_work(cell: Cell, *, near: Branches | None = None, progress: Progress = 
     homes = find_homes(replace(scenes.held, cell=started), all_runs, known=known, progress=progress)
     solved = _with_all_homes(with_homes(started, homes, given=cell))
     if depends_on_homes(started, runs):
-        runs = _Worked(solved, scenes, progress, near).runs()
+        runs = WorkedStages(solved, scenes, progress, near).runs()
     worked_on = [stage for stage in program_stages(solved) if stage.phase.tasks]
     stages = (_worked(scenes, stage, run) for stage, run in zip(worked_on, runs, strict=True))
     return PlannedProgram(
@@ -119,8 +120,16 @@ def _refuse_other_paths(cell: Cell) -> None:
             clock_paths(stage.cell, [build_toolpath(task, stage.cell.part) for task in stage.cell.tasks])
 
 
-class _Worked:
-    """Stages with tasks, planned one after the other.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BegunStage:
+    """A stage with tasks, from whose start all of them can be carried out; nothing moves yet."""
+
+    scene: Scene  # the scene that it is judged in, with the cell of the stage, every start filled in
+    paths: Mapping[str, ClockedPath]  # path of every task on the common clock, by task
+
+
+class WorkedStages:
+    """Stages with tasks, begun or planned one after the other.
 
     Attributes:
         cell: The cell with the starts that were found so far.
@@ -143,6 +152,14 @@ class _Worked:
         """The motion of a stage; None of one without tasks."""
         if not stage.phase.tasks:
             return None
+        begun = self.begun(stage)
+        with located(stage, self.cell, self._given):
+            planned = plan_run(begun.scene.cell, begun.paths, stage.phase, progress=self._progress)
+        self.leave(stage, planned.motion.q[-1])
+        return planned if stage.move is None else replace(planned, scene=begun.scene)
+
+    def begun(self, stage: Stage) -> BegunStage:
+        """A stage with tasks, its starts given or near where the robots were before, or else searched for."""
         cell = self._with_known_starts(stage)
         scene = replace(self._scenes.of_stage(stage), cell=cell)
         toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks}
@@ -159,11 +176,12 @@ class _Worked:
         started, more = with_chosen_start(cell, start, toolpaths)
         self._record(stage, started)
         self.moved[stage.phase.name] = (*moved, *more)
-        with located(stage, self.cell, self._given):
-            planned = plan_run(started, paths, stage.phase, progress=self._progress)
+        return BegunStage(scene=replace(scene, cell=started), paths=paths)
+
+    def leave(self, stage: Stage, q: Array) -> None:
+        """Go on from where a stage ends, in [rad] or [m], shape (nq,): the robots that worked in it are there."""
         at_work = set(stage.phase.roles) - set(stage.phase.idle)
-        self._last |= {name: planned.motion.q[-1, cell.columns(name)] for name in sorted(at_work)}
-        return planned if stage.move is None else replace(planned, scene=scene)
+        self._last |= {name: q[self.cell.columns(name)] for name in sorted(at_work)}
 
     def _with_known_starts(self, stage: Stage) -> Cell:
         """The cell of a stage with starts that earlier stages found or lead to."""

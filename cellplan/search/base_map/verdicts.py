@@ -51,6 +51,8 @@ class PlaceVerdict:
     pair: tuple[str, str] | None = None  # bodies too near each other, and their distance in [m]; None without any
     distance: float | None = None  # that distance
     at: float | None = None  # time in [s] at which they are
+    phase: int = 0  # the phase of work by which it fails
+    starts: tuple[Array, ...] = ()  # start posture in each phase, where there are several and the place passes
     reason: str = ""  # why it is not judged; empty where it is
 
     @property
@@ -67,13 +69,19 @@ class PlaceVerdict:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MapJob:
-    """The job of one cell with one robot at many places."""
+    """One phase of work of a cell with one robot at many places."""
 
+    name: str  # its tasks, or what it is; empty for the only phase
     job: Job  # the tasks at their nodes
     scene: Scene  # the cell made computable; of its mounted pairs those that depend on its place
     robot: str  # name of the robot
     start: Array  # start configuration of the whole cell in [rad] or [m], shape (nq,)
     places: Places
+
+    @property
+    def works(self) -> bool:
+        """Whether the robot has a task in this phase."""
+        return any(relation.robot == self.robot for relation in self.job.relations)
 
 
 def verdicts_at_start(job: MapJob, q: Array, at: Indices) -> tuple[list[PlaceVerdict], Indices]:
@@ -117,6 +125,43 @@ def judge(job: MapJob, q: Array, at: Indices) -> dict[int, PlaceVerdict]:
             for place, verdict in zip(at[group].tolist(), _judged(job, q[group], at[group]), strict=True):
                 verdicts[place] = verdict.or_better(verdicts.get(place))
     return verdicts
+
+
+def judge_phases(jobs: Sequence[MapJob], starts: Sequence[tuple[Array, Indices]]) -> dict[int, PlaceVerdict]:
+    """The verdict of each place over all phases, one after the other while none fails; see ``judge``.
+
+    Args:
+        starts: For each phase starts of the robot within its limits and their places, the same places in all phases.
+    """
+    judged: dict[int, list[PlaceVerdict]] = {place: [] for place in starts[0][1].tolist()}
+    for phase, (job, (q, at)) in enumerate(zip(jobs, starts, strict=True)):
+        left = [all(verdict.passes for verdict in judged[place]) for place in at.tolist()]
+        for place, verdict in judge(job, q[left], at[left]).items():
+            judged[place].append(replace(verdict, phase=phase))
+    return {place: over_phases(verdicts) for place, verdicts in judged.items()}
+
+
+def over_phases(verdicts: Sequence[PlaceVerdict]) -> PlaceVerdict:
+    """The verdict of a place from those of its phases: the first that fails, else the worst figures of all.
+
+    The cycle is then the sum of those of the phases.
+    """
+    failed = next((verdict for verdict in verdicts if not verdict.passes), None)
+    if failed is not None or len(verdicts) == 1:
+        return failed or verdicts[0]
+    tight = min(verdicts, key=lambda verdict: np.inf if verdict.margin is None else verdict.margin)
+    fast = max(verdicts, key=lambda verdict: max(verdict.speed or 0.0, np.sqrt(verdict.acceleration or 0.0)))
+    return replace(
+        verdicts[0],
+        joint=tight.joint,
+        margin=tight.margin,
+        fast=fast.fast,
+        speed=fast.speed,
+        acceleration=fast.acceleration,
+        cycle=sum(verdict.cycle or 0.0 for verdict in verdicts),
+        phase=0,
+        starts=tuple(verdict.start for verdict in verdicts if verdict.start is not None),
+    )
 
 
 def _is_in_vain(job: MapJob, verdicts: Mapping[int, PlaceVerdict], q: Array, at: Indices) -> Flags:
