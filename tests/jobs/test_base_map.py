@@ -121,12 +121,13 @@ def test_the_best_place_is_certified_by_a_solve(cell: Cell) -> None:
         (["--robot", "right", "--yaw", "left"], "--yaw: expected degrees or toward, got 'left'"),
         (["--robot", "right", "--grid", "0"], "--grid: expected millimetres above 0, got 0"),
         (
-            ["--robot", "right", "--mode", "pairwise"],
-            "motion.mode: expected simultaneous or part_at_rest for a map of bases, got 'pairwise'",
+            ["--robot", "right", "--mode", "semi_coordinated"],
+            "motion.mode: expected simultaneous, pairwise or part_at_rest without program, got 'semi_coordinated': add "
+            "program: {} for a program from home to home",
         ),
         (
-            ["--robot", "right", "--set", "program={}"],
-            "program: expected a cell without a program from home to home for a map of bases",
+            ["--robot", "right", "--set", "motion.cyclic=true"],
+            "motion.cyclic: expected false for a map of bases, got true",
         ),
     ],
 )
@@ -141,19 +142,81 @@ def test_what_cannot_be_mapped_is_one_located_line(
     assert "\n" not in error
 
 
+SLOW = {"robots.left.start_deg": [50, -85, 35], "motion": {"duration_s": 4, "step_s": 0.02, "time_law": "quintic"}}
+WIDE = BaseGrid(x=(1000, 2600), y=(-600, 1000), step=400)
+RING = {"circle": {"radius_mm": 40, "center_mm": [110, -90], "plane": "xy"}, "project": "+z"}
+
+
+def test_a_program_of_one_block_has_the_map_of_the_block() -> None:
+    block = load_cell(CELL).with_values(SLOW)
+
+    alone, program = (base_map(cell, "right", WIDE) for cell in (block, block.with_values({"program": {}})))
+
+    for one, other in zip(alone["places"], program["places"], strict=True):
+        assert one["verdict"] == other["verdict"]
+        assert one["figures"].get("margin") == pytest.approx(
+            other["figures"].get("margin"), abs=0.1
+        )  # as good as margins at nodes are
+    assert (alone["phases"], program["phases"]) == ([], ["circle"])
+
+
+@pytest.fixture(scope="module")
+def two_tasks() -> Cell:
+    block = load_cell(CELL).with_values(SLOW)
+    written: Any = block.origin.document["tasks"]
+    return block.with_values({"program": {}, "tasks.ring": {**written["circle"], "path": RING}})
+
+
+def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(two_tasks: Cell) -> None:
+    circle = load_cell(CELL).with_values(SLOW)
+    ring = circle.with_values({"tasks.circle.path": RING})
+
+    places, *alone = (base_map(cell, "right", WIDE)["places"] for cell in (two_tasks, circle, ring))
+
+    verdicts = [place["verdict"] == "passes" for place in places]
+    assert verdicts == [all(place["verdict"] == "passes" for place in pair) for pair in zip(*alone, strict=True)]
+    assert len(set(verdicts)) == 2
+    failing = {place["reason"].partition(":")[0] for place in places if place["reason"]}
+    assert failing == {"circle", "ring"}  # the task by which a place fails is named
+
+
+def test_a_place_of_a_program_is_written_with_the_start_of_every_task(two_tasks: Cell) -> None:
+    places = base_map(two_tasks, "right", WIDE)
+    best = places["best"][0]
+
+    again = base_map(two_tasks.with_values(best["settings"]), "right", _at(places["places"][best["place"]]))
+
+    assert {"robots.right.start_deg", "tasks.ring.start_deg"} < set(best["settings"])
+    (place,) = again["places"]
+    assert place["figures"]["cycle_s"] == pytest.approx(places["places"][best["place"]]["figures"]["cycle_s"], rel=1e-6)
+
+
+def _at(place: Any) -> BaseGrid:
+    """The grid of one place."""
+    return BaseGrid(x=(place["x_mm"],) * 2, y=(place["y_mm"],) * 2)
+
+
+def test_a_base_from_which_nothing_is_reached_is_mapped_too(two_tasks: Cell) -> None:
+    away = two_tasks.with_values({"robots.right.base.x_mm": 9000})
+
+    verdicts = [[place["verdict"] for place in base_map(cell, "right", WIDE)["places"]] for cell in (two_tasks, away)]
+
+    assert verdicts[0] == verdicts[1]
+
+
 @pytest.mark.parametrize(("clearance", "verdict"), [(20, Verdict.PASSES), (60, Verdict.COLLISION)])
 def test_starts_judged_together_are_judged_as_each_by_itself(clearance: float, verdict: Verdict) -> None:
     near = load_cell(CELL).with_values({**STARTS, "checks.clearance_mm": clearance})  # the arms are 30 mm apart
     ready = prepared(near, "right", BaseGrid(x=(1900, 2300), y=(100, 100), step=400))
-    q, at = ready.starts()
-    known, inside = verdicts_at_start(ready.job, q, at)
+    ((q, at),), (job,) = ready.starts(), ready.jobs
+    known, inside = verdicts_at_start(job, q, at)
     q, at = q[inside], at[inside]
 
-    together = judge(ready.job, q, at)
+    together = judge(job, q, at)
 
     alone: dict[int, PlaceVerdict] = {}
     for start, place in zip(q, at.tolist(), strict=True):
-        (judgement,) = judge(ready.job, start[None], np.array([place])).values()
+        (judgement,) = judge(job, start[None], np.array([place])).values()
         alone[place] = judgement.or_better(alone.get(place))
     assert len(known) == 2
     assert len(set(at.tolist())) < len(at)

@@ -9,7 +9,7 @@ from cellplan.certify.run_pairs import scene_of_run
 from cellplan.errors import InputError, NoSolutionError
 from cellplan.files.input.findings import listed
 from cellplan.geometry.arrays import Array
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.motion.motion import Schedule
 from cellplan.model.motion.plan import Hold, Phase
 from cellplan.model.progress import Progress, silent
@@ -39,7 +39,8 @@ class WorkPhase:
 def work_phases(cell: Cell, robot: str, progress: Progress = silent) -> Iterator[WorkPhase]:
     """The phases of work in their order, each begun near where the one before ends.
 
-    Where a robot, which may stand elsewhere, cannot begin its task or follow it, the others go on without it.
+    Where a robot, which may stand elsewhere, cannot begin its task, the others begin without it, and it is where it was
+    or mid-range.
 
     Args:
         robot: The name of that robot.
@@ -53,7 +54,7 @@ def work_phases(cell: Cell, robot: str, progress: Progress = silent) -> Iterator
     for stage in program_stages(cell) or (Stage(phase=first[0], cell=cell),):
         if not stage.phase.tasks:
             continue
-        begun = _begun(worked, stage, robot)
+        begun = _begun(worked, scenes, stage, robot)
         made = [_work_phase(stage, begun, phase) for phase in first or (stage.phase,)]
         if len(made) == 1 and not is_program:
             made = [replace(made[0], name="")]
@@ -77,25 +78,31 @@ def _work_phase(stage: Stage, begun: BegunStage, phase: Phase) -> WorkPhase:
     )
 
 
-def _begun(worked: WorkedStages, stage: Stage, name: str) -> BegunStage:
-    """A stage whose robots begin their tasks, all of them or all but one, which is where it is written or mid-range."""
+def _begun(worked: WorkedStages, scenes: StageScenes, stage: Stage, name: str) -> BegunStage:
+    """A stage whose robots begin their tasks, all of them or all but one."""
     try:
         return worked.begun(stage)
     except (InputError, NoSolutionError):
         if name not in stage.phase.roles or name in stage.phase.idle:
             raise
-    cell = stage.cell
+    cell, scene = stage.cell, scenes.of_stage(stage)
     robots = [replace(robot, start=None, home=None) if robot.name == name else robot for robot in cell.robots]
-    tasks = tuple(task for task in cell.tasks if task.robot != name)
-    others = replace(cell, robots=tuple(robots), tasks=tasks)
-    roles = {**stage.phase.roles, name: Hold(at_home=True)}
-    begun = worked.begun(replace(stage, cell=others, phase=replace(stage.phase, roles=roles)))
-    robot = cell.robot(name)
-    start = 0.5 * np.add(*finite_limits(robot.model)) if robot.start is None else robot.start
-    started = [replace(robot, start=start) if other.name == name else other for other in begun.scene.cell.robots]
-    whole = replace(begun.scene.cell, robots=tuple(started), tasks=cell.tasks)
+    others = replace(cell, robots=tuple(robots), tasks=tuple(task for task in cell.tasks if task.robot != name))
+    if others.tasks:
+        phase = replace(stage.phase, roles={**stage.phase.roles, name: Hold(at_home=True)})
+        others = worked.begun(replace(stage, cell=others, phase=phase)).scene.cell
+    begun = [cell.robot(name) if robot.name == name else robot for robot in others.robots]
+    starts = [_somewhere(robot, worked.cell.robot(robot.name).start) for robot in begun]
+    robots = [replace(robot, start=start) for robot, start in zip(begun, starts, strict=True)]
+    whole = replace(cell, robots=tuple(robots))
     paths = clock_paths(whole, [build_toolpath(task, whole.part) for task in whole.tasks])
-    return BegunStage(scene=replace(begun.scene, cell=whole), paths=paths)
+    return BegunStage(scene=replace(scene, cell=whole), paths=paths)
+
+
+def _somewhere(robot: Robot, known: Array | None) -> Array:
+    """Where a robot begins, or was before; else its home, or mid-range, shape (n,)."""
+    middle: Array = 0.5 * np.add(*finite_limits(robot.model))
+    return next(q for q in (robot.start, known, robot.home, middle) if q is not None)
 
 
 def _end(begun: BegunStage, work: WorkPhase) -> Array:

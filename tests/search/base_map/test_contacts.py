@@ -48,7 +48,7 @@ def alone(scene: Scene, X_WB: Array, q: Array) -> PlaceContact | None:
 
 
 def test_contacts_are_those_of_each_cell_with_its_base_there(ready: PreparedMap, swings: tuple[Array, Array]) -> None:
-    scene, (X_WB, q) = ready.job.scene, swings
+    scene, (X_WB, q) = ready.jobs[0].scene, swings
 
     together = contacts(scene, "right", X_WB, q, standing=False)
 
@@ -64,9 +64,9 @@ def test_contacts_are_those_of_each_cell_with_its_base_there(ready: PreparedMap,
 
 def test_contacts_move_with_the_cell(ready: PreparedMap, swings: tuple[Array, Array]) -> None:
     X, (X_WB, q) = pose((0.7, -1.2, 0.4), (0.0, 0.0, 2.0)), swings
-    elsewhere = Scene.from_cell(displaced(ready.job.scene.cell, X))
+    elsewhere = Scene.from_cell(displaced(ready.jobs[0].scene.cell, X))
 
-    here, there = contacts(ready.job.scene, "right", X_WB, q), contacts(elsewhere, "right", X @ X_WB, q)
+    here, there = contacts(ready.jobs[0].scene, "right", X_WB, q), contacts(elsewhere, "right", X @ X_WB, q)
 
     for contact, other in zip(here, there, strict=True):
         assert (contact is None) is (other is None)
@@ -78,7 +78,7 @@ def test_contacts_move_with_the_cell(ready: PreparedMap, swings: tuple[Array, Ar
 @pytest.mark.parametrize("depth", [0.004, 0.012])
 def test_a_base_that_stands_too_deep_in_the_floor_is_a_contact_of_its_own(ready: PreparedMap, depth: float) -> None:
     """5 mm are allowed; the foot reaches 100 mm below its base, and nothing else of the arm as far without its tool."""
-    cell = ready.job.scene.cell
+    cell = ready.jobs[0].scene.cell
     robots = tuple(replace(robot, tool=no_tool()) if robot.name == "right" else robot for robot in cell.robots)
     scene = Scene.from_cell(replace(cell, robots=robots))
     sunk = pose((1.9, 0.3, 0.1 - depth), (0.0, 0.0, np.pi))

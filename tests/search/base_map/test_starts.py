@@ -18,20 +18,20 @@ LINKS = (0.5, 0.4)  # [m] of the first two links of the arm
 def test_every_start_brings_the_tool_of_the_robot_that_stands_there_to_the_start_of_its_path(
     ready: PreparedMap,
 ) -> None:
-    q, at = ready.starts()
-    goal = _goal(ready.job)
+    ((q, at),) = ready.starts()
+    goal = _goal(ready.jobs[0])
     desired = goal.X_WR @ goal.X_RT
 
     assert len(q) > 10
     assert np.all(np.diff(at) >= 0)
     for start, place in zip(q, at.tolist(), strict=True):
-        robot = replace(goal.robot, X_WB=ready.job.places.X_WB[place])
+        robot = replace(goal.robot, X_WB=ready.jobs[0].places.X_WB[place])
         tool = ScrewChain(robot).tool_poses(start[None])[0]
         np.testing.assert_allclose(tool[:2], desired[:2], atol=1e-8)  # position in the plane, and the turn about z
 
 
 def test_a_planar_arm_has_both_elbows_wherever_its_wrist_is_within_reach_and_none_elsewhere(ready: PreparedMap) -> None:
-    goal = _goal(ready.job)
+    goal = _goal(ready.jobs[0])
     places = Places.of(goal.robot.X_WB, *FINE)
     q, at = starts_at(goal, places, goal.robot.model, goal.robot.X_WB, seed=ready.cell.solver.seed)
     X_WT = goal.X_WR @ goal.X_RT
@@ -55,8 +55,8 @@ def _wrist(model: RobotModel) -> list[float]:
 
 
 def test_the_same_seeds_give_the_same_starts_whatever_part_of_the_world_the_cell_stands_in(ready: PreparedMap) -> None:
-    q, at = ready.starts()
-    goal, job = _goal(ready.job), ready.job
+    ((q, at),) = ready.starts()
+    goal, job = _goal(ready.jobs[0]), ready.jobs[0]
     X = np.eye(4)
     X[:2, :2] = [[0.0, -1.0], [1.0, 0.0]]
     X[:3, 3] = [3.0, -1.0, 0.5]
