@@ -58,7 +58,9 @@ def base_map(
 
     All other robots, the height and the tilt of the base stay. The motion of every place is worked out anew at 65 nodes
     or more with the pseudo-inverse of the cell, and judged by position limits, speeds, accelerations and, at up to 33
-    nodes, by the distances that the cell demands. Of a program every phase of work is judged, no transfer. Of several start postures at a place the one that is nearest to the present
+    nodes, by the distances that the cell demands. Of a program every phase of work is judged, no transfer.
+
+    Of several start postures at a place the one that is nearest to the present
     start is tried first, and the first that passes is kept.
 
     Args:
