@@ -198,8 +198,8 @@ def write_base_map(record: Record, folder: Path, *, formats: Collection[str] = (
 def _drawing(ready: PreparedMap) -> dict[str, Any]:
     """The cell from above as the robot begins its first task, with the paths of all phases in which it works."""
     shown = [drawing(work.scene, work.start, work.schedule) for work in ready.phases]
-    at_work = [drawn for drawn, job in zip(shown, ready.jobs, strict=True) if job.works]
-    return {**shown[ready.first], "paths": [path for drawn in at_work for path in drawn["paths"]]}
+    at_work = [one for one, job in zip(shown, ready.jobs, strict=True) if job.works]
+    return {**shown[ready.first], "paths": [path for one in at_work for path in one["paths"]]}
 
 
 def place_settings(ready: PreparedMap, verdict: PlaceVerdict, place: int) -> dict[str, Any]:
@@ -219,8 +219,8 @@ def place_settings(ready: PreparedMap, verdict: PlaceVerdict, place: int) -> dic
         if ready.jobs[phase].works:
             work = ready.phases[phase].scene.cell
             task = next(task for task in work.tasks if task.robot == robot.name)
-            is_own = phase == ready.first and ready.cell.task(task.name).start_posture is None
-            where = f"robots.{robot.name}" if is_own else f"tasks.{task.name}"
+            is_first = phase == ready.first and ready.cell.task(task.name).start_posture is None
+            where = f"robots.{robot.name}" if is_first else f"tasks.{task.name}"
             values |= {f"{where}.{key}": value for key, value in _written_start(work, robot, start).items()}
     return values
 
