@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cellplan.checks.joints.via_points import with_via_points
 from cellplan.model.cell.cell import Cell
 from cellplan.model.cell.joint_limits import acceleration_limit
 from cellplan.model.report.report import Check, Report
@@ -64,5 +65,5 @@ def with_joins(cell: Cell, reports: Sequence[Report]) -> list[Report]:
     """
     if not cell.program.is_home_to_home:
         return list(reports)
-    first = reports[0]
-    return [replace(first, checks=(*first.checks, check_joins(cell, reports))), *reports[1:]]
+    first, *others = with_via_points(cell, reports)
+    return [replace(first, checks=(*first.checks, check_joins(cell, reports))), *others]

@@ -74,11 +74,12 @@ def configuration_findings(path: KeyPath, given: Given, model: RobotModel, docum
         if missing:
             yield document.finding(path, f"missing, expected one value per joint: add {listed(missing)}")
         return
-    as_list = (*robot, f"{key}_deg")
+    as_list = (*robot, key if isinstance(key, int) else f"{key}_deg")
     sliding = [joint.name for joint in model.joints if not joint.is_revolute]
     if sliding:
         expected = ", ".join(f"{joint}: …" for joint in keys)
-        text = f"unexpected key, '{sliding[0]}' is a prismatic joint: use {key}: {{{expected}}}"
+        name = "" if isinstance(key, int) else f"{key}: "
+        text = f"unexpected {'key' if name else 'list'}, '{sliding[0]}' is a prismatic joint: use {name}{{{expected}}}"
         yield document.key_finding(as_list, text)
     elif len(given) != len(keys):
         text = f"expected {len(keys)} angles, one per joint ({listed(model.joint_names)}), got {len(given)}"

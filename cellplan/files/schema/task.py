@@ -41,6 +41,8 @@ TOOL_AXIS_WORDS: Final = f"normal, {DIRECTION_WORDS}"
 LAW_WORDS: Final = "constant, trapezoid, quintic or {trapezoid: {ramp: 0.25}}"
 CORNER_WORDS: Final = "stop or {blend_mm: 2}"
 AFTER_WORDS: Final = "the name of a task or a list of names"
+VIA_WORDS: Final = "home, a list of joint angles or a mapping with one key per joint (a1_deg, rail_mm)"
+MOST_VIA: Final = 20
 POSITION_WORDS: Final = "auto or a mapping with one key per joint (a1_deg, rail_mm)"
 
 
@@ -105,6 +107,22 @@ PositionChoice = Annotated[
 ]
 
 
+ViaPoint = Annotated[
+    Annotated[Literal["home"], Tag(f"<{VIA_WORDS}>")]
+    | Annotated[tuple[Angle, ...], Tag("<list>")]
+    | Annotated[dict[str, JointPosition], Tag("<mapping>")],
+    by_kind(VIA_WORDS, list=tuple, mapping=dict),
+]
+ViaPoints = Annotated[tuple[ViaPoint, ...], Field(max_length=MOST_VIA)]
+
+
+class ViaEntry(Entry):
+    """Configurations that the robot of a task passes in transfer moves, at rest in each of them, in their order."""
+
+    before: ViaPoints = Field(default=(), description="On its way to the task.")
+    after: ViaPoints = Field(default=(), description="On its way from the task.")
+
+
 StandOff = Annotated[Mm, Within(ge=0.0, le=FARTHEST_STAND_OFF_MM)]
 TaskAxis = Literal["x", "y", "z", "rx", "ry", "rz"]
 
@@ -142,6 +160,11 @@ class TaskEntry(Entry):
         default=None,
         min_length=1,
         description="The same with one key per joint with its unit (a1_deg, rail_mm); excludes holder_deg.",
+    )
+    via: ViaEntry | None = Field(
+        default=None,
+        description="Configurations that its robot passes in the transfer moves to the task and from it; only with "
+        "program.",
     )
     path: PathEntry = Field(description="Path of the tool tip on the part.")
     tool_axis: ToolAxis | None = Field(

@@ -116,6 +116,12 @@ def refuse_unless_assignable(cell: Cell) -> None:
         raise InputError(
             f"{at('program')}: expected no marks, attach or detach, as an assignment orders all tasks itself"
         )
+    for task in cell.tasks:
+        if task.via_before or task.via_after:
+            raise InputError(
+                f"{task.where('via')}: unexpected key, as an assignment reckons with straight moves from task to task: "
+                "add it to the cell that is written"
+            )
     if len(cell.positioners) > 1:
         raise InputError(f"{at('part.held_by')}: expected one robot that holds the part, got {len(cell.positioners)}")
     for robot in cell.robots:

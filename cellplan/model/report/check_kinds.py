@@ -88,6 +88,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("joint_position", "joint positions within their limits", "Joint beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("controller_position", "positions that controllers show within their limits", "Shown position beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),
     CheckKind("joint_margin", "joints keep the demanded margin", "Joint too near its limit", excess=DISTANCE, concern=LIMIT),
+    CheckKind("via_point", "via points passed", "Via point missed"),
     CheckKind("locked_joint", "failed joints at rest", "Failed joint moves"),
     CheckKind("home", "idle robots at their homes", "Idle robot leaves its home"),
     CheckKind("payload", "tool and part within the payload", "Payload exceeded"),

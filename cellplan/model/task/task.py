@@ -226,6 +226,9 @@ class Task:
         start_posture: Configuration of its robot at its start in [rad] or [m], shape (n,); None for that of the robot
             if the task is its first one, and for one that is to be searched otherwise.
         holder_posture: Configuration of the first holder at its start, likewise; None for that holder's start posture.
+        via_before: Configurations of its robot in [rad] or [m] that it passes in the transfer move to the task, shape
+            (n,) each; None for its home.
+        via_after: Likewise in the transfer move from it.
         origin: File and lines that the task was read from; empty for a task made in Python.
     """
 
@@ -262,6 +265,8 @@ class Task:
     spin: float = 0.0
     start_posture: Array | None = None
     holder_posture: Array | None = None
+    via_before: tuple[Array | None, ...] = ()
+    via_after: tuple[Array | None, ...] = ()
     origin: Origin = field(default_factory=Origin, compare=False, repr=False)
 
     def where(self, key: str = "", *, shared: str = "") -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -23,6 +24,7 @@ from cellplan.planning.sequence.part_moves import PartMove
 from cellplan.planning.sequence.scenes import StageScenes
 from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.planning.timing.schedule import TIME_DECIMALS, clock_paths
+from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.planning.transfer.plan import plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.runs.plan.given_starts import with_chosen_start, with_placed_starts
@@ -257,7 +259,8 @@ def _joined(
             progress("planning transfer moves", number / len(stages))
             goal = left[0].motion.q[0] if left else home
             with named_transfer(stages, number):
-                made = _transferred(stage, scene, (last, goal), home, progress)
+                ends = via_points(stages, number, (last, goal), home)
+                made = _transferred(stage, scene, ends, home, progress)
         yield made
         last = made.motion.q[-1]
 
@@ -277,16 +280,40 @@ def dwell_times(stage: Stage) -> Array:
     return times
 
 
-def _transferred(
-    stage: Stage, scene: Scene, ends: tuple[Array, Array], home: Array, progress: Progress
-) -> PlannedStage:
-    """The transfer moves of one stage, from one stacked configuration to another.
+def via_points(stages: Sequence[Stage], number: int, ends: tuple[Array, Array], home: Array) -> list[Array]:
+    """Stacked configurations that the transfer moves of a stage pass, both ends among them, shape (nq,) each.
+
+    Robots first pass what is stated after their last tasks while the others stand. Then all go together, those that
+    have something to pass before their next tasks as far as that; they go on while the others stand.
+    """
+    before = stages[number - 1].cell.tasks if number else ()
+    after = next((stage.cell.tasks for stage in stages[number + 1 :] if stage.cell.tasks), ())
+    leaving, coming = ({task.robot: task.via_after for task in before}, {task.robot: task.via_before for task in after})
+
+    def moved(q: Array, via: Mapping[str, Sequence[Array | None]], place: int) -> Array:
+        q = q.copy()
+        for robot, points in via.items():
+            if place < len(points):
+                point, columns = points[place], stages[number].cell.columns(robot)
+                q[columns] = home[columns] if point is None else point
+        return q
+
+    passed = [ends[0]]
+    for place in range(max(map(len, leaving.values()), default=0)):
+        passed.append(moved(passed[-1], leaving, place))
+    passed += [moved(ends[1], coming, place) for place in range(max(map(len, coming.values()), default=0))]
+    passed = [passed[0], *(q for other, q in pairwise(passed) if np.any(q != other))]
+    return [*passed, ends[1]] if len(passed) == 1 or np.any(passed[-1] != ends[1]) else passed
+
+
+def _transferred(stage: Stage, scene: Scene, ends: Sequence[Array], home: Array, progress: Progress) -> PlannedStage:
+    """The transfer moves of one stage, from one stacked configuration to the next, at rest in each of them.
 
     Raises:
         InputError: Co-holders would have to move by themselves.
         BlockedTransferError: No way was found.
     """
-    cell, (start, goal) = scene.cell, ends
+    cell, start, goal = scene.cell, ends[0], ends[-1]
     for name in cell.positioners if len(cell.positioners) > 1 else ():
         columns = cell.columns(name)
         if np.any(np.abs(goal[columns] - start[columns]) > CLOSED):
@@ -295,12 +322,32 @@ def _transferred(
                 "the other holders of the part cannot be moved one by one; set motion.cyclic: true, and no home of "
                 "theirs"
             )
-    query = TransferQuery.of(scene_of_run(scene, ()), start, goal, seed=cell.solver.seed, home=home)
-    transfer = plan_transfer(query, retimer=transfer_retimer(scene), progress=progress)
+    alone, retimer = scene_of_run(scene, ()), transfer_retimer(scene)
+    legs, rungs = list[Array](), dict[str, list[str]]()
+    for number, (a, b) in enumerate(pairwise(ends), start=1):
+        query = TransferQuery.of(alone, a, b, seed=cell.solver.seed, home=home)
+        try:
+            transfer = plan_transfer(query, retimer=retimer, progress=progress)
+        except BlockedTransferError as error:
+            if len(ends) == 2:
+                raise
+            leg = f"leg {number} of {len(ends) - 1} over its via points"
+            raise BlockedTransferError(error.place, f"{leg}: {error.what}", error.best) from error
+        legs.append(transfer.q if not legs else transfer.q[1:])
+        for robot, rung in transfer.rungs.items():
+            rungs.setdefault(robot, []).append(rung.words)
+    q = np.concatenate(legs)
+    times = np.round(np.arange(len(q)) * retimer.step, TIME_DECIMALS)
     return PlannedStage(
         stage=stage,
         scene=scene,
-        schedule=Schedule(times=transfer.times, tasks=()),
-        motion=Motion(times=transfer.times, q=transfer.q),
-        rungs={robot: rung.words for robot, rung in transfer.rungs.items()},
+        schedule=Schedule(times=times, tasks=()),
+        motion=Motion(times=times, q=q),
+        rungs={robot: _over_via_points(words) for robot, words in rungs.items()},
     )
+
+
+def _over_via_points(words: Sequence[str]) -> str:
+    """How a robot moves in all legs in which it does."""
+    how = " then ".join(dict.fromkeys(words))
+    return how if len(words) == 1 else f"{how} over {len(words) - 1} via point{'s' * (len(words) > 2)}"

@@ -17,7 +17,7 @@ from cellplan.model.settings.units import Mm
 
 STAND_OFF: Final = Mm(30.0)  # of the tools of a program where the cell gives none
 STAND_OFFS: Final = ("approach_mm", "retract_mm")
-TASK_KEYS: Final = ("after", "start_deg", "start", "holder_deg", "holder")  # of tasks in a program
+TASK_KEYS: Final = ("after", "start_deg", "start", "holder_deg", "holder", "via")  # of tasks in a program
 CURE: Final = "add program: {} for a program from home to home"
 
 
@@ -67,6 +67,14 @@ def posture_findings(
             if not findings:
                 place = ("tasks", name, key if isinstance(given, dict) else f"{key}_deg")
                 yield from _limits(place, given, models[robot], document)
+
+        for key, points in (("before", task.via.before), ("after", task.via.after)) if task.via is not None else ():
+            for index, point in enumerate(points):
+                path = ("tasks", name, "via", key, index)
+                if isinstance(point, str) or task.robot not in models:
+                    continue
+                findings = list(configuration_findings(path, point, models[task.robot], document))
+                yield from findings or _limits(path, point, models[task.robot], document)
 
 
 def _limits(

@@ -92,6 +92,21 @@ def changes(*, program: str = "{}", order: str = "", second: str = "", motion: s
             "E2_deg, F2_deg",
         ),
         (
+            {"second": "via: {before: [[0, 0], [400, 0, 0, 0, 0, 0], {rail_mm: 0}, park], after: home}"},
+            "c:22: tasks.second.via.before[3]: expected home, a list of joint angles or a mapping with one key per "
+            "joint (a1_deg, rail_mm), got 'park'\n"
+            "c:22: tasks.second.via.after: expected a list of entries, got 'home'",
+        ),
+        (
+            {"second": "via: {before: [[0, 0], [400, 0, 0, 0, 0, 0], {rail_mm: 0}, home]}"},
+            "c:22: tasks.second.via.before[0]: expected 6 angles, one per joint (A3, B3, C3, D3, E3, F3), got 2\n"
+            "c:22: tasks.second.via.before[1]: expected 'A3' within its limits -180 .. 180 deg, got 400\n"
+            "c:22: tasks.second.via.before[2].rail_mm: unknown key; allowed: A3_deg, B3_deg, C3_deg, D3_deg, E3_deg, "
+            "F3_deg\n"
+            "c:22: tasks.second.via.before[2]: missing, expected one value per joint: add A3_deg, B3_deg, C3_deg, "
+            "D3_deg, E3_deg, F3_deg",
+        ),
+        (
             {"second": "start_deg: auto\nstart: auto"},
             "c:23: tasks.second.start: expected either start_deg or start, got both",
         ),
