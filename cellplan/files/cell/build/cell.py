@@ -17,7 +17,7 @@ from cellplan.files.schema.cell import CycleEntry, MotionEntry
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathEntry, PolylineEntry
 from cellplan.files.schema.shapes import ObstacleEntry
-from cellplan.files.schema.task import BlendEntry, TaskEntry, TrapezoidEntry, ViaEntry, ViaPoint
+from cellplan.files.schema.task import BlendEntry, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
 from cellplan.geometry.transforms import Array
@@ -122,9 +122,8 @@ def build_task(
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
     tool_axis, tool_x = tool_directions(entry)
-    process, via = entry.process, entry.via or ViaEntry()
+    process, corners = entry.process, entry.corners or motion.corners
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
-    corners = entry.corners or motion.corners
     return Task(
         name=name,
         robot=entry.robot,
@@ -159,15 +158,17 @@ def build_task(
         after=entry.preceding,
         start_posture=_posture(entry.given_start, models, entry.robot),
         holder_posture=_posture(entry.given_holder, models, *(it.robot for it in document.part.held_by[:1])),
-        via_before=tuple(_via(point, models, entry.robot) for point in via.before),
-        via_after=tuple(_via(point, models, entry.robot) for point in via.after),
+        **_via_points(entry.via or ViaEntry(), models, entry.robot),
         origin=origin,
     )
 
 
-def _via(point: ViaPoint, models: Mapping[str, RobotModel], robot: str) -> Array | None:
-    """A configuration that a robot passes in [rad] or [m]; None for its home."""
-    return None if isinstance(point, str) else configuration_in_si(models[robot], point)
+def _via_points(via: ViaEntry, models: Mapping[str, RobotModel], robot: str) -> dict[str, Any]:
+    """The configurations that a robot passes before and after a task in [rad] or [m], None for its home, by field."""
+    return {
+        name: tuple(None if isinstance(point, str) else configuration_in_si(models[robot], point) for point in points)
+        for name, points in (("via_before", via.before), ("via_after", via.after))
+    }
 
 
 def _posture(given: Given, models: Mapping[str, RobotModel], *robots: str) -> Array | None:
