@@ -17,7 +17,7 @@ from cellplan.files.schema.cell import CycleEntry, MotionEntry
 from cellplan.files.schema.closed_shapes import CircleEntry, RectangleEntry, RhombusEntry, start_direction
 from cellplan.files.schema.path import PathEntry, PolylineEntry
 from cellplan.files.schema.shapes import ObstacleEntry
-from cellplan.files.schema.task import BlendEntry, TaskEntry, TrapezoidEntry, ViaEntry
+from cellplan.files.schema.task import BlendEntry, CornerChoice, TaskEntry, TrapezoidEntry, ViaEntry
 from cellplan.files.schema.tool import OF_ROD, RodEntry, ToolEntry
 from cellplan.files.shapes import MeshReader, centred_solid, direction, obstacle_shape, tool_solid
 from cellplan.geometry.transforms import Array
@@ -121,8 +121,7 @@ def build_task(
 ) -> Task:
     """The task of one operator; settings that it does not state are those of the motion."""
     entry, motion = document.tasks[name], document.motion
-    tool_axis, tool_x = tool_directions(entry)
-    process, corners = entry.process, entry.corners or motion.corners
+    (tool_axis, tool_x), process = tool_directions(entry), entry.process
     law = _time_law(entry.time_law or motion.time_law) if process is None else TimeLaw(kind=TimeLawKind.STEADY)
     return Task(
         name=name,
@@ -141,7 +140,7 @@ def build_task(
         duration=entry.duration_s,
         feed=si_or_none(entry.feed_mm_s) if process is None else process.feed_mm_s.si,
         time_law=law,
-        blend=corners.blend_mm.si if isinstance(corners, BlendEntry) else None,
+        blend=_blend(entry.corners or motion.corners),
         settle=entry.settle_s,
         repeat=entry.repeat,
         approach=_straight_move(entry.approach_mm, entry.approach_s),
@@ -161,6 +160,11 @@ def build_task(
         **_via_points(entry.via or ViaEntry(), models, entry.robot),
         origin=origin,
     )
+
+
+def _blend(corners: CornerChoice) -> float | None:
+    """Distance from a corner at which its rounding begins in [m]; None for a stop."""
+    return corners.blend_mm.si if isinstance(corners, BlendEntry) else None
 
 
 def _via_points(via: ViaEntry, models: Mapping[str, RobotModel], robot: str) -> dict[str, Any]:
