@@ -28,18 +28,19 @@ from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import End, Instance, choose_stations, find_conflicts, least_transfer, with_rules
+from cellplan.search.assign.instance import End, Instance, find_conflicts, least_transfer, with_rules
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
+from cellplan.search.assign.stations import choose_stations
 from cellplan.search.assign.table import ModeSearch, ModeTable
 from cellplan.search.assign.transfers import TransferCertifier
 
 ROUNDS: Final = 4  # programs that are solved until one passes
 EFFORT: Final = (2.0, 5.0, 15.0, 60.0, 240.0)  # of the block model, in units of deterministic time, by --effort
 NEARLY: Final = 1.05  # [-] of the cycle of the program: so long are those of its alternatives at most
-LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "collisions")
+LOOKED_FOR: Final = ("torch and weld position", "reach", "joint limits", "path", "tool by the part", "collisions")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -175,16 +176,13 @@ class _Search:
         draft, settings = self.draft, self.draft.settings
         cell, stations = draft.cell, draft.stations()
         goals = [self._as_given(goal) for goal in task_goals(cell, draft.robots)]
-        table = ModeSearch(
-            cell=cell,
-            goals=goals,
-            stations=stations,
-            spins=draft.spins(),
-        ).table()
-        progress("stations", 0.0)
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
+        table = ModeSearch(
+            cell=cell, goals=goals, stations=stations, spins=draft.spins(), tool_fits=clearance.tool_fits
+        ).table()
+        progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
         refuse_impossible_tasks(draft, goals, table, {task for task, _, _ in modes})
@@ -330,7 +328,7 @@ def _task_values(
     place = f"tasks.{task.name}"
     values: dict[str, object] = {f"{place}.robot": robot}
     spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
-    if end.mode.spin:
+    if end.mode.spin and not task.is_spin_free:
         values[f"{place}.spin_deg"] = spin
     if task.start_posture is None:
         values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)

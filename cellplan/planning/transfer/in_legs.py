@@ -24,11 +24,13 @@ from cellplan.planning.timing.retime import JointLimitsInTime, Retimer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line, straight_steps
+from cellplan.scene.pairs import ScenePair
 from cellplan.scene.scene import Scene
 
 LEGS: Final = 3
 BACK: Final = (0.3, 0.6, 1.0)  # [-] shares of the way home that a robot backs off
 MOST_REFUSED: Final = 60  # legs that are refused before none is looked for any more
+NEARER: Final = 1e-5  # [m] than it may be that a pair is in rows that are not certified: rounding of quick distances
 MOST_COMBINATIONS: Final = 2_000_000  # of the routes of all robots that are compared
 CORNERED: Final = 2  # joints of a positioner that goes joint by joint
 START, GOAL = 0, 1  # places of a robot among those at which it may stand between two legs
@@ -101,6 +103,19 @@ def legs_of(query: TransferQuery, retimer: Retimer, tried: Tried) -> list[Array]
     return []
 
 
+def least_steps(query: TransferQuery, retimer: Retimer, refused: Mapping[str, Ends]) -> int:
+    """Steps that a move in legs takes at least where some robots cannot go straight at once.
+
+    Args:
+        query: Who moves from where to where.
+        retimer: The limits of all joints and the step of the rows.
+        refused: Ends of the move of those robots.
+    """
+    routes = {name: _routes_of(query, name, retimer, is_blocked=name in refused) for name in query.movers}
+    ends = _fastest(query, routes, [refused])
+    return 0 if ends is None else int(straight_steps(np.diff(ends, axis=0), retimer.bounds, retimer.step).sum())
+
+
 def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[str] | None:
     """Robots that carry the bodies of a pair that comes too near along a line; None where none does.
 
@@ -108,16 +123,26 @@ def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[s
         line: Stacked joint positions in [rad] or [m], shape (N, nq).
         movers: The robots that move, of which some are named.
     """
-    bound = certify(scene, line, with_minimum=False)
-    if bound.is_met:
-        return None
-    at_fault = (pair.pair for pair in bound.pairs if pair.touches or pair.unproved or pair.distance < pair.demand)
+    at_fault = _too_near(scene, line)
+    if not at_fault:
+        bound = certify(scene, line, with_minimum=False)
+        if bound.is_met:
+            return None
+        at_fault = [pair.pair for pair in bound.pairs if pair.touches or pair.unproved or pair.distance < pair.demand]
     carriers = [
         {body.robot for body in (scene.bodies[pair.first], scene.bodies[pair.second]) if body.link != BASE}
         for pair in at_fault
     ]
     named = [names for one in carriers if (names := {name for name in one if name in movers})]
     return min(named, key=lambda names: (len(names), sorted(names)), default=set(movers))
+
+
+def _too_near(scene: Scene, line: Array) -> list[ScenePair]:
+    """Pairs that are too near in the rows of a line already, which takes less than a certificate to see."""
+    demands = np.array([pair.least_distance for pair in scene.pairs])
+    near = scene.near(line, float(demands.max(initial=0.0)))
+    rows = np.unique(near.rows[near.distances < demands[near.rows] - NEARER])
+    return [scene.pairs[row] for row in rows.tolist()]
 
 
 def _routes_of(query: TransferQuery, name: str, retimer: Retimer, *, is_blocked: bool) -> RobotRoutes:

@@ -4,8 +4,8 @@ Both are examined in few configurations with a reserve, as an assignment needs m
 when it is solved.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from typing import Final
@@ -14,6 +14,7 @@ import numpy as np
 
 from cellplan.certify.run_pairs import rows_moved_by, scene_of_rows
 from cellplan.geometry.arrays import Array, Indices
+from cellplan.scene.bodies import Kind
 from cellplan.scene.pairs import Rule
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.goals import Stations
@@ -23,6 +24,7 @@ LOOKED_AT: Final = 5  # configurations of a mode that are examined, those before
 MET: Final = 4  # configurations of each of two modes that are combined
 RESERVE: Final = 0.007  # [m] beyond the demand, of bodies of different robots, the part and the surroundings
 WITHIN_ROBOT: Final = 0.0005  # [m] likewise of bodies of one robot, whose design often sets the distance
+AT_SEAM: Final = 0.0005  # [m] likewise of a tool and the part: their distance is that of the path, for any arm
 FAR: Final = 0.75  # [m] points on the axes of two arms that are farther apart do not meet
 
 
@@ -42,6 +44,7 @@ class AssignmentClearance:
     stations: Stations
     conflict: float
     examined: tuple[int, int] = (0, 0)
+    _fitting: dict[tuple[str, str, float], bool] = field(default_factory=dict)
 
     def stacked(self, modes: Mapping[str, Array], station: int) -> Array:
         """Stacked configurations with some robots in configurations of shape (S, n) each and the others at home."""
@@ -57,11 +60,21 @@ class AssignmentClearance:
         """Whether the part and its holder touch nothing at a station while all operators are at home."""
         return self._standing.touching(self.stacked({}, station)[0]) is None
 
+    def tool_fits(self, mode: TaskMode) -> bool:
+        """Whether its tool keeps its distance from the part: the same for all arms, branches and poses of the part."""
+        key = mode.task, mode.robot, mode.spin
+        if key not in self._fitting:
+            self._fitting[key] = self._keeps_apart(self._tools[mode.robot], mode, np.arange(len(mode.q)))
+        return self._fitting[key]
+
     def is_free(self, mode: TaskMode) -> bool:
         """Whether a mode keeps its distance from all that stands, from the part and within its robot."""
         self.examined = self.examined[0] + 1, self.examined[1]
-        scene, demands = self._alone[mode.robot]
-        rows = spread_rows(len(mode.q), LOOKED_AT)
+        return self._keeps_apart(self._alone[mode.robot], mode, spread_rows(len(mode.q), LOOKED_AT))
+
+    def _keeps_apart(self, demanded: tuple[Scene, Array], mode: TaskMode, rows: Indices) -> bool:
+        """Whether pairs keep the distances that they demand in [m] at some configurations of a mode."""
+        scene, demands = demanded
         near = scene.near(self.stacked({mode.robot: mode.q[rows]}, mode.station), float(demands.max(initial=0.0)))
         return bool(np.all(near.distances >= demands[near.rows]))
 
@@ -107,12 +120,19 @@ class AssignmentClearance:
     @cached_property
     def _alone(self) -> dict[str, tuple[Scene, Array]]:
         """By operator, the scene of its pairs but those with other operators at work, and their demands in [m]."""
-        scenes = {}
-        for name in self._operators:
-            rows = sorted(self._moved[name])
-            demands = np.array([self._demand(row) for row in rows])
-            scenes[name] = scene_of_rows(self.scene, rows), demands
-        return scenes
+        return {name: self._demanded(sorted(self._moved[name])) for name in self._operators}
+
+    @cached_property
+    def _tools(self) -> dict[str, tuple[Scene, Array]]:
+        """By operator, likewise of its tool and the part."""
+        return {
+            name: self._demanded([row for row in sorted(self._moved[name]) if self._is_of_seam(row)])
+            for name in self._operators
+        }
+
+    def _demanded(self, rows: Sequence[int]) -> tuple[Scene, Array]:
+        """The scene of some pairs, and their demands in [m]."""
+        return scene_of_rows(self.scene, rows), np.array([self._demand(row) for row in rows])
 
     @cached_property
     def _between(self) -> dict[tuple[str, ...], Scene]:
@@ -127,7 +147,13 @@ class AssignmentClearance:
         pair = self.scene.pairs[row]
         bodies = self.scene.bodies[pair.first], self.scene.bodies[pair.second]
         reserve = WITHIN_ROBOT if bodies[0].robot == bodies[1].robot else RESERVE
+        reserve = AT_SEAM if self._is_of_seam(row) else reserve
         return (pair.demand if pair.rule is Rule.CLEARANCE else 0.0) + reserve
+
+    def _is_of_seam(self, row: int) -> bool:
+        """Whether a pair is a tool and the part."""
+        pair = self.scene.pairs[row]
+        return {self.scene.bodies[it].kind for it in (pair.first, pair.second)} == {Kind.TOOL, Kind.PART}
 
 
 def spread_rows(count: int, looked_at: int) -> Indices:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Final, Self
+from typing import Self
 
 import numpy as np
 
@@ -14,12 +14,7 @@ from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import Stations, TaskGoal
 from cellplan.search.assign.rules import TaskRules
-from cellplan.search.assign.table import Key, ModeTable, TaskMode
-
-MOST_MODES: Final = 2  # free modes of one robot for one task at one station
-SECOND: Final = 0.25  # [-] worth of a further robot for a task that another one can do already, over their number
-WORTHLESS: Final = 0.05  # [-] share of the tasks: a station that is worth less is left out once all tasks are covered
-APART: Final = 0.3  # [rad, m] stations nearer than that to a chosen one are left out once all tasks are covered
+from cellplan.search.assign.table import Key, TaskMode
 
 Conflict = frozenset[Key]  # two of task, robot and station that cannot be at work together
 
@@ -131,72 +126,6 @@ def least_transfer(instance: Instance) -> int:
                 shortest.append(int(steps[places[:, None] != places[None]].min()))
     shortest += [instance.station_steps(a, b) for a in instance.used for b in instance.used if a != b]
     return min(shortest)
-
-
-def choose_stations(
-    table: ModeTable,
-    goals: Sequence[TaskGoal],
-    clearance: AssignmentClearance,
-    *,
-    most: int,
-    rules: TaskRules = TaskRules(),  # noqa: B008 - frozen
-) -> tuple[tuple[int, ...], dict[Key, tuple[TaskMode, ...]]]:
-    """Stations by greedy cover, with the free modes at them.
-
-    A station is worth most where tasks can be done that none of those chosen has a mode for, then where further robots
-    can do them.
-
-    Args:
-        most: Number of stations at most.
-        rules: Groups of tasks that must be possible too.
-    """
-
-    def meet(first: Key, second: Key) -> bool:
-        return first in modes and second in modes and clearance.meet(modes[first][0], modes[second][0])
-
-    at_station: dict[int, list[Key]] = {}
-    for key in table.modes:
-        at_station.setdefault(key[2], []).append(key)
-    candidates = {station for station in sorted(at_station) if clearance.is_open(station)}
-    able: dict[str, int] = dict.fromkeys((goal.name for goal in goals), 0)
-    used, modes = list[int](), dict[Key, tuple[TaskMode, ...]]()
-    while candidates and len(used) < most:
-        worth = {station: _worth(at_station[station], able) for station in sorted(candidates)}
-        covered = rules.covered(modes, meet)
-        for station in worth if covered < rules.grouped else ():
-            worth[station] += rules.covered([*modes, *at_station[station]], meet) - covered
-        best = max(worth, key=lambda station: (worth[station], -station))
-        if worth[best] < WORTHLESS * len(goals) and all(able.values()):
-            break
-        candidates.discard(best)
-        here = {key: free for key in at_station[best] if (free := _free(table.modes[key], clearance))}
-        if here:
-            used.append(best)
-            modes |= here
-        for task, _, _ in here:
-            able[task] += 1
-        if all(able.values()):
-            q = clearance.stations.q
-            candidates = {it for it in candidates if np.abs(q[it] - q[best]).max() > APART}
-    return tuple(used), modes
-
-
-def _worth(keys: Sequence[Key], able: Mapping[str, int]) -> float:
-    """What the modes at a station add to robots that are able to do each task."""
-    robots: dict[str, int] = {}
-    for task, _, _ in keys:
-        robots[task] = robots.get(task, 0) + 1
-    worth = ((1.0 if able[task] == 0 else SECOND / (1 + able[task])) + 0.01 * count for task, count in robots.items())
-    return round(sum(worth), 6)
-
-
-def _free(modes: Sequence[TaskMode], clearance: AssignmentClearance) -> tuple[TaskMode, ...]:
-    """The first modes that are free of collisions."""
-    free: list[TaskMode] = []
-    for mode in modes:
-        if len(free) < MOST_MODES and clearance.is_free(mode):
-            free.append(mode)
-    return tuple(free)
 
 
 def find_conflicts(modes: Mapping[Key, Sequence[TaskMode]], clearance: AssignmentClearance) -> frozenset[Conflict]:

@@ -6,7 +6,7 @@ Collisions come last and elsewhere, as they cost most.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -73,6 +73,7 @@ class ModeSearch:
     goals: Sequence[TaskGoal]
     stations: Stations
     spins: Array  # turns of the tool about its axis beside those of the tasks in [rad], shape (S,)
+    tool_fits: Callable[[TaskMode], bool] = lambda _: True  # whether the tool of a mode keeps away from the part
 
     def table(self) -> ModeTable:
         """The table of all robots."""
@@ -129,7 +130,9 @@ class ModeSearch:
                 margin=float(result.margins[index]),
                 directions=tuple(it for it in (False, True) if allowed[it][place] and (goal.is_reversible or not it)),
             )
-            table.modes.setdefault((goal.name, follower.robot.name, place), []).append(mode)
+            if self.tool_fits(mode):
+                table.note("tool by the part", [goal.name])
+                table.modes.setdefault((goal.name, follower.robot.name, place), []).append(mode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

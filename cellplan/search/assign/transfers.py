@@ -1,16 +1,16 @@
 """Transfers between blocks, certified straight; those that are refused cost what the move in legs takes instead."""
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from cellplan.certify.certify import certify
 from cellplan.certify.run_pairs import scene_of_run
 from cellplan.geometry.arrays import Array
 from cellplan.planning.timing.retime import Retimer
-from cellplan.planning.transfer.in_legs import legs_of, refusing_robots
+from cellplan.planning.transfer.in_legs import least_steps, legs_of, refusing_robots
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line, straight_steps
@@ -18,7 +18,7 @@ from cellplan.scene.scene import Scene
 from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, relocations
 from cellplan.search.assign.schedule import BlockSchedule
 
-MOST_SETTLED: Final = 60  # choices of modes until no transfer of the best one is newly refused
+MOST_SETTLED: Final = 200  # choices of modes until no transfer of the best one is newly refused
 
 
 @dataclass(eq=False)
@@ -36,7 +36,8 @@ class TransferCertifier:
     home: Array
     retimer: Retimer
     examined: int = 0
-    _known: set[bytes] = field(default_factory=set)
+    _known: dict[bytes, Refusal | None] = field(default_factory=dict)
+    _timed: set[bytes] = field(default_factory=set)  # those of which the legs are known
 
     def __post_init__(self) -> None:
         """In transfers no tool is at work."""
@@ -46,7 +47,7 @@ class TransferCertifier:
         """The best modes for an order of blocks in which no transfer is refused any more."""
         for _ in range(MOST_SETTLED):
             best = sequencer.sequenced(schedule)
-            refusals = self.refusals(sequencer, best)
+            refusals = self.refusals(sequencer, best) or self._in_legs(sequencer, best)
             if not refusals:
                 return best
             sequencer.refusals += refusals
@@ -70,36 +71,52 @@ class TransferCertifier:
             best = better
 
     def refusals(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
-        """Transfers of a sequence that are not free straight and were not known to be."""
-        resting: Stop = (None, (None,) * len(sequencer.instance.robots))
+        """Transfers of a sequence that are not free straight and were not known to be, with the least they may take."""
         refusals = []
-        for before, after in pairwise((resting, *sequenced.stops, resting)):
-            start, goal = self._stacked(sequencer, before, leaves=True), self._stacked(sequencer, after, leaves=False)
-            if (key := np.concatenate([start, goal]).tobytes()) in self._known:
-                continue
-            self._known.add(key)
-            refusal = self._refusal(sequencer, (start, goal), (before[0], after[0]))
-            refusals += [] if refusal is None else [refusal]
+        for query, stations, key in self._transfers(sequencer, sequenced):
+            if key not in self._known:
+                self._known[key] = self._refusal(sequencer, query, stations)
+                refusals += [] if (refusal := self._known[key]) is None else [refusal]
         return refusals
 
+    def _in_legs(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
+        """Transfers of a sequence that were refused, once more with what their legs take."""
+        refusals = []
+        for query, _, key in self._transfers(sequencer, sequenced):
+            if (refusal := self._known[key]) is not None and key not in self._timed:
+                self._timed.add(key)
+                legs = legs_of(query, self.retimer, Tried())
+                steps = self._steps_of(legs) if legs else self._one_by_one(query)
+                refusals += [replace(refusal, steps=steps)] if steps > refusal.steps else []
+        return refusals
+
+    def _transfers(
+        self, sequencer: Sequencer, sequenced: SequencedBlocks
+    ) -> Iterator[tuple[TransferQuery, tuple[int | None, int | None], bytes]]:
+        """Transfers of a sequence with their stations, each with what it is known by."""
+        resting: Stop = (None, (None,) * len(sequencer.instance.robots))
+        for before, after in pairwise((resting, *sequenced.stops, resting)):
+            start, goal = self._stacked(sequencer, before, leaves=True), self._stacked(sequencer, after, leaves=False)
+            query = TransferQuery.of(self.scene, start, goal, seed=0, home=self.home)
+            yield query, (before[0], after[0]), np.concatenate([start, goal]).tobytes()
+
     def _refusal(
-        self, sequencer: Sequencer, ends: tuple[Array, Array], stations: tuple[int | None, int | None]
+        self, sequencer: Sequencer, query: TransferQuery, stations: tuple[int | None, int | None]
     ) -> Refusal | None:
         """The refusal of a transfer; None where it is free straight."""
-        start, goal = ends
-        query = TransferQuery.of(self.scene, start, goal, seed=0, home=self.home)
+        start, goal = query.start, query.goal
         self.examined += 1
-        line = straight_line(start, goal)
-        if not query.movers or certify(self.scene, line, with_minimum=False).is_met:
+        carriers = refusing_robots(self.scene, straight_line(start, goal), query.movers) if query.movers else None
+        if carriers is None:
             return None
-        carriers = refusing_robots(self.scene, line, query.movers) or set(query.movers)
-        columns = {name: self.scene.cell.columns(name) for name in sequencer.instance.robots if name in carriers}
-        legs = legs_of(query, self.retimer, Tried())
+        columns = {name: self.scene.cell.columns(name) for name in query.movers if name in carriers}
+        ends = {name: (start[at].tobytes(), goal[at].tobytes()) for name, at in columns.items()}
+        operators = [name for name in columns if name in sequencer.instance.robots]
         return Refusal(
-            before={name: start[at].tobytes() for name, at in columns.items()},
-            after={name: goal[at].tobytes() for name, at in columns.items()},
+            before={name: ends[name][0] for name in operators},
+            after={name: ends[name][1] for name in operators},
             stations=stations,
-            steps=self._steps_of(legs) if legs else self._one_by_one(query),
+            steps=least_steps(query, self.retimer, ends),
         )
 
     def _steps_of(self, ends: list[Array]) -> int:
