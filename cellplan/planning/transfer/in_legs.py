@@ -113,7 +113,8 @@ def least_steps(query: TransferQuery, retimer: Retimer, refused: Mapping[str, En
     """
     routes = {name: _routes_of(query, name, retimer, is_blocked=name in refused) for name in query.movers}
     ends = _fastest(query, routes, [refused])
-    return 0 if ends is None else int(straight_steps(np.diff(ends, axis=0), retimer.bounds, retimer.step).sum())
+    at = np.array([query.start, query.goal] if ends is None else ends)
+    return int(straight_steps(at[:-1], at[1:], retimer.bounds, retimer.step).sum())
 
 
 def refusing_robots(scene: Scene, line: Array, movers: tuple[str, ...]) -> set[str] | None:

@@ -57,7 +57,9 @@ def test_the_first_station_lets_most_work_be_shared(
 
     robots = {(task, robot) for task, robot, _ in modes}
     assert {robot for _, robot in robots} == {"west", "east"}
-    done = {station: {key[0] for key in table.modes if key[2] == station} for station in {key[2] for key in table.modes}}
+    done = {
+        station: {key[0] for key in table.modes if key[2] == station} for station in {key[2] for key in table.modes}
+    }
     assert len(done[first]) == max(len(tasks) for station, tasks in done.items() if clearance.is_open(station))
 
 
