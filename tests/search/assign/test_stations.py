@@ -66,7 +66,7 @@ def test_the_first_station_lets_most_work_be_shared(
 def test_whether_the_tool_fits_is_the_same_for_all_branches_and_poses_of_the_part(
     searched: tuple[ModeTable, list[TaskGoal], AssignmentClearance],
 ) -> None:
-    table, goals, clearance = searched
+    table, _, clearance = searched
     by_spin: dict[tuple[str, str, float], list[bool]] = {}
     for choices in table.modes.values():
         for mode in choices[:1]:
