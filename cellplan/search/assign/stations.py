@@ -127,10 +127,10 @@ class _Cover:
             total[~is_done] += dear
         return total + loads.max(axis=2).sum(axis=1)
 
-    def _groups_left(self, keys: Collection[Key]) -> int:
+    def _groups_left(self, keys: Collection[Key]) -> float:
         """Groups of tasks that are not possible at the stations in use and one more."""
         if not self._rules.grouped:
-            return 0
+            return 0.0
         return self._rules.grouped - self._rules.covered([*self.modes, *keys], self._meet)
 
     def _meet(self, first: Key, second: Key) -> bool:
