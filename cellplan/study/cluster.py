@@ -1,9 +1,13 @@
-"""Cluster: the trials of a study on the workers of a Dask scheduler, each in a child process of its worker."""
+"""Cluster: the trials of a study on the workers of a Dask scheduler, each in a child process of its worker.
+
+The files of the study travel too, once, by their content: workers need no file system in common with it.
+"""
 
 import platform
 import queue
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, InvalidStateError
 from contextlib import suppress
@@ -15,6 +19,7 @@ import numpy as np
 
 import cellplan
 from cellplan.errors import InputError, NotFiniteError, StudyStoppedError
+from cellplan.study.bundle import Bundle
 from cellplan.study.workers import Lost
 
 CONNECT_S: Final = 10.0  # [s] within which the scheduler answers at the start
@@ -38,8 +43,11 @@ class Cluster(Executor):
 
     is_remote = True
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, bundle: Bundle | None = None) -> None:
         """Connect.
+
+        Args:
+            bundle: The files that the trials read; None where they read none.
 
         Raises:
             InputError: Dask is not installed, the address is none or nothing answers there.
@@ -49,6 +57,7 @@ class Cluster(Executor):
         self._dask = self._client.get_executor(pure=False)
         threads = sum(self._client.sync(self._client.scheduler.ncores, callback_timeout=CONNECT_S).values())
         self.count = max(2, PER_THREAD * threads)
+        self._bundle, self._held = bundle, list[tuple[object, Any]]()
         self._running: dict[Future[Any], _Sent] = {}
         self._again: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
         self._is_over = threading.Event()
@@ -68,9 +77,24 @@ class Cluster(Executor):
     def submit(self, function: Callable[..., Any], /, *arguments: object, **named: object) -> Future[Any]:
         """Begin a job on the cluster."""
         outer: Future[Any] = Future()
-        call = partial(self._dask.submit, checked, _versions(), function, *arguments, **named)
-        self._send(outer, call)
+        self._send(outer, partial(self._begun, function, *arguments, **named))
         return outer
+
+    def _begun(self, function: Callable[..., Any], *arguments: object, **named: object) -> Future[Any]:
+        """A job of Dask."""
+        sent: Future[Any] = self._dask.submit(checked, _versions(), self._files(), function, *arguments, **named)
+        return sent
+
+    def _files(self) -> Any:
+        """The files of the study as a result of Dask, which recomputes what is lost with a worker; None without any."""
+        if self._bundle is None:
+            return None
+        connection = self._client.scheduler_comm
+        if not self._held or self._held[-1][0] is not connection:
+            key = f"cellplan-files-{self._bundle.digest}-{len(self._held)}"
+            with warnings.catch_warnings(action="ignore", category=UserWarning):  # that files are large
+                self._held.append((connection, self._client.submit(itself, self._bundle, key=key)))
+        return self._held[-1][1]
 
     def _send(self, outer: Future[Any], call: Callable[[], Any]) -> None:
         """Give a job to Dask."""
@@ -160,15 +184,20 @@ def _answer(outer: Future[Any], answer: Any) -> None:
         outer.set_exception(answer) if isinstance(answer, BaseException) else outer.set_result(answer)
 
 
-def checked(versions: dict[str, str], function: Callable[..., Any], *arguments: object) -> Any:
-    """Result of a job on a worker of the cluster.
+def itself(bundle: Bundle) -> Bundle:
+    """The files of a study, on a worker."""
+    return bundle
+
+
+def checked(versions: dict[str, str], bundle: Bundle | None, function: Callable[..., Any], *arguments: object) -> Any:
+    """Result of a job on a worker of the cluster; its last argument is the folder of the bundle, if there is one.
 
     Raises:
         StudyStoppedError: The worker has other versions, so that its figures would be other ones.
     """
     if versions != _versions():
         raise StudyStoppedError(f"--scheduler: expected workers with {versions}, got one with {_versions()}")
-    return function(*arguments)
+    return function(*arguments) if bundle is None else function(*arguments, bundle.root())
 
 
 def _versions() -> dict[str, str]:

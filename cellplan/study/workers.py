@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 from cellplan.errors import CellplanError, NotFiniteError, OverrunError, StudyStoppedError, TimeLimitError
 from cellplan.guard import ChildStock, Guard
+from cellplan.study.bundle import Unpacked, packed_with_paths, reading_below
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 
 ADDRESS: Final = re.compile(r" at 0x[0-9a-fA-F]+")  # of an object in an error text: another one in each process
@@ -127,7 +128,7 @@ def _children() -> ChildStock:
 def packed(evaluate: Evaluate) -> bytes:
     """What an evaluator is sent to a worker as."""
     try:
-        payload = pickle.dumps(evaluate)
+        payload = packed_with_paths(evaluate)
     except (AttributeError, TypeError, pickle.PicklingError) as error:
         raise TypeError(f"evaluate: expected a function of a module, bound to plain data, got {error}") from None
     if b"__main__" in payload:
@@ -135,8 +136,12 @@ def packed(evaluate: Evaluate) -> bytes:
     return payload
 
 
-def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str | Lost:
-    """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost."""
+def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits, root: str = "") -> str | Lost:
+    """Outcome of a trial as JSON, worked out in a child process of this one; or how it was lost.
+
+    Args:
+        root: The folder of the files of the study; empty where they stand under their own paths.
+    """
     guard = Guard(
         file=f"trial {variant.number}",
         worker="its process",
@@ -145,13 +150,14 @@ def outcome_in_child(evaluate: bytes, variant: Variant, limits: Limits) -> str |
         megabytes=limits.megabytes,
     )
     try:
-        text: str = _children().call(evaluated, evaluate, variant, guard=guard, prepare=(prepared, evaluate, START))
+        prepare = prepared, (evaluate, root), START
+        text: str = _children().call(evaluated, evaluate, variant, root, guard=guard, prepare=prepare)
     except OverrunError as error:
         return Lost(str(error), isinstance(error, TimeLimitError))
     return text
 
 
-def evaluated(evaluate: bytes, variant: Variant) -> str:
+def evaluated(evaluate: bytes, variant: Variant, root: str = "") -> str:
     """Outcome of a trial as JSON; an exception of the evaluator is one too.
 
     Raises:
@@ -159,20 +165,24 @@ def evaluated(evaluate: bytes, variant: Variant) -> str:
         NotFiniteError: A figure of the trial is no number: what it judges by is wrong.
         MemoryError: There is not enough of it.
     """
+    as_written: Callable[[str], str] = str
     try:
-        return _text(_unpacked(evaluate)(variant))
+        unpacked = _unpacked(evaluate, root)
+        as_written = unpacked.as_written
+        with reading_below(root):
+            return as_written(_text(unpacked.value(variant)))
     except (StudyStoppedError, NotFiniteError, MemoryError):
         raise
     except Exception as error:  # noqa: BLE001 - the trial's own
         said = (str(error).splitlines() or [""])[0]
         reason = said if isinstance(error, CellplanError) else f"{type(error).__name__}: {said}"
-        return _text(crashed(ADDRESS.sub("", reason)))
+        return as_written(_text(crashed(ADDRESS.sub("", reason))))
 
 
-def prepared(evaluate: bytes) -> None:
+def prepared(evaluate_and_root: tuple[bytes, str]) -> None:
     """Read what the evaluator needs; an error of it shows in every trial."""
     with suppress(Exception):
-        _unpacked(evaluate)
+        _unpacked(*evaluate_and_root)
 
 
 def crashed(reason: str) -> TrialOutcome:
@@ -181,10 +191,9 @@ def crashed(reason: str) -> TrialOutcome:
 
 
 @lru_cache(maxsize=1)
-def _unpacked(evaluate: bytes) -> Evaluate:
+def _unpacked(evaluate: bytes, root: str) -> Unpacked:
     """The evaluator, which keeps what it has read from one trial to the next."""
-    unpacked: Evaluate = pickle.loads(evaluate)  # noqa: S301 - packed by the process that asks
-    return unpacked
+    return Unpacked(evaluate, root)
 
 
 def _text(outcome: TrialOutcome) -> str:

@@ -1,6 +1,7 @@
 """Studies on a Dask cluster of processes of this machine."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,12 +15,15 @@ import pytest
 from builders.study_trials import Killer, Wrong, halved, rounds
 
 from cellplan.errors import InputError, StudyStoppedError
+from cellplan.jobs.sweep.sweep import SweepJob, files_of, sweep
 from cellplan.study.cluster import Cluster
 from cellplan.study.folder import JOURNAL
 from cellplan.study.study import Stop
+from cellplan.study.variants import read_axis
 from cellplan.study.workers import Workers
 
 TRIALS = Stop(trials=14)
+CELLS = Path(__file__).resolve().parents[2] / "cells"
 
 
 class LocalCluster:
@@ -36,9 +40,10 @@ class LocalCluster:
         line = next(line for line in scheduler.stderr if "Scheduler at:" in line)
         self.address = line.split()[-1]
 
-    def start_worker(self) -> None:
+    def start_worker(self, folder: Path | None = None) -> None:
         """Start a worker of one thread and wait for it to be registered."""
-        worker = self._started("worker", self.address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
+        worker = self._started("worker", self.address, *options, folder=folder)
         assert worker.stderr is not None
         assert any("Registered to" in line for line in worker.stderr)
 
@@ -49,13 +54,14 @@ class LocalCluster:
             process.send_signal(number)
             process.communicate()
 
-    def _started(self, kind: str, *arguments: str) -> subprocess.Popen[str]:
+    def _started(self, kind: str, *arguments: str, folder: Path | None = None) -> subprocess.Popen[str]:
         process = subprocess.Popen(
             [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+            cwd=folder,
         )
         self.processes.append(process)
         return process
@@ -94,6 +100,42 @@ def test_a_cluster_gives_the_same_study_although_a_worker_is_killed(cluster: Loc
     result = on_cluster(cluster, tmp_path / "cluster", Killer(tmp_path / "mark"))
     assert [process.poll() for process in cluster.processes].count(-signal.SIGKILL) == 1
     assert result == here(tmp_path / "here", Killer(tmp_path / "mark"))
+
+
+@pytest.mark.slow
+def test_workers_need_no_file_of_the_study_although_one_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cell is named from the folder of this process; those of the workers are empty."""
+    pytest.importorskip("distributed")
+    shutil.copytree(CELLS, tmp_path / "job")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "job")
+    job = SweepJob(cell=Path("own_urdf.yaml"))
+    axes = [read_axis("robots.own.model=robots/own_arm.urdf,robots/none.urdf"), read_axis("motion.duration_s=3,4,5")]
+    started, killed = LocalCluster(), list[int]()
+
+    def kill(_stage: str, share: float) -> None:
+        if share > 0.1 and not killed:
+            killed.append(started.processes[1].pid)
+            started.processes[1].kill()
+
+    try:
+        started.start_scheduler()
+        for _ in range(2):
+            started.start_worker(tmp_path / "empty")
+        with Cluster(started.address, files_of(job, axes)) as executor:
+            record = sweep(job, axes, tmp_path / "there", workers=executor, progress=kill)
+        with Cluster(started.address) as executor:
+            blind = sweep(job, axes, tmp_path / "blind", workers=executor)
+    finally:
+        started.end()
+    assert killed
+    assert record["counts"]["passed"] == 3
+    assert blind["counts"]["passed"] == 0  # the workers find nothing by themselves
+    sweep(job, axes, tmp_path / "here", workers=1)
+    for name in ("study.jsonl", "study.json", "study.csv", "study.html"):
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """``cellplan map``: the base plane of one robot, coloured by whether the whole job passes at each place."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +38,7 @@ class MapOptions(Options):
     workers: Annotated[
         int | None, option("--workers N", "Processes that judge (default: one for each processor).", min=1)
     ] = None
+    scheduler: shared.Scheduler = None
     resume: Annotated[bool, option("--resume", "Continue the map in the folder.")] = False
     status: Annotated[bool, option("--status", "Say how far the map in the folder is, and do nothing.")] = False
     formats: shared.PlotFormats = ()
@@ -51,10 +53,10 @@ def base_map(options: MapOptions) -> Result | None:
     Exit status: 0 at least one place passes (with --certify: is verified), 1 none does, 2 bad input, 3 no start at the
     present base, 130 interrupted (--resume goes on).
     """
-    from cellplan.guard import processors
+    from cellplan.cli.options.crew import crew
     from cellplan.jobs.base_map.base_map import NOUN, map_study
     from cellplan.jobs.base_map.grid import BaseGrid, read_span, read_yaw
-    from cellplan.jobs.base_map.prepared import MapRequest, requested_cell
+    from cellplan.jobs.base_map.prepared import MapRequest, files_of, requested_cell
     from cellplan.jobs.base_map.result import map_lines
     from cellplan.study.status import read_status
 
@@ -69,11 +71,15 @@ def base_map(options: MapOptions) -> Result | None:
     if options.status:
         say(f"{folder}: {read_status(folder).text(NOUN)}")
         return None
-    with progress_listener(quiet=options.quiet) as progress, resumable():
+    with (
+        crew(options.workers, options.scheduler, partial(files_of, request)) as workers,
+        progress_listener(quiet=options.quiet) as progress,
+        resumable(),
+    ):
         record = map_study(
             request,
             folder,
-            workers=options.workers or processors(),
+            workers=workers,
             resume=options.resume,
             certify=options.certify,
             progress=progress,

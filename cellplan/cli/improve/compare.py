@@ -1,6 +1,7 @@
 """``cellplan compare``: one cell in every mode, or several cells and runs, side by side."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -33,6 +34,7 @@ class CompareOptions(Options):
     settings: shared.Settings = ()
     task: shared.TaskName = None
     workers: shared.Solvers = None
+    scheduler: shared.Scheduler = None
     resume: shared.ResumeStudy = False
     keep_runs: shared.KeepRuns = False
     formats: shared.PlotFormats = ()
@@ -47,15 +49,19 @@ def compare(options: CompareOptions) -> Result:
     What fails or cannot be planned is a column with its reason. Exit status: 0 at least one passed, 1 none did, 2 bad
     input, 130 interrupted (--resume goes on).
     """
-    from cellplan.guard import processors
-    from cellplan.jobs.compare.compare import CompareJob, first_name
+    from cellplan.cli.options.crew import crew
+    from cellplan.jobs.compare.compare import CompareJob, files_of, first_name
     from cellplan.jobs.compare.compare import compare as run_comparison
     from cellplan.jobs.compare.result import comparison_lines
 
     job = options.to(CompareJob)
-    folder, workers = options.output or Path("outputs") / f"{first_name(job)}-compare", options.workers or processors()
+    folder = options.output or Path("outputs") / f"{first_name(job)}-compare"
     job = replace(job, runs=folder if options.keep_runs else None)
-    with progress_listener(quiet=options.quiet) as progress, resumable():
+    with (
+        crew(options.workers, options.scheduler, partial(files_of, job), keep_runs=options.keep_runs) as workers,
+        progress_listener(quiet=options.quiet) as progress,
+        resumable(),
+    ):
         record = run_comparison(job, folder, workers=workers, resume=options.resume, progress=progress)
     status, lines = exit_status(record["counts"]), comparison_lines(record, folder)
     return result_of_folder(options.schema, status, lines, folder / "study.html", study=record)

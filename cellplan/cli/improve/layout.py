@@ -64,14 +64,7 @@ class LayoutOptions(Options):
     workers: Annotated[
         int | None, option("--workers N", "Processes that search (default: one for each processor).", min=1)
     ] = None
-    scheduler: Annotated[
-        str | None,
-        option(
-            "--scheduler ADDRESS",
-            "Dask scheduler whose workers search, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]). They read "
-            "the cell file under the same path.",
-        ),
-    ] = None
+    scheduler: shared.Scheduler = None
     repair: Annotated[
         bool, option("--repair", "Find the smallest change with which the cell passes, and other remedies.")
     ] = False

@@ -1,12 +1,13 @@
 """Searches of ``cellplan layout`` and ``cellplan fastest --free``: request, work, and what came of it."""
 
 from collections.abc import Callable
-from concurrent.futures import Executor
 from contextlib import ExitStack
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
+from cellplan.cli.options.crew import crew
 from cellplan.cli.options.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
@@ -16,7 +17,7 @@ from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.run.folder import refuse_unless_replaceable
 from cellplan.guard import processors
-from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.request import LayoutRequest, files_of
 from cellplan.jobs.layout.result import layout_lines
 from cellplan.jobs.layout.search import layout_workers, refuse_search, search_layout
 from cellplan.jobs.repair.record import SCHEMA
@@ -62,12 +63,12 @@ def searched(options: SearchOptions, request: LayoutRequest) -> Result:
         InterruptedWorkError: The search was interrupted.
     """
     stop = Stop(trials=options.trials, seconds=_quantity("--budget", options.budget, read_time))
-    if options.workers is not None and options.scheduler is not None:
-        raise InputError("--workers: unexpected beside --scheduler, whose workers search; leave one of them out")
     folder = study_folder(options, "fastest" if request.free else "layout")
     refuse_search(request, folder, resume=options.resume)
     with ExitStack() as opened:
-        workers = opened.enter_context(_workers(options, request))
+        workers = opened.enter_context(crew(options.workers, options.scheduler, partial(files_of, request)))
+        if isinstance(workers, int):
+            workers = opened.enter_context(layout_workers(workers, request))
         progress = opened.enter_context(progress_listener(quiet=options.quiet))
         opened.enter_context(resumable())
         record = search_layout(
@@ -97,15 +98,6 @@ def repaired(options: "LayoutOptions", request: LayoutRequest) -> Result:
 def study_folder(options: SearchOptions, what: str) -> Path:
     """Where a study is written: beside other results of the cell unless the options say otherwise."""
     return options.output or (Path("outputs") / f"{load_cell(options.cell, allow_dirs=options.allow_dirs).name}-{what}")
-
-
-def _workers(options: SearchOptions, request: LayoutRequest) -> Executor:
-    """The processes that search, here or of a cluster."""
-    if options.scheduler is None:
-        return layout_workers(options.workers or processors(), request)
-    from cellplan.study.cluster import Cluster
-
-    return Cluster(options.scheduler)
 
 
 def _quantity(option: str, text: str | None, read: Callable[[str, str], Value]) -> Value | None:

@@ -1,6 +1,7 @@
 """``cellplan sweep``: solve every combination of some values of a cell, and compare what comes of them."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -33,6 +34,7 @@ class SweepOptions(Options):
     settings: shared.Settings = ()
     task: shared.TaskName = None
     workers: shared.Solvers = None
+    scheduler: shared.Scheduler = None
     resume: shared.ResumeStudy = False
     keep_runs: shared.KeepRuns = False
     formats: shared.PlotFormats = ()
@@ -47,19 +49,23 @@ def sweep(options: SweepOptions) -> Result:
     A variant that fails is a row with its reason. Exit status: 0 at least one variant passed, 1 none did, 2 bad input,
     130 interrupted (--resume goes on).
     """
+    from cellplan.cli.options.crew import crew
     from cellplan.files.cell.load import load_cell
-    from cellplan.guard import processors
     from cellplan.jobs.sweep.result import study_lines
-    from cellplan.jobs.sweep.sweep import SweepJob
+    from cellplan.jobs.sweep.sweep import SweepJob, files_of
     from cellplan.jobs.sweep.sweep import sweep as run_sweep
     from cellplan.study.variants import read_axis
 
     axes = [read_axis(text) for text in options.vary]
     name = load_cell(options.cell, allow_dirs=options.allow_dirs).name
-    folder, workers = options.output or Path("outputs") / f"{name}-sweep", options.workers or processors()
+    folder = options.output or Path("outputs") / f"{name}-sweep"
     settings = options.settings if options.mode is None else (f"motion.mode={options.mode}", *options.settings)
     job = options.to(SweepJob, settings=settings, runs=folder if options.keep_runs else None)
-    with progress_listener(quiet=options.quiet) as progress, resumable():
+    with (
+        crew(options.workers, options.scheduler, partial(files_of, job, axes), keep_runs=options.keep_runs) as workers,
+        progress_listener(quiet=options.quiet) as progress,
+        resumable(),
+    ):
         record = run_sweep(job, axes, folder, workers=workers, resume=options.resume, progress=progress)
     status = ExitStatus.PASSED if record["counts"]["passed"] else ExitStatus.CHECK_FAILED
     return result_of_folder(options.schema, status, study_lines(record, folder), folder / "study.html", study=record)

@@ -80,4 +80,12 @@ Seed = Annotated[int, option("--seed N", "Seed of starts and perturbations.", mi
 ResumeSearch = Annotated[bool, option("--resume", "Continue the search in the folder.")]
 ResumeStudy = Annotated[bool, option("--resume", "Continue the study in the folder.")]
 KeepRuns = Annotated[bool, option("--keep-runs", "Keep the run folder of every variant below runs/.")]
+Scheduler = Annotated[
+    str | None,
+    option(
+        "--scheduler ADDRESS",
+        "Dask scheduler whose workers do the work, such as tcp://10.0.0.5:8786 (extra: cellplan[cluster]); the files "
+        "of the cell travel to them.",
+    ),
+]
 Solvers = Annotated[int | None, option("--workers N", "Processes that solve (default: one for each processor).", min=1)]

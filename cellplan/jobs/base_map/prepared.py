@@ -25,6 +25,7 @@ from cellplan.search.base_map.verdicts import MapJob
 from cellplan.search.kernel.job import MOST, Job, Layouts, enough_nodes
 from cellplan.search.kernel.run import run
 from cellplan.search.synchronous import refuse_other_methods
+from cellplan.study.bundle import Bundle
 
 NODES: Final = 65  # [-] of a motion at least: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
 
@@ -133,6 +134,11 @@ def requested_cell(request: MapRequest) -> Cell:
     """The cell with all that the request sets in it."""
     cell = load_cell(request.cell, allow_dirs=request.allow_dirs)
     return with_overrides(cell, request.settings, mode=request.mode)
+
+
+def files_of(request: MapRequest) -> Bundle:
+    """The files that a map reads."""
+    return Bundle.of([(request.cell, requested_cell(request))], allow_dirs=request.allow_dirs)
 
 
 def refuse_map(cell: Cell, name: str, grid: BaseGrid) -> None:

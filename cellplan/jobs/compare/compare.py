@@ -34,6 +34,7 @@ from cellplan.runs.outcome import solved_outcome
 from cellplan.runs.overrides import require_task, with_overrides
 from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
+from cellplan.study.bundle import Bundle
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
 from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
@@ -124,6 +125,13 @@ def first_name(job: CompareJob) -> str:
     """
     _refuse_unfitting(job)
     return _cell_name(_source(job, job.subjects[0]))
+
+
+def files_of(job: CompareJob) -> Bundle:
+    """The files of the cells that are compared, and the whole of the runs."""
+    cells = [path for path in job.subjects if not path.is_dir()]
+    read = ((path, with_overrides(load_cell(path, allow_dirs=job.allow_dirs), job.settings)) for path in cells)
+    return Bundle.of(read, allow_dirs=job.allow_dirs, runs=[path for path in job.subjects if path.is_dir()])
 
 
 def evaluate_subject(job: CompareJob, variant: Variant) -> TrialOutcome:

@@ -4,7 +4,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from cellplan.files.cell.load import load_cell
+from cellplan.runs.overrides import with_overrides
 from cellplan.search.programs.objective import CycleTiming, Objective
+from cellplan.study.bundle import Bundle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,3 +70,10 @@ class LayoutRequest:
             "try": [path.name for path in self.attempts],
             "seed": self.seed,
         }
+
+
+def files_of(request: LayoutRequest) -> Bundle:
+    """The files that a search reads."""
+    given, *others = (load_cell(path, allow_dirs=request.allow_dirs) for path in (request.cell, *request.attempts))
+    cells = [with_overrides(given, request.settings), *others]
+    return Bundle.of(zip((request.cell, *request.attempts), cells, strict=True), allow_dirs=request.allow_dirs)

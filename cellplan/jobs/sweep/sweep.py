@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from cellplan.runs.outcome import solved_outcome
 from cellplan.runs.overrides import require_task, with_overrides
 from cellplan.runs.solution import Solution
 from cellplan.runs.write_run import versions
+from cellplan.study.bundle import Bundle
 from cellplan.study.folder import run_folder, write_results
 from cellplan.study.study import Study
 from cellplan.study.trial import TrialOutcome, Variant
@@ -98,6 +100,17 @@ def sweep(
     record = study_record(header, [trial.record for trial in finished.trials])
     write_results(folder, study_files(record, job.formats))
     return record
+
+
+def files_of(job: SweepJob, axes: Sequence[Axis]) -> Bundle:
+    """The files that the variants read, those that only a value of a key names among them."""
+    base = _base_cell(job)
+    cells = [base]
+    for axis in axes:
+        for value in axis.values:
+            with suppress(InputError):  # the variant says what is wrong
+                cells.append(base.with_values({axis.address: value}))
+    return Bundle.of([(job.cell, cell) for cell in cells], allow_dirs=job.allow_dirs)
 
 
 def evaluate_variant(job: SweepJob, variant: Variant) -> TrialOutcome:

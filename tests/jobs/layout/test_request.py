@@ -40,7 +40,7 @@ def test_a_quantity_is_read_with_its_unit(read, text, value):  # type: ignore[no
         ),
         (
             ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
-            "error: --workers: unexpected beside --scheduler, whose workers search; leave one of them out",
+            "error: --workers: unexpected beside --scheduler, whose workers do the work; leave one of them out",
         ),
         (["--budget", "0"], "error: --budget: expected a time above 0 such as 60s or 10min, got '0'"),
         (["--clearance", "-1mm"], "error: --clearance: expected a length such as 10mm (mm, cm, m), got '-1mm'"),
