@@ -77,13 +77,13 @@ class Cluster(Executor):
     def submit(self, function: Callable[..., Any], /, *arguments: object, **named: object) -> Future[Any]:
         """Begin a job on the cluster."""
         outer: Future[Any] = Future()
-        self._send(outer, partial(self._begun, function, *arguments, **named))
-        return outer
 
-    def _begun(self, function: Callable[..., Any], *arguments: object, **named: object) -> Future[Any]:
-        """A job of Dask."""
-        sent: Future[Any] = self._dask.submit(checked, _versions(), self._files(), function, *arguments, **named)
-        return sent
+        def call() -> Future[Any]:
+            sent: Future[Any] = self._dask.submit(checked, _versions(), self._files(), function, *arguments, **named)
+            return sent
+
+        self._send(outer, call)
+        return outer
 
     def _files(self) -> Any:
         """The files of the study as a result of Dask, which recomputes what is lost with a worker; None without any."""
