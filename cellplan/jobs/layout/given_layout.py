@@ -105,7 +105,7 @@ def _violations(ready: PreparedSearch, standing: Standing | None, rejected: str)
     """What a rejected layout breaks, the worst first: at the nodes of the search, else why it is rejected."""
     limits = list[LimitRecord]()
     if standing is not None:
-        demands = ready.demands(objective="conforming", duration=ready.duration)
+        demands = ready.demands(objective="conforming", **({} if ready.phases else {"duration": ready.duration}))
         limits = standing_of(standing.problem, standing.measures.point, demands, EFFORT).violations()
     return limits or [{"kind": "check", "subject": "", "text": rejected}]
 
@@ -118,6 +118,6 @@ def _rounded(value: float | None) -> Number:
 def _shown_start(ready: PreparedSearch) -> Array:
     """The configuration in which the given layout is drawn: its start, or all joints at zero without one."""
     try:
-        return ready.given_start
+        return ready.given_start[: ready.cell.joint_count]
     except NoSolutionError:
         return np.zeros(ready.cell.joint_count)

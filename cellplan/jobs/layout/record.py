@@ -171,7 +171,7 @@ def layout_record(
         "solves": sum(result.solves for result in tried.values()),
         "given": given.record,
         "best": next((candidate for candidate in listed if best and candidate["trial"] == best.trial), None),
-        "velocity_only_s": _velocity_only(best) if best and has_accelerations else None,
+        "velocity_only_s": _velocity_only(best) if best and has_accelerations and ready.phases is None else None,
         "top": listed[:TOP],
         "front": _front(listed),
         "binding": best.standing.binding() if best else [],

@@ -97,15 +97,18 @@ class _Search:
         return replace(study, propose=self.proposals, enough=is_enough)
 
     def _best(self, finished: Finished) -> CandidateResult | None:
-        """The first candidate that passes, best first."""
+        """The first candidate that passes, best first; of programs, whose transfers are estimates, the fastest one."""
+        passed = list[CandidateResult]()
         for finalist in self.finish.ordered(self.candidates(finished))[:CANDIDATES]:
             number = finalist.trial.number
             if number not in self.tried:
                 self.progress(f"certifying trial {number}", 1.0)
                 self.tried[number] = self.finish.certified(finalist)
             if self.tried[number].passed:
-                return self.tried[number]
-        return None
+                passed.append(self.tried[number])
+                if self.ready.phases is None or self.request.objective is not Objective.CYCLE:
+                    break
+        return min(passed, key=lambda result: (result.cycle, result.trial), default=None)
 
     def candidates(self, finished: Finished) -> list[StudyTrial]:
         """Trials that conform by the search, best first."""

@@ -19,7 +19,8 @@ from cellplan.model.units import DEG, MM
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.run import run
-from cellplan.search.spline_path.problem import PathProblem
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.synchronous import refuse_other_jobs
 
 DRAWS: Final = 48  # [-] layouts nearby that are tried side by side where there is no motion
 SPREADS: Final = (0.5, 1.0, 2.0, 4.0)  # [-] usual steps by which they differ, more and more
@@ -34,6 +35,8 @@ def ready_cell(request: LayoutRequest) -> PreparedSearch:
     Where a joint path may change, so may the start posture of its robot, which decides the motion without one.
     """
     cell = searched_cell(request)
+    if cell.program.is_home_to_home:
+        refuse_other_jobs(cell, "--repair")
     for robot in cell.robots:
         if robot.path is not None:
             where = cell.origin.at(f"robots.{robot.name}.path")
@@ -88,7 +91,7 @@ def begins(ready: PreparedSearch, start: Array, *, seed: int, count: int) -> Ite
 def _near(ready: PreparedSearch, start: Array, rng: np.random.Generator) -> Begin | None:
     """The layout of least change among draws in which all tools follow their paths; None without one."""
     variables, problem = ready.variables, ready.coarse
-    if isinstance(problem, PathProblem):
+    if not isinstance(problem, LayoutProblem):
         return None
     for spread in SPREADS:
         steps = spread * variables.scale * rng.standard_normal((DRAWS, len(variables.names)))

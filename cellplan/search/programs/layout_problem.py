@@ -19,6 +19,7 @@ from cellplan.search.kernel.run import run, run_near
 from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.transfers import Transfers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +38,8 @@ class LayoutProblem:
     given: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
+    parts: tuple[slice, ...] = field(init=False)
+    transfers: Transfers = field(init=False)
     is_dense: bool = field(init=False, default=False)
     is_accelerating: bool = field(init=False)
 
@@ -46,6 +49,7 @@ class LayoutProblem:
         derive(self, **{name: getattr(self.variables, name) for name in names})
         is_accelerating = bool(np.isfinite(self.acceleration).any())
         derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
+        derive(self, parts=(slice(0, len(self.times)),), transfers=Transfers.none(self.job.cell.joint_count))
 
     def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
         """The same problem on about so many nodes evenly, and more about some times in [s] on their clock."""

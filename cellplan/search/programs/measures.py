@@ -57,7 +57,8 @@ class Measures:
     )
     within: float  # distance in [m] beyond what is demanded, from which on pairs are not near
     factor: float  # how many times as long as the nodes the motion must last for all speeds and accelerations
-    cycle: float  # shortest cycle in [s]
+    cycle: float  # shortest cycle in [s], with all transfers
+    span: float  # time in [s] from the first node to the last
     arms: ArmValues | None  # least singular values of the arms; None where none are demanded
     singular: PeakValues  # shares of what is demanded of them that they miss, negative where they keep it, shape (N, A)
     pace: Pace | None = None  # the motion as fast as the limits allow everywhere; None with the time laws of the cell
@@ -66,6 +67,7 @@ class Measures:
     def of(cls, problem: Problem, point: Point, demands: Demands, effort: Effort) -> "Measures":
         """Measure a point."""
         times, limits, beyond = problem.times, problem.limits, demands.beyond
+        span = float(times[-1] - times[0])
         pace = Pace.of(problem, point) if demands.timing is CycleTiming.RETIMED else None
         speeds, accelerations, factor = _loads(problem, point) if pace is None else _paced(problem, point, pace)
         most = demands.clearance + (0.0 if beyond is None else float(beyond.max(initial=0.0)))
@@ -88,7 +90,8 @@ class Measures:
             violations=distances.demands + added - distances.values,
             within=effort.within,
             factor=factor,
-            cycle=factor * float(times[-1] - times[0]),
+            cycle=_work(demands, factor, span) + problem.transfers.seconds(point.x, point.q),
+            span=span,
             arms=arms,
             singular=PeakValues.of(times, _missing(arms, demands, len(times))),
             pace=pace,
@@ -108,7 +111,7 @@ class Measures:
         allowed.append(most)
         violations.append((self.singular.value.max(axis=0) + reserve.singular) / SINGULAR)
         allowed.append(np.full(len(violations[-1]), 0.5 * reserve.singular / SINGULAR))
-        if demands.duration is not None and demands.objective is not Objective.CYCLE:
+        if demands.duration is not None:
             whole = demands.duration / self.span / (1.0 + reserve.time)
             loads = np.array([self.factor])
             if self.pace is None:
@@ -131,7 +134,7 @@ class Measures:
             case MeasureKind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
             case MeasureKind.DURATION:
-                return np.full(len(nodes), self.factor)
+                return np.full(len(nodes), self.cycle)
             case _:
                 distances = self.distances
                 places = zip(distances.pairs.tolist(), distances.nodes.tolist(), strict=True)
@@ -155,11 +158,6 @@ class Measures:
     def nearest(self) -> float:
         """The largest of ``violations`` but those within a robot in [m]: bodies are so much too near each other."""
         return float(self.violations[~self.distances.within_robot].max(initial=-self.within))
-
-    @property
-    def span(self) -> float:
-        """Time in [s] from the first node to the last."""
-        return self.cycle / self.factor if self.factor > 0.0 else 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -194,6 +192,12 @@ def _loads(problem: Problem, point: Point) -> tuple[PeakValues, PeakValues, floa
     return speeds, accelerations, max(float(speeds.value.max()), float(np.sqrt(accelerations.value.max())))
 
 
+def _work(demands: Demands, factor: float, span: float) -> float:
+    """Time of the motions in [s]: as fast as the limits allow, or as a program has them."""
+    is_written = demands.objective is Objective.CYCLE and demands.duration is not None
+    return span if is_written else factor * span
+
+
 def _missing(arms: ArmValues | None, demands: Demands, nodes: int) -> Array:
     """Shares of the singular values that are demanded, which are missed, shape (N, A)."""
     if arms is None or demands.singular is None:
@@ -218,7 +222,10 @@ def reserves(distances: Distances, reserve: Reserve) -> Array:
 
 
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
-    """Nodes at which distances are asked: the ones nearest to even times, and to the times given."""
-    times = problem.times
-    key_times = np.append(np.linspace(times[0], times[-1], effort.keys), effort.also_at)
-    return np.unique(np.abs(times[:, None] - key_times).argmin(axis=0)).astype(np.intp)
+    """Nodes at which distances are asked: the ones nearest to even times of each motion, and to the times given."""
+    chosen = [np.abs(problem.times[:, None] - np.array(effort.also_at)).argmin(axis=0)]
+    for part in problem.parts:
+        times = problem.times[part]
+        even = np.linspace(times[0], times[-1], effort.keys)
+        chosen.append(part.start + np.abs(times[:, None] - even).argmin(axis=0))
+    return np.unique(np.concatenate(chosen)).astype(np.intp)

@@ -29,8 +29,8 @@ class Demands:
     """What is demanded of a point.
 
     Attributes:
-        duration: Cycle in [s] that the limits of speed and acceleration must allow; None where any will do. The
-            objectives clearance and change need one.
+        duration: Time of all motions in [s] that the limits of speed and acceleration must allow; None where any will
+            do. The objectives clearance and change need one; with one the transfers alone make the cycle shorter.
     """
 
     objective: Objective  # what is improved
@@ -47,6 +47,11 @@ class Demands:
             raise ValueError(f"demands: the objective '{self.objective}' needs a duration")
         if not np.all(self.margin >= 0.0):
             raise ValueError(f"demands: expected margins of at least 0, got {self.margin}")
+
+    @property
+    def is_shorter_work(self) -> bool:
+        """Whether the motions themselves are to become shorter."""
+        return self.objective is Objective.CYCLE and self.duration is None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -78,7 +78,7 @@ class Pace:
     def of(cls, problem: Problem, point: Point) -> Self:
         """The fastest motion along a path."""
         velocity, limited = problem.limits.velocity, np.isfinite(problem.acceleration)
-        stretches = _stretches(problem.times, point, velocity)
+        stretches = _stretches(problem, point)
         squares, shares, seconds = [np.zeros(0)], [np.zeros(0)], 0.0
         for stretch in stretches:
             directions = stretch.directions(point.qd)
@@ -194,8 +194,9 @@ class Pace:
         return by_variables / limits[:, None]
 
 
-def _stretches(times: Array, point: Point, velocity: Array) -> tuple[PacedStretch, ...]:
-    """The stretches of a path between rests of all joints and corners that are passed at speed."""
+def _stretches(problem: Problem, point: Point) -> tuple[PacedStretch, ...]:
+    """The stretches of a path between rests of all joints, corners that are passed at speed, and motions."""
+    times, velocity = problem.times, problem.limits.velocity
     velocities, accelerations = point.qd / velocity, point.qdd / velocity
     rates = np.linalg.norm(velocities, axis=1)
     rests = rates <= REST_SHARE * rates.max(initial=0.0)
@@ -204,6 +205,7 @@ def _stretches(times: Array, point: Point, velocity: Array) -> tuple[PacedStretc
     twice = np.append(np.diff(times) == 0.0, False)
     turned = np.linalg.norm(np.diff(velocities / safe[:, None], axis=0, append=0.0), axis=1) > KINK
     is_corner = twice & np.append(~rests[1:] & ~rests[:-1], False) & turned
+    is_corner[[part.start - 1 for part in problem.parts[1:]]] = True
     ends = np.unique([0, *np.flatnonzero(rests), *(np.flatnonzero(is_corner) + 1), len(times) - 1])
     stretches = []
     for first, last in pairwise(ends.tolist()):

@@ -6,6 +6,7 @@ from typing import Protocol
 from cellplan.geometry.arrays import Array, Flags, Indices
 from cellplan.model.robot.robot import JointLimits
 from cellplan.search.kernel.varied import Varied
+from cellplan.search.programs.transfers import Transfers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,6 +64,14 @@ class Problem(Varied, Protocol):
     @property
     def times(self) -> Array:
         """Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump."""
+
+    @property
+    def parts(self) -> tuple[slice, ...]:
+        """Nodes of its motions, one after the other: those of the phases of a program, else all."""
+
+    @property
+    def transfers(self) -> Transfers:
+        """What leads from one of its motions to the next; none where there is one alone."""
 
     @property
     def limits(self) -> JointLimits:

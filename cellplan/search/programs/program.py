@@ -105,8 +105,8 @@ class LinearProgram:
             inner = pace.inner
             lower = np.append(lower, np.full(len(inner), SLOWER))
             upper = np.append(upper, np.full(len(inner), FASTER))
-            is_aim = demands.objective is Objective.CYCLE
-            curved = np.append(curved, is_aim * CURVATURE * pace.shares[inner])
+            of_cycle = pace.seconds / linear.measures.cycle if demands.objective is Objective.CYCLE else 0.0
+            curved = np.append(curved, of_cycle * CURVATURE * pace.shares[inner])
         return cls(
             rows=linear.rows(demands, reserve, np.maximum(-lower, upper)),
             box=(lower, upper),

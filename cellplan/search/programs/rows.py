@@ -117,6 +117,8 @@ class Linear:
         pace, duration = self.measures.pace, self._duration(demands, reserve)
         if pace is None:
             first = [] if duration is None else [*self._timing(duration, demands, reserve)]
+            if demands.objective is Objective.CYCLE and not demands.is_shorter_work:
+                first.append(self._cycle())
         else:
             parts = [rows.widened(len(box) - count) for rows in parts]
             first = [] if duration is None else [self._lasting(pace, duration, demands, reserve), *self._paced(pace)]
@@ -124,25 +126,44 @@ class Linear:
 
     def _duration(self, demands: Demands, reserve: Reserve) -> float | None:
         """How many times as long as the nodes the motion may last; None where it may last as long as it takes."""
-        if demands.objective is Objective.CYCLE:
+        if demands.is_shorter_work:
             return self.measures.factor
-        span = float(self.problem.times[-1] - self.problem.times[0])
-        return None if demands.duration is None else demands.duration / span / (1.0 + reserve.time)
+        return None if demands.duration is None else demands.duration / self.measures.span / (1.0 + reserve.time)
 
-    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Reserve) -> ConstraintRows:
-        """The duration of a retimed motion: the objective itself, or bounded by a given one."""
-        is_aim = demands.objective is Objective.CYCLE
-        share, unit, count = self.measures.factor / whole, 1.0 if is_aim else SHARE, len(self.problem.scale)
-        saved = 0.5 * share * pace.shares[pace.inner] / unit
+    def _cycle(self, work: Array | None = None) -> ConstraintRows:
+        """The cycle as a share of its own as the objective: time of the transfers, and of the motions by squares.
+
+        Args:
+            work: Share of the time of the motions that the squares save, each by its own share, shape (m,).
+        """
+        cycle, saved = self.measures.cycle, np.zeros(0) if work is None else work
+        point = self.measures.point
+        by_layout = self.problem.transfers.derivatives(point.x, point.q, self.derivatives.q) * self.problem.scale
         return ConstraintRows(
             kind=MeasureKind.DURATION,
             subjects=np.zeros(1, dtype=np.intp),
             nodes=np.zeros(1, dtype=np.intp),
-            violations=np.array([(share - 1.0) / unit]),
+            violations=np.zeros(1),
+            gradients=np.concatenate([by_layout / cycle, -saved])[None],
+            allowed=np.zeros(1),
+            units=np.full(1, cycle),
+            aim=1.0,
+        )
+
+    def _lasting(self, pace: Pace, whole: float, demands: Demands, reserve: Reserve) -> ConstraintRows:
+        """The duration of a retimed motion: the objective itself, or bounded by a given one."""
+        if demands.objective is Objective.CYCLE:
+            return self._cycle(0.5 * pace.seconds / self.measures.cycle * pace.shares[pace.inner])
+        share, count = self.measures.factor / whole, len(self.problem.scale)
+        saved = 0.5 * share * pace.shares[pace.inner] / SHARE
+        return ConstraintRows(
+            kind=MeasureKind.DURATION,
+            subjects=np.zeros(1, dtype=np.intp),
+            nodes=np.zeros(1, dtype=np.intp),
+            violations=np.array([(share - 1.0) / SHARE]),
             gradients=np.concatenate([np.zeros(count), -saved])[None],
-            allowed=np.full(1, 0.0 if is_aim else 0.5 * reserve.time / unit),
-            units=np.full(1, whole * unit),
-            aim=1.0 if is_aim else 0.0,
+            allowed=np.full(1, 0.5 * reserve.time / SHARE),
+            units=np.full(1, whole * self.measures.span * SHARE),
         )
 
     def _paced(self, pace: Pace) -> Iterator[ConstraintRows]:
@@ -174,7 +195,7 @@ class Linear:
     def _timing(self, whole: float, demands: Demands, reserve: Reserve) -> Iterator[ConstraintRows]:
         """Speeds and accelerations under the laws: the objective itself, or bounds at a given duration."""
         measures, problem = self.measures, self.problem
-        is_aim = demands.objective is Objective.CYCLE
+        is_aim = demands.is_shorter_work
         unit = 1.0 if is_aim else SHARE
         quantities = [(MeasureKind.SPEED, measures.speeds, self.derivatives.qd, problem.limits.velocity)]
         if self.derivatives.qdd is not None:

@@ -27,6 +27,7 @@ from cellplan.search.kernel.singular_values import SingularValues
 from cellplan.search.kernel.varied import KernelVariables
 from cellplan.search.programs.layout_problem import PairsAtNodes, distances_at
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.transfers import Transfers
 from cellplan.search.spline_path.nodes import PathNodes
 from cellplan.search.spline_path.variables import PathVariables
 
@@ -62,10 +63,14 @@ class PathProblem:
     is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
+    parts: tuple[slice, ...] = field(init=False)
+    transfers: Transfers = field(init=False)
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""
-        derive(self, times=self.nodes.job.times, limits=self.nodes.job.limits)
+        job = self.nodes.job
+        derive(self, times=job.times, limits=job.limits, parts=(slice(0, len(job.times)),))
+        derive(self, transfers=Transfers.none(job.cell.joint_count))
         path, layout = self.path, self.layout
         given = np.concatenate([path.given.coefficients.ravel(), layout.given])
         derive(self, names=(*path.names, *layout.names), given=given)

@@ -147,9 +147,13 @@ class Variables:
             x: Values of the variables, shape (n,).
             start: Start postures in [rad] or [m], shape (nq,); those among the variables are taken from x.
         """
-        values = dict[str, object](self.conversion)
+        starts = self.state(x).starts
+        return self.numbers(x) | written_starts(self.base, self.settings, np.where(np.isnan(starts), start, starts))
+
+    def numbers(self, x: Array) -> dict[str, object]:
+        """The same without the start postures."""
+        values, state = dict[str, object](self.conversion), self.state(x)
         numbers = self.tied.factors @ x + self.tied.terms
-        state = self.state(x)
         for variable, number in zip(self.tied.ranges, numbers.tolist(), strict=True):
             if variable.kind is VariableKind.WEIGHT:
                 values[f"robots.{variable.name}.weights"] = [
@@ -157,7 +161,7 @@ class Variables:
                 ]
             elif variable.kind is not VariableKind.START:
                 values[variable.address] = written_number(variable, number)
-        return values | written_starts(self.base, self.settings, np.where(np.isnan(state.starts), start, state.starts))
+        return values
 
     def cell(self, x: Array, start: Array) -> Cell:
         """The cell of the file with these values, as ``solve`` will have it; see ``values``."""

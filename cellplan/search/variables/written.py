@@ -1,11 +1,13 @@
 """Numbers of a layout as they are written in a cell file: in its units, with the digits that are worth writing."""
 
+from collections.abc import Container
 from typing import Any, Final
 
 from cellplan.geometry.arrays import Array
 from cellplan.model.cell.cell import Cell, Robot
 from cellplan.model.cell.layout import LayoutSettings, VariableKind, VaryRange
 from cellplan.model.robot.robot import Joint
+from cellplan.model.task.task import Task
 from cellplan.model.units import DEG, MM
 
 LENGTH_DIGITS: Final = 3  # of a millimetre
@@ -45,15 +47,26 @@ def written_starts(cell: Cell, settings: LayoutSettings, start: Array) -> dict[s
 
 def written_start(cell: Cell, robot: Robot, start: Array) -> dict[str, Any]:
     """The start posture of a robot: `start_deg` if all joints turn and no `start` is given, else `start`."""
+    document: Any = cell.origin.document
+    return _written_at(f"robots.{robot.name}", document["robots"][robot.name], robot, start)
+
+
+def written_task_start(cell: Cell, task: Task, start: Array) -> dict[str, Any]:
+    """The start posture of the robot of a task for that task, likewise."""
+    document: Any = cell.origin.document
+    return _written_at(f"tasks.{task.name}", document["tasks"][task.name], cell.robot(task.robot), start)
+
+
+def _written_at(address: str, entry: Container[str], robot: Robot, start: Array) -> dict[str, Any]:
+    """The start posture of a robot or a task by address."""
     joints = robot.model.joints
     numbers = [_within_limits(value, joint) for value, joint in zip(start.tolist(), joints, strict=True)]
-    entry: Any = cell.origin.document["robots"]
-    as_list = all(joint.is_revolute for joint in joints) and "start" not in entry[robot.name]
+    as_list = all(joint.is_revolute for joint in joints) and "start" not in entry
     if as_list:
-        return {f"robots.{robot.name}.start_deg": numbers}
+        return {f"{address}.start_deg": numbers}
     keys = [f"{joint.name}_{'deg' if joint.is_revolute else 'mm'}" for joint in joints]
-    replaced = {f"robots.{robot.name}.start_deg": None} if "start_deg" in entry[robot.name] else {}
-    return {f"robots.{robot.name}.start": dict(zip(keys, numbers, strict=True)), **replaced}
+    replaced = {f"{address}.start_deg": None} if "start_deg" in entry else {}
+    return {f"{address}.start": dict(zip(keys, numbers, strict=True)), **replaced}
 
 
 def _within_limits(value: float, joint: Joint) -> float:

@@ -11,7 +11,8 @@ from cellplan.search.programs.objective import CycleTiming, Objective
 
 def is_scaled(ready: PreparedSearch) -> bool:
     """Whether the motion is made as fast as the limits allow as a whole."""
-    return ready.request.objective is Objective.CYCLE and ready.request.timing is CycleTiming.LAWS
+    is_cycle = ready.request.objective is Objective.CYCLE
+    return is_cycle and ready.request.timing is CycleTiming.LAWS and ready.phases is None
 
 
 def draft(
@@ -27,6 +28,10 @@ def draft(
         early: Begins with its clearance at once, unless its duration may still change.
     """
     is_cycle = ready.request.objective is Objective.CYCLE
+    if ready.phases is not None:
+        law = Law.COMMON_SPEED if ready.is_fastest else Law.AS_WRITTEN
+        retimed: dict[str, object] = {"motion.timing": "fastest"} if ready.is_fastest else {}
+        return TimedProgram.solved(cell, law, retimed, task=None, progress=progress, early=early)
     if ready.request.timing is CycleTiming.RETIMED:
         timing: object = "fastest" if is_cycle else {"cycle_s": ready.duration}
         law = Law.COMMON_SPEED if is_cycle else Law.REDUCED_SPEED

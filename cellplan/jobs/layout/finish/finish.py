@@ -80,6 +80,11 @@ class CandidateResult:
         return self.program is not None and not self.reason
 
     @property
+    def cycle(self) -> float:
+        """Its cycle in [s]; infinite without a program."""
+        return np.inf if self.program is None else self.program.cycle
+
+    @property
     def margin(self) -> float | None:
         """Smallest verified distance of a turning joint from its limits in [deg]; None without one."""
         return None if self.program is None else margin_of(self.program)
@@ -201,7 +206,7 @@ class Finish:
     def _drafted(self, x: Array, start: Array, refinement: _Refinement, *, is_first: bool) -> _Timed:
         """The layout improved at more nodes, with its motion in the cycle that it has there."""
         x, start, standing, demands = self._improved(x, start, refinement, is_first=is_first)
-        is_once = self.ready.request.objective is not Objective.CYCLE  # else other durations are tried
+        is_once = self.ready.phases is not None or self.ready.request.objective is not Objective.CYCLE
         helping = self.workers if isinstance(self.workers, Workers) else None
         early = EarlyClearance(helping.begin if is_once and helping is not None else None)
         timed = _Timed(x=x, start=start, standing=standing, demands=demands, refinement=refinement, early=early)

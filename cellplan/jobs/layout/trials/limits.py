@@ -184,7 +184,7 @@ def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
     by = problem.derivatives(measures.point)
     span = float(problem.times[-1] - problem.times[0])
     return {
-        "cycle_s": _listed(span * _of_factor(standing, by) * steps),
+        "cycle_s": _listed((span * _of_factor(standing, by) + _of_transfers(standing, by)) * steps),
         "margin_deg": _listed(_of_margin(standing, by) * DEG * steps),
         "clearance_mm": _listed(_of_distance(standing, by) * MM * steps),
     }
@@ -193,6 +193,8 @@ def effects(standing: Standing, steps: Array) -> dict[str, list[float | None]]:
 def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
     """Derivatives of the load of the joint that decides the clock; of all that decide it where it is retimed."""
     problem, measures = standing.problem, standing.measures
+    if standing.demands.objective is Objective.CYCLE and not standing.demands.is_shorter_work:
+        return np.zeros(by.q.shape[-1])
     if measures.pace is not None:
         demands = replace(standing.demands, objective=Objective.CYCLE, duration=None)
         optimum = explain(problem, measures.point, demands, Effort())
@@ -203,6 +205,14 @@ def _of_factor(standing: Standing, by: PointDerivatives) -> Array:
         highest = _highest(measures.accelerations, by.qdd, problem.acceleration, measures.accelerations.value)
         return highest / (2.0 * float(rates.max()))
     return _highest(measures.speeds, by.qd, problem.limits.velocity, measures.speeds.value)
+
+
+def _of_transfers(standing: Standing, by: PointDerivatives) -> Array:
+    """Derivatives of the time of the transfers of a program; those of a retimed one are in its load."""
+    point, transfers = standing.measures.point, standing.problem.transfers
+    if standing.measures.pace is not None:
+        return np.zeros(by.q.shape[-1])
+    return transfers.derivatives(point.x, point.q, by.q)
 
 
 def _of_margin(standing: Standing, by: PointDerivatives) -> Array:

@@ -11,8 +11,9 @@ from cellplan.errors import NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.joint_path import PathSearch, resolving, without_path
+from cellplan.jobs.layout.trials.phases import ProgramPhases, starts_of
 from cellplan.jobs.layout.trials.searched import searched_cell
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.model.cell.layout import VariableKind
 from cellplan.model.motion.motion import Schedule
@@ -21,6 +22,7 @@ from cellplan.planning.modes import plan_phases
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.planning.timing.schedule import clock_paths, schedule_paths
+from cellplan.runs.plan.sequence import plan_work
 from cellplan.runs.plan.start import chosen_start
 from cellplan.scene.scene import Scene
 from cellplan.search.distances.cell_distances import CellDistances
@@ -29,6 +31,7 @@ from cellplan.search.kernel.singular_values import usual_values
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.objective import CycleTiming, Demands, Objective
 from cellplan.search.programs.problem import Point
+from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.spline_path.problem import PathProblem
 from cellplan.search.starts.generator import StartGenerator
 from cellplan.search.starts.problem import StartProblem
@@ -36,6 +39,7 @@ from cellplan.search.synchronous import refuse_other_jobs
 from cellplan.search.variables.variables import Variables
 
 NODES: Final = 65  # [-] of the trials: with parabolas through them speeds are good to 0.5 %, margins to 0.1 deg
+UNLIMITED: Final = 1e6  # [s] that motions may last which are timed when they are solved
 NOT_FOLLOWED: Final = "a tool loses its path at the nodes of the search"  # of a layout that solve may yet follow
 ALONG_SPLINE: Final = {
     CycleTiming.LAWS: 4,
@@ -59,10 +63,13 @@ class PreparedSearch:
     moving: tuple[str, ...]  # names of the robots that move
     unled: "PreparedSearch | None" = None  # the same without the joint path; None where no path varies
     solved_start: Array | None = None  # start of the given layout that a solve finds, shape (nq,); or None
+    phases: ProgramPhases | None = None  # of a program from home to home; its first phase is ``schedule``, ``moving``
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
         """Make a cell ready."""
+        if cell.program.is_home_to_home:
+            return cls._of_program(request, cell)
         unled = without_path(cell)
         variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
@@ -83,8 +90,33 @@ class PreparedSearch:
         )
         return _with_solved_start(prepared) if needs_start else prepared
 
-    def problem(self, nodes: int = NODES) -> LayoutProblem | PathProblem:
+    @classmethod
+    def _of_program(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
+        """Make a program ready."""
+        variables = Variables.of(cell)
+        scene = Scene.from_cell(variables.base)
+        bodies = CellDistances.of(scene, variables)
+        phases = ProgramPhases.of(variables.base, variables, bodies)
+        robots = [replace(robot, start=phases.work.cell.robot(robot.name).start) for robot in variables.base.robots]
+        given = variables.read_from(replace(variables.base, robots=tuple(robots)))
+        variables = replace(variables, given=given)
+        first = phases.work.stages[0]
+        return cls(
+            request=request,
+            cell=cell,
+            variables=variables,
+            scene=scene,
+            bodies=bodies,
+            schedule=first.schedule,
+            moving=tuple(first.stage.phase.moving),
+            solved_start=phases.start,
+            phases=replace(phases, variables=variables),
+        )
+
+    def problem(self, nodes: int = NODES) -> LayoutProblem | ProgramProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
+        if self.phases is not None:
+            return self.phases.problem(nodes // 2 + 1)
         variables, acceleration = self.variables, acceleration_limits(self.scene.cell)
         if self.unled is None:
             enough = enough_nodes(self.schedule, nodes)
@@ -94,7 +126,7 @@ class PreparedSearch:
         return self.path_search.problem(nodes, bodies=self.bodies, acceleration=acceleration)
 
     @cached_property
-    def coarse(self) -> LayoutProblem | PathProblem:
+    def coarse(self) -> LayoutProblem | ProgramProblem | PathProblem:
         """The problem of the trials, at as many nodes as the given layout needs where ``solve`` follows its paths."""
         problem, nodes = self.problem(), NODES
         if not isinstance(problem, LayoutProblem) or isinstance(self._given_start, NoSolutionError):
@@ -127,6 +159,8 @@ class PreparedSearch:
     def given_start(self) -> Array:
         """The start posture of the given layout in [rad] or [m], shape (nq,); found where the cell gives none.
 
+        Of a program it is that of all its phases, shape (P nq,).
+
         Raises:
             NoSolutionError: There is none.
         """
@@ -147,6 +181,8 @@ class PreparedSearch:
 
     def start_of(self, cell: Cell) -> Array:
         """The start posture of a cell with this job; see ``given_start``."""
+        if self.phases is not None:
+            return starts_of(plan_work(cell))
         if all(robot.start is not None for robot in cell.robots):
             return np.concatenate([robot.start for robot in cell.robots if robot.start is not None])
         scene = self.scene if cell is self.variables.base else Scene.from_cell(cell)
@@ -161,20 +197,36 @@ class PreparedSearch:
 
     @property
     def duration(self) -> float:
-        """Duration of the job in [s], as the cell has it."""
-        return float(self.schedule.times[-1])
+        """Duration of the job in [s], as the cell has it; of a program that of its phases with work."""
+        return float(self.schedule.times[-1]) if self.phases is None else self.phases.duration
+
+    @property
+    def is_fastest(self) -> bool:
+        """Whether the motions go as fast along their paths as the limits allow, not as time laws have it."""
+        return self.request.timing is CycleTiming.RETIMED or self.cell.motion.timing is Timing.FASTEST
+
+    @property
+    def _clock(self) -> dict[str, Any]:
+        """How the motions are timed, and what they may last.
+
+        Of a program as it is written, and of one whose tasks have demanded speeds, the transfers alone become shorter.
+        """
+        is_cycle, timing = self.request.objective is Objective.CYCLE, self.request.timing
+        if self.phases is None:
+            return {"duration": None if is_cycle else self.duration, "timing": timing}
+        has_speeds = any(task.feed is not None or task.process is not None for task in self.cell.tasks)
+        if self.is_fastest and is_cycle and not has_speeds:
+            return {"duration": None, "timing": CycleTiming.RETIMED}
+        return {"duration": UNLIMITED if self.is_fastest else self.duration, "timing": CycleTiming.LAWS}
 
     def demands(self, **changes: Any) -> Demands:
         """What is demanded of a layout."""
-        objective = self.request.objective
         values: dict[str, Any] = {
-            "objective": objective,
+            "objective": self.request.objective,
             "margin": self.variables.margin,
-            "duration": None if objective is Objective.CYCLE else self.duration,
-            "timing": self.request.timing,
             "singular": _singular(self),
         }
-        return Demands(**(values | changes))
+        return Demands(**(values | self._clock | changes))
 
 
 def demands_near(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
@@ -197,11 +249,14 @@ def _singular(ready: PreparedSearch) -> Array | None:
     if not share > 0.0:
         return None
     problem = ready.coarse
-    usual = _usual(problem.nodes.job if isinstance(problem, PathProblem) else problem.job)
+    if isinstance(problem, ProgramProblem):
+        usual = np.concatenate([_usual(phase.job) for phase in problem.phases])
+    else:
+        usual = _usual(problem.nodes.job if isinstance(problem, PathProblem) else problem.job)
     return np.where(usual > SINGULAR_EVERYWHERE, share * usual, 0.0)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _usual(job: Job) -> Array:
     """What is usual of the singular values of the arms."""
     return usual_values(job)
@@ -212,8 +267,10 @@ def values_of(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object
 
     Args:
         x: The variables, shape (n,).
-        start: Start posture in [rad] or [m], shape (nq,).
+        start: Start posture in [rad] or [m], shape (nq,); see ``PreparedSearch.given_start``.
     """
+    if ready.phases is not None:
+        return ready.phases.values(x, start)
     problem = ready.coarse
     return (problem if isinstance(problem, PathProblem) else ready.variables).values(x, start)
 

@@ -1,6 +1,7 @@
 """The cell that a layout search is asked for, with all that its request sets in it."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from cellplan.errors import InputError
@@ -8,14 +9,16 @@ from cellplan.files.cell.changes import read_setting
 from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.jobs.layout.request import LayoutRequest
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, Timing
+from cellplan.model.cell.layout import VariableKind
 from cellplan.model.units import DEG, MM
 from cellplan.runs.overrides import with_overrides
 from cellplan.search.programs.objective import CycleTiming, Objective
-from cellplan.search.synchronous import refuse_other_jobs
+from cellplan.search.synchronous import refuse_other_jobs, refuse_other_methods
 
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg", "length_mm", "tilt_deg")
 PREFIX: Final = "robots."
+OF_ONE_TASK: Final = frozenset({VariableKind.SPIN, VariableKind.GRASP})  # which several tasks of a robot would share
 FREE: Final = ("start", "weights", "path", "spin")
 
 
@@ -41,12 +44,42 @@ def searched_cell(request: LayoutRequest) -> Cell:
         values["layout.vary"] = _varied(cell, request)
     changed = cell.with_values(values) if values else cell
     paths = () if changed.layout is None else [path.robot for path in changed.layout.paths]
-    refuse_other_jobs(changed, "a layout search", paths=paths)
+    if changed.program.is_home_to_home:
+        _refuse_of_program(request, changed)
+    else:
+        refuse_other_jobs(changed, "a layout search", paths=paths)
     if paths:
         _refuse_open_tasks(changed, purpose="--free path" if request.free else "layout.vary: a joint path")
     _refuse_margins(changed)
     _refuse_misplacement(request, changed)
     return changed
+
+
+def _refuse_of_program(request: LayoutRequest, cell: Cell) -> None:
+    """Refuse what a search cannot change, or judge, in a program from home to home."""
+    at, motion, layout = cell.origin.at, cell.motion, cell.layout
+    refuse_other_methods(replace(cell, motion=replace(motion, timing=Timing.AS_WRITTEN)), "a layout search")
+    if motion.timing is Timing.CYCLE:
+        raise InputError(
+            f"{at('motion.timing')}: expected as_written or fastest for a layout search of a program, got a cycle: "
+            "write fastest, and cycle_s into what comes of it"
+        )
+    if request.misplacement is not None or (layout is not None and layout.misplacement is not None):
+        key = "--misplacement" if request.misplacement is not None else at("layout.misplacement")
+        raise InputError(f"{key}: expected no misplaced bases with a program from home to home; leave it out")
+    if layout is None:
+        return
+    vary = "--free" if request.free else at("layout.vary")
+    if layout.choices or layout.paths:
+        address = layout.choices[0].address if layout.choices else f"robots.{layout.paths[0].robot}.path"
+        raise InputError(f"{vary}: expected no choices and no joint path with a program, got {address}; leave it out")
+    for variable in layout.ranges:
+        is_other_start = variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]
+        if is_other_start or variable.kind in OF_ONE_TASK:
+            raise InputError(
+                f"{vary}: expected bases, tools, the part, weights and the start of the first holder with a program, "
+                f"got {variable.address}; leave it out"
+            )
 
 
 def _refuse_misplacement(request: LayoutRequest, cell: Cell) -> None:

@@ -26,6 +26,7 @@ from cellplan.study.trial import TrialOutcome, TrialStatus, Variant
 EFFORT: Final = Effort(iterations=40)  # longer ones go on as perturbations of what they came to
 STAGE: Final = Effort(iterations=6)  # of motions that joint paths begin with
 STAGES: Final = 4
+FAR: Final = 2.5  # [-] usual steps of samples of a program
 PROBE: Final = Effort(iterations=12)  # of the paths that a trial chooses from
 PATH: Final = Effort(least_gain=1e-3)  # many coefficients gain little each, but for long
 
@@ -211,6 +212,8 @@ def _given(ready: PreparedSearch) -> Begin | None:
             return ready.variables.given, start
     except NoSolutionError:
         pass
+    if ready.phases is not None:
+        return None
     try:
         return ready.starts.at(0).first
     except NoSolutionError:
@@ -228,8 +231,12 @@ def _attempted(ready: PreparedSearch, index: int) -> Cell:
     return load_cell(ready.request.attempts[index], allow_dirs=ready.request.allow_dirs)
 
 
-def _sampled(ready: PreparedSearch, index: int) -> Begin:
-    """A start that was sampled over all that may change."""
+def _sampled(ready: PreparedSearch, index: int) -> Begin | None:
+    """A start that was sampled over all that may change; of a program one far from the given layout."""
+    if ready.phases is not None:
+        rng = generator(f"layout/sample/{index}", ready.request.seed)
+        point = perturbed(ready.coarse, ready.coarse.given, ready.given_start, rng, size=FAR)
+        return None if point is None else (point.x, point.start)
     return ready.starts.at(1 + index).first
 
 

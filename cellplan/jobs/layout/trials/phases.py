@@ -1,0 +1,151 @@
+"""The phases of a program with work, made ready for a search: their jobs, starts and bodies, and what lies between."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.joint_limits import acceleration_limits
+from cellplan.model.cell.layout import VariableKind
+from cellplan.planning.sequence.stages import Stage, program_stages
+from cellplan.runs.plan.retiming import transfer_retimer
+from cellplan.runs.plan.sequence import PlannedProgram, PlannedStage, plan_work
+from cellplan.search.distances.cell_distances import CellDistances
+from cellplan.search.kernel.job import Job, enough_nodes
+from cellplan.search.programs.layout_problem import LayoutProblem
+from cellplan.search.programs.program_problem import ProgramProblem
+from cellplan.search.programs.transfers import HOME, Transfers
+from cellplan.search.variables.phase_variables import PhaseVariables
+from cellplan.search.variables.variables import Variables
+from cellplan.search.variables.written import written_start, written_task_start
+
+FEWER: Final = 4  # [-] times fewer nodes of a straight move that grips or puts down the part
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ProgramPhases:
+    """The phases of a program with work, P of them."""
+
+    work: PlannedProgram  # the phases of the given layout, with all starts and homes
+    variables: Variables  # what may change
+    bodies: tuple[CellDistances, ...]  # the bodies of each phase
+    between: tuple[CellDistances, ...]  # the bodies during each transfer
+
+    @classmethod
+    def of(cls, cell: Cell, variables: Variables, bodies: CellDistances) -> "ProgramPhases":
+        """Plan the work of a cell.
+
+        Args:
+            bodies: The bodies while the part is held, or fixed.
+
+        Raises:
+            NoSolutionError: A phase has no start, or a tool loses its path.
+        """
+        work = plan_work(cell)
+        of_phases = [
+            bodies if planned.stage.move is None else CellDistances.of(planned.scene, _variables(variables, planned))
+            for planned in work.stages
+        ]
+        lying = dict[bytes, CellDistances]()
+        between = []
+        for stage in _transfer_stages(work):
+            if stage.place is None:
+                between.append(bodies)
+                continue
+            part = PhaseVariables(whole=variables, begins_there=False, lying=stage.cell.part)
+            key = stage.place.X_WP.tobytes()
+            if key not in lying:
+                lying[key] = CellDistances.of(work.scenes.of_stage(stage), part)
+            between.append(lying[key])
+        return cls(work=work, variables=variables, bodies=tuple(of_phases), between=tuple(between))
+
+    @property
+    def start(self) -> Array:
+        """The start postures of all phases, one after the other, in [rad] or [m], shape (P nq,)."""
+        return starts_of(self.work)
+
+    @property
+    def duration(self) -> float:
+        """Time of all phases in [s], as the cell has it."""
+        return sum(float(planned.schedule.times[-1]) for planned in self.work.stages)
+
+    def problem(self, nodes: int) -> ProgramProblem:
+        """The problem with about so many nodes in each phase."""
+        phases = []
+        for planned, bodies in zip(self.work.stages, self.bodies, strict=True):
+            stage, schedule = planned.stage, planned.schedule
+            enough = enough_nodes(schedule, nodes if stage.move is None else nodes // FEWER)
+            job = Job.of(stage.cell, schedule, moving=tuple(stage.phase.moving), nodes=enough)
+            phases.append(
+                LayoutProblem(
+                    job=job,
+                    variables=_variables(self.variables, planned),
+                    bodies=bodies,
+                    acceleration=acceleration_limits(planned.scene.cell),
+                )
+            )
+        return ProgramProblem(phases=tuple(phases), transfers=self._transfers([len(it.times) for it in phases]))
+
+    def values(self, x: Array, start: Array) -> dict[str, object]:
+        """What to write into the given cell file: the layout, and the start of each task.
+
+        Args:
+            x: Values of the variables, shape (n,).
+            start: Starts of the phases in [rad] or [m], shape (P nq,).
+        """
+        values, base = self.variables.numbers(x), self.variables.base
+        for planned, q in zip(self.work.stages, start.reshape(len(self.work.stages), -1), strict=True):
+            for task in planned.stage.cell.tasks if planned.stage.move is None else ():
+                values |= written_task_start(base, task, q[base.columns(task.robot)])
+        for name in sorted({it.name for it in self.variables.settings.ranges if it.kind is VariableKind.START}):
+            values |= written_start(base, base.robot(name), self.variables.state(x).starts[base.columns(name)])
+        return values
+
+    def _transfers(self, counts: list[int]) -> Transfers:
+        """The transfers between the phases with so many nodes, from home and back home."""
+        cell, firsts = self.work.cell, np.cumsum([0, *counts])
+        homes = np.full(cell.joint_count, HOME)
+        free = next((number for number, it in enumerate(self.work.stages) if _begins_there(it)), None)
+        for robot in self.variables.base.robots:
+            if robot.home is None and robot.name in cell.positioners and free is not None:
+                homes[cell.columns(robot.name)] = firsts[free]  # its home is its start
+        ends, number, last = [], 0, homes
+        for stage in program_stages(cell):
+            if stage.phase.tasks:
+                number, last = number + 1, np.full(cell.joint_count, firsts[number + 1] - 1)
+            elif stage.dwell is None:
+                goal = np.full(cell.joint_count, firsts[number]) if number < len(counts) else homes
+                ends.append((last, goal))
+        retimer = transfer_retimer(self.work.scenes.held)
+        home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
+        return Transfers(
+            ends=np.swapaxes(np.array(ends), 0, 1),
+            home=home,
+            bounds=retimer.bounds,
+            bodies=self.between,
+            step=retimer.step,
+        )
+
+
+def _transfer_stages(work: PlannedProgram) -> list[Stage]:
+    """The stages in which robots move from one phase to the next."""
+    return [stage for stage in program_stages(work.cell) if not stage.phase.tasks and stage.dwell is None]
+
+
+def starts_of(work: PlannedProgram) -> Array:
+    """The start postures of all phases with work, one after the other, in [rad] or [m], shape (P nq,)."""
+    return np.concatenate([planned.motion.q[0] for planned in work.stages])
+
+
+def _begins_there(planned: PlannedStage) -> bool:
+    """Whether a phase begins with the holder at its start, not where a task or the part has it."""
+    return planned.stage.move is None and all(task.holder_posture is None for task in planned.stage.cell.tasks)
+
+
+def _variables(variables: Variables, planned: PlannedStage) -> PhaseVariables:
+    """The variables as a phase has them."""
+    stage = planned.stage
+    lying = None if stage.place is None else stage.cell.part
+    return PhaseVariables(whole=variables, begins_there=_begins_there(planned), lying=lying)

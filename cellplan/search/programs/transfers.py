@@ -1,0 +1,103 @@
+r"""Transfers: an estimate of the time between the motions of a program, each transfer straight from rest to rest.
+
+All joints of a transfer share one law, whose bounds of speed, acceleration and jerk are the least of all joints; see
+``planning.transfer.straight_time``. Here the least is that of a p-norm, :math:`1/v = \|\Delta q_i / V_i\|_p`, so that
+the time has derivatives where two joints are as slow as each other; it is a little longer than the true one.
+
+A transfer that is not free straight has to go round what is in its way. With :math:`\delta` the p-norm of what bodies
+miss of their demanded distances at some configurations along it, it is taken to last :math:`1 + \delta / (\delta + D)`
+times as long: more by a half where it is a decimetre deep, at most twice.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array, Indices
+from cellplan.planning.timing.retime import JointLimitsInTime
+from cellplan.planning.transfer.straight_time import box_widths
+from cellplan.search.distances.cell_distances import CellDistances
+
+NORM: Final = 24.0  # [-] p: six joints as slow as each other take 8 % more
+SHORTEST: Final = 1e-9  # [rad] or [m] of a move: what is shorter stands still
+STEP: Final = 1e-6  # [rad] or [m] to either side, by which the time is differentiated
+SAMPLES: Final = 15  # [-] configurations along a transfer whose bodies are looked at
+DEPTH_NORM: Final = 4.0  # [-] p of depths: nearly the deepest
+DEEP: Final = 0.1  # [m] D: depth with which a transfer lasts longer by a half
+HOME: Final = -1  # in place of a node
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Transfers:
+    """The T transfers of a program."""
+
+    ends: Indices  # nodes that each joint of a transfer moves from and to, or ``HOME``, shape (2, T, nq)
+    home: Array  # homes of all robots in [rad] or [m], shape (nq,)
+    bounds: JointLimitsInTime  # limits of the joints
+    step: float  # time between two rows in [s]
+    bodies: tuple[CellDistances, ...]  # the bodies during each of them
+
+    @classmethod
+    def none(cls, joints: int) -> "Transfers":
+        """Those of a single motion."""
+        nothing = np.zeros(joints)
+        bounds = JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing)
+        return cls(ends=np.zeros((2, 0, joints), dtype=np.intp), home=nothing, bounds=bounds, step=1.0, bodies=())
+
+    def seconds(self, x: Array, q: Array) -> float:
+        """Time of them all in [s], for variables of shape (n,) and joint positions at the nodes, shape (N, nq)."""
+        begin, end = self._ends(q, self.home)
+        depths = np.array([depth_along(bodies, x, *at)[0] for bodies, *at in zip(self.bodies, begin, end, strict=True)])
+        return float(self._times(end - begin) @ (1.0 + depths / (depths + DEEP)))
+
+    def derivatives(self, x: Array, q: Array, dq: Array) -> Array:
+        """Derivatives of this time by the variables, shape (n,), from those of the joints, shape (N, nq, n)."""
+        total, (begin, end) = np.zeros(len(x)), self._ends(q, self.home)
+        changes = self._ends(dq, np.zeros((len(self.home), len(x))))
+        times, sides = self._times(end - begin), STEP * np.eye(len(self.home))
+        for place, bodies in enumerate(self.bodies):
+            move, by = end[place] - begin[place], changes[1][place] - changes[0][place]
+            slopes = (self._times(move + sides) - self._times(move - sides)) / (2.0 * STEP)
+            depth, by_depth = depth_along(bodies, x, begin[place], end[place], changes[:, place])
+            total += (1.0 + depth / (depth + DEEP)) * slopes @ by
+            total += times[place] * DEEP / (depth + DEEP) ** 2 * by_depth
+        return total
+
+    def _ends(self, of_nodes: Array, at_home: Array) -> Array:
+        """Values at both ends of each transfer, shape (2, T, nq, ...), from those of the nodes, (N, nq, ...)."""
+        is_home = (self.ends == HOME).reshape(*self.ends.shape, *(1,) * (of_nodes.ndim - 2))
+        ends: Array = np.where(is_home, at_home, of_nodes[self.ends, np.arange(len(self.home))])
+        return ends
+
+    def _times(self, moves: Array) -> Array:
+        """Times of straight moves in [s], shape (..., nq) to (...)."""
+        length, bounds = np.abs(moves), self.bounds
+        v, a, j = (
+            1.0 / np.maximum(np.linalg.norm(length / limit, ord=NORM, axis=-1), SHORTEST)[..., None]
+            for limit in (bounds.velocity, bounds.acceleration, bounds.jerk)
+        )
+        shared = JointLimitsInTime(velocity=v, acceleration=a, jerk=j)
+        times: Array = box_widths(np.ones_like(v), shared, least=self.step).sum(axis=-1)
+        return np.where(length.max(axis=-1, initial=0.0) > SHORTEST, times, 0.0)
+
+
+def depth_along(
+    bodies: CellDistances, x: Array, begin: Array, end: Array, changes: Array | None = None
+) -> tuple[float, Array]:
+    """The p-norm of what bodies miss of their distances along a straight move in [m], and its derivatives, shape (n,).
+
+    Args:
+        x: The variables, shape (n,).
+        begin: Joint positions in [rad] or [m], shape (nq,).
+        end: Likewise.
+        changes: Derivatives of both by the variables, shape (2, nq, n); None where those of the depth are not needed.
+    """
+    share = np.linspace(0.0, 1.0, SAMPLES + 2)[1:-1, None]
+    near = bodies.near(x, begin + share * (end - begin), bodies.most_demanded)
+    missed = np.maximum(bodies.demands[near.rows] - near.distances, 0.0)
+    depth = float(np.linalg.norm(missed, ord=DEPTH_NORM)) if len(missed) else 0.0
+    if changes is None or depth <= 0.0:
+        return depth, np.zeros(len(x))
+    dq = changes[0] + share[..., None] * (changes[1] - changes[0])
+    return depth, -((missed / depth) ** (DEPTH_NORM - 1.0)) @ bodies.derivatives(near, x, dq)

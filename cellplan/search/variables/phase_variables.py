@@ -1,0 +1,57 @@
+"""The variables of a program as one of its phases has them: other starts, and the part where it lies."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cellplan.geometry.arrays import Array
+from cellplan.geometry.frozen import derive
+from cellplan.model.cell.cell import Cell, Part
+from cellplan.search.distances.moving_bodies import NeighbourCells
+from cellplan.search.kernel.job import Layouts
+from cellplan.search.kernel.screws import Directions
+from cellplan.search.variables.variables import Variables
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PhaseVariables:
+    """The variables of a program in one of its phases."""
+
+    whole: Variables  # the variables of the program
+    begins_there: bool  # whether it begins where variables of the start say
+    lying: Part | None = None  # the part where it lies in the cell
+    names: tuple[str, ...] = field(init=False)
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    scale: Array = field(init=False)
+    cost: Array = field(init=False)
+    given: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Note what the variables of the program know."""
+        names = ("names", "lower", "upper", "scale", "cost", "given")
+        derive(self, **{name: getattr(self.whole, name) for name in names})
+
+    def layouts(self, x: Array, start: Array) -> Layouts:
+        """See ``KernelVariables``."""
+        layouts = self.whole.layouts(x, start)
+        return layouts if self.begins_there else replace(layouts, start=start)
+
+    def directions(self, x: Array) -> Directions:
+        """See ``KernelVariables``."""
+        directions = self.whole.directions(x)
+        return directions if self.begins_there else replace(directions, start=np.zeros_like(directions.start))
+
+    def placed(self, x: Array) -> Cell:
+        """See ``LayoutVariables``."""
+        cell = self.whole.placed(x)
+        return cell if self.lying is None else replace(cell, part=self.lying)
+
+    def base_twists(self, x: Array) -> Array:
+        """See ``LayoutVariables``."""
+        return self.whole.base_twists(x)
+
+    def neighbours(self, x: Array, step: float) -> Iterable[NeighbourCells]:
+        """See ``LayoutVariables``; a part that lies does not move."""
+        return (it for it in self.whole.neighbours(x, step) if self.lying is None or it.robot is not None)
