@@ -7,6 +7,7 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Indices
 from cellplan.model.robot.robot import JointLimits
 from cellplan.search.programs.problem import Distances, Point, PointDerivatives
+from cellplan.search.programs.transfers import Transfers
 
 END = 2.0  # [s]
 NODES = 41
@@ -31,6 +32,8 @@ class Toy:
     cost: Array = field(default_factory=lambda: np.array([2.0, 3.0]))
     given: Array = field(default_factory=lambda: np.array([0.5, 4.5]))
     times: Array = field(default_factory=lambda: TIMES)
+    parts: tuple[slice, ...] = (slice(0, NODES),)
+    transfers: Transfers = field(default_factory=lambda: Transfers.none(2))
     is_dense: bool = False
     reaches: float = 9.0  # largest x0 with a motion
 

@@ -87,7 +87,7 @@ def _bound(
         MeasureKind.SINGULAR: SINGULAR,
     }
     bindings = list[BindingRow]()
-    if rows.kind is MeasureKind.DURATION:
+    if rows.kind in {MeasureKind.DURATION, MeasureKind.CYCLE}:
         return []
     for row in np.flatnonzero(multipliers > COUNTS).tolist():
         subject, size = int(rows.subjects[row]), units.get(rows.kind, SHARE)

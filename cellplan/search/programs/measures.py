@@ -30,6 +30,7 @@ class MeasureKind(StrEnum):
     ACCELERATION = "acceleration"
     DISTANCE = "distance"
     DURATION = "duration"
+    CYCLE = "cycle"
     SINGULAR = "singular"
 
 
@@ -134,6 +135,8 @@ class Measures:
             case MeasureKind.ACCELERATION:
                 return np.sqrt(self.accelerations.value[nodes, subjects])
             case MeasureKind.DURATION:
+                return np.full(len(nodes), self.factor)
+            case MeasureKind.CYCLE:
                 return np.full(len(nodes), self.cycle)
             case _:
                 distances = self.distances

@@ -61,12 +61,13 @@ class ProgramProblem:
         return PointDerivatives(**_stacked(parts, "q", "qd", "qdd", "rates"))
 
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
-        """See ``Problem``."""
+        """See ``Problem``; a tool and the part that it works on may touch: of them the task sets the distance."""
         all_near = list[Distances]()
         for place, (phase, rows) in enumerate(zip(self.phases, self.parts, strict=True)):
             chosen = nodes[(nodes >= rows.start) & (nodes < rows.stop)] - rows.start
             near = phase.distances(self._of_phase(point, place), chosen, within)
-            all_near.append(replace(near, nodes=near.nodes + rows.start))
+            may_touch = (near.demands <= 0.0) & (phase.bodies.most_demanded > 0.0)
+            all_near.append(replace(near, nodes=near.nodes + rows.start, within_robot=near.within_robot | may_touch))
         firsts = [first + near.pairs for first, near in zip(self._first_pairs, all_near, strict=True)]
         return Distances(
             **_stacked(all_near, "nodes", "values", "demands", "within_robot"),

@@ -35,8 +35,8 @@ class ConstraintRows:
     def that_can_bind(self, box: Array) -> Self:
         """Those that a step within ``+-box`` can bring to their bounds."""
         reach = np.abs(self.gradients) @ box
-        highest = self.violations + reach
-        return self.of(highest > (float((self.violations - reach).max(initial=-np.inf)) if self.aim else 0.0))
+        highest, least = self.violations + reach, self.violations - reach
+        return self.of(highest >= least.max(initial=-np.inf) if self.aim else highest > 0.0)
 
     def bends(self, here: Measures, there: Measures, z: Array) -> Array:
         """Change of the violations by a step z beyond what the rows predict, shape (M,); 0 where it was not seen."""
@@ -140,7 +140,7 @@ class Linear:
         point = self.measures.point
         by_layout = self.problem.transfers.derivatives(point.x, point.q, self.derivatives.q) * self.problem.scale
         return ConstraintRows(
-            kind=MeasureKind.DURATION,
+            kind=MeasureKind.CYCLE,
             subjects=np.zeros(1, dtype=np.intp),
             nodes=np.zeros(1, dtype=np.intp),
             violations=np.zeros(1),
@@ -163,7 +163,7 @@ class Linear:
             violations=np.array([(share - 1.0) / SHARE]),
             gradients=np.concatenate([np.zeros(count), -saved])[None],
             allowed=np.full(1, 0.5 * reserve.time / SHARE),
-            units=np.full(1, whole * self.measures.span * SHARE),
+            units=np.full(1, whole * SHARE),
         )
 
     def _paced(self, pace: Pace) -> Iterator[ConstraintRows]:

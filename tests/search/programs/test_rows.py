@@ -61,7 +61,10 @@ def small() -> tuple[LayoutProblem, Point]:
 
 
 def demands_of(objective: Objective, timing: CycleTiming) -> Demands:
-    return Demands(objective=objective, timing=timing, margin=np.full(6, 0.3), duration=1.2, singular=np.full(1, 0.3))
+    duration = None if objective is Objective.CYCLE else 1.2
+    return Demands(
+        objective=objective, timing=timing, margin=np.full(6, 0.3), duration=duration, singular=np.full(1, 0.3)
+    )
 
 
 @cache

@@ -13,7 +13,7 @@ from cellplan.planning.sequence.stages import Stage, program_stages
 from cellplan.runs.plan.retiming import transfer_retimer
 from cellplan.runs.plan.sequence import PlannedProgram, PlannedStage, plan_work
 from cellplan.search.distances.cell_distances import CellDistances
-from cellplan.search.kernel.job import Job, enough_nodes
+from cellplan.search.kernel.job import MOST, Job, enough_nodes
 from cellplan.search.programs.layout_problem import LayoutProblem
 from cellplan.search.programs.program_problem import ProgramProblem
 from cellplan.search.programs.transfers import HOME, Transfers
@@ -72,21 +72,27 @@ class ProgramPhases:
         return sum(float(planned.schedule.times[-1]) for planned in self.work.stages)
 
     def problem(self, nodes: int) -> ProgramProblem:
-        """The problem with about so many nodes in each phase."""
-        phases = []
-        for planned, bodies in zip(self.work.stages, self.bodies, strict=True):
-            stage, schedule = planned.stage, planned.schedule
-            enough = enough_nodes(schedule, nodes if stage.move is None else nodes // FEWER)
-            job = Job.of(stage.cell, schedule, moving=tuple(stage.phase.moving), nodes=enough)
-            phases.append(
-                LayoutProblem(
-                    job=job,
-                    variables=_variables(self.variables, planned),
-                    bodies=bodies,
-                    acceleration=acceleration_limits(planned.scene.cell),
-                )
-            )
+        """The problem with about so many nodes in each phase, and as many as the given layout needs."""
+        phases = [
+            self._phase_problem(planned, bodies, nodes)
+            for planned, bodies in zip(self.work.stages, self.bodies, strict=True)
+        ]
         return ProgramProblem(phases=tuple(phases), transfers=self._transfers([len(it.times) for it in phases]))
+
+    def _phase_problem(self, planned: PlannedStage, bodies: CellDistances, nodes: int) -> LayoutProblem:
+        """The problem of one phase; the tools follow their paths in the given layout, as its plan has shown."""
+        stage, schedule = planned.stage, planned.schedule
+        enough = enough_nodes(schedule, nodes if stage.move is None else nodes // FEWER)
+        problem = LayoutProblem(
+            job=Job.of(stage.cell, schedule, moving=tuple(stage.phase.moving), nodes=enough),
+            variables=_variables(self.variables, planned),
+            bodies=bodies,
+            acceleration=acceleration_limits(planned.scene.cell),
+        )
+        while problem.evaluate(problem.given, planned.motion.q[0]) is None and enough < MOST:
+            enough = 2 * enough - 1
+            problem = problem.finer(schedule, nodes=enough)
+        return problem
 
     def values(self, x: Array, start: Array) -> dict[str, object]:
         """What to write into the given cell file: the layout, and the start of each task.

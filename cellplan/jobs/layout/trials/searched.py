@@ -18,7 +18,6 @@ from cellplan.search.synchronous import refuse_other_jobs, refuse_other_methods
 
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg", "length_mm", "tilt_deg")
 PREFIX: Final = "robots."
-OF_ONE_TASK: Final = frozenset({VariableKind.SPIN, VariableKind.GRASP})  # which several tasks of a robot would share
 FREE: Final = ("start", "weights", "path", "spin")
 
 
@@ -75,10 +74,10 @@ def _refuse_of_program(request: LayoutRequest, cell: Cell) -> None:
         raise InputError(f"{vary}: expected no choices and no joint path with a program, got {address}; leave it out")
     for variable in layout.ranges:
         is_other_start = variable.kind is VariableKind.START and variable.name not in cell.positioners[:1]
-        if is_other_start or variable.kind in OF_ONE_TASK:
+        if is_other_start or variable.kind is VariableKind.GRASP:
             raise InputError(
-                f"{vary}: expected bases, tools, the part, weights and the start of the first holder with a program, "
-                f"got {variable.address}; leave it out"
+                f"{vary}: expected no grasps, and no starts but that of the first holder, with a program, got "
+                f"{variable.address}; leave it out"
             )
 
 

@@ -1,0 +1,63 @@
+"""A search of a program from end to end, and what is refused of programs."""
+
+from pathlib import Path
+
+import pytest
+from builders.study_trials import InThisProcess
+
+from cellplan import LayoutRequest, Stop, load_cell, search_layout, solve
+from cellplan.errors import InputError
+from cellplan.jobs.layout.trials.searched import searched_cell
+from cellplan.search.programs.objective import CycleTiming, Objective
+
+CELL = Path(__file__).resolve().parents[3] / "cells" / "three_tasks_each.yaml"
+
+
+@pytest.mark.slow
+def test_a_program_becomes_shorter_by_moved_bases_and_passes_solve(tmp_path: Path) -> None:
+    request = LayoutRequest(cell=CELL, settings=("motion.timing=fastest",))
+
+    result = search_layout(request, tmp_path / "study", stop=Stop(trials=1), workers=InThisProcess())
+
+    best, given = result.record["best"], result.record["given"]
+    assert best is not None
+    cell = load_cell(tmp_path / "study" / "best.yaml")
+    solution = solve(cell)
+    assert solution.passed
+    assert solution.motion.times[-1] == pytest.approx(best["cycle_s"])
+    assert best["cycle_s"] < 0.95 * given["cycle_s"]
+    assert [body.name for body in cell.environment] == [body.name for body in load_cell(CELL).environment]
+    assert all(task.start_posture is not None for task in cell.tasks)
+    assert all(variable["cycle_s"] is not None for variable in result.record["variables"])
+
+
+@pytest.mark.slow
+def test_a_program_as_it_is_written_gets_shorter_transfers(tmp_path: Path) -> None:
+    request = LayoutRequest(cell=CELL, settings=("motion.duration_s=3",))
+
+    result = search_layout(request, tmp_path / "study", stop=Stop(trials=1), workers=InThisProcess())
+
+    best, given = result.record["best"], result.record["given"]
+    assert best is not None
+    assert best["cycle_s"] < given["cycle_s"]
+    works = [phase for phase in result.best.program.solution.runs if phase.phase.name.startswith("work")]
+    assert [phase.report.cycle_time for phase in works] == pytest.approx([3.0] * 3)
+
+
+def _refusal(**changes: object) -> str:
+    with pytest.raises(InputError) as caught:
+        searched_cell(LayoutRequest(cell=CELL, **changes))
+    return str(caught.value)
+
+
+def test_what_a_search_cannot_change_in_a_program_is_one_line() -> None:
+    assert "--misplacement: expected no misplaced bases with a program" in _refusal(misplacement=(1.0, 1.0))
+    assert "expected a task of a robot that has no other" in _refusal(free=("spin",))
+    assert "got robots.holder.path; leave it out" in _refusal(free=("path",))
+    assert "got tasks.left_seam.robot; leave it out" in _refusal(vary=("tasks.left_seam.robot=[left, right]",))
+    assert "write fastest" in _refusal(settings=("motion.timing={cycle_s: 20}",))
+
+
+def test_programs_may_be_retimed_and_may_only_have_to_conform() -> None:
+    for changes in ({"timing": CycleTiming.RETIMED}, {"objective": Objective.CONFORMING}, {"free": ("start",)}):
+        assert searched_cell(LayoutRequest(cell=CELL, **changes)).program.is_home_to_home
