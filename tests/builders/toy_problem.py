@@ -32,8 +32,7 @@ class Toy:
     cost: Array = field(default_factory=lambda: np.array([2.0, 3.0]))
     given: Array = field(default_factory=lambda: np.array([0.5, 4.5]))
     times: Array = field(default_factory=lambda: TIMES)
-    parts: tuple[slice, ...] = (slice(0, NODES),)
-    transfers: Transfers = field(default_factory=lambda: Transfers.none(2))
+    transfers: Transfers = field(default_factory=lambda: Transfers.none(2, nodes=NODES))
     is_dense: bool = False
     reaches: float = 9.0  # largest x0 with a motion
 

@@ -38,7 +38,6 @@ class LayoutProblem:
     given: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
-    parts: tuple[slice, ...] = field(init=False)
     transfers: Transfers = field(init=False)
     is_dense: bool = field(init=False, default=False)
     is_accelerating: bool = field(init=False)
@@ -49,7 +48,7 @@ class LayoutProblem:
         derive(self, **{name: getattr(self.variables, name) for name in names})
         is_accelerating = bool(np.isfinite(self.acceleration).any())
         derive(self, times=self.job.times, limits=self.job.limits, is_accelerating=is_accelerating)
-        derive(self, parts=(slice(0, len(self.times)),), transfers=Transfers.none(self.job.cell.joint_count))
+        derive(self, transfers=Transfers.none(self.job.cell.joint_count, nodes=len(self.times)))
 
     def finer(self, schedule: Schedule, *, nodes: int, denser: Sequence[float] = ()) -> Self:
         """The same problem on about so many nodes evenly, and more about some times in [s] on their clock."""

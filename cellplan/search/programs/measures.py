@@ -227,7 +227,7 @@ def reserves(distances: Distances, reserve: Reserve) -> Array:
 def key_nodes(problem: Problem, effort: Effort) -> Indices:
     """Nodes at which distances are asked: the ones nearest to even times of each motion, and to the times given."""
     chosen = [np.abs(problem.times[:, None] - np.array(effort.also_at)).argmin(axis=0)]
-    for part in problem.parts:
+    for part in problem.transfers.parts:
         times = problem.times[part]
         even = np.linspace(times[0], times[-1], effort.keys)
         chosen.append(part.start + np.abs(times[:, None] - even).argmin(axis=0))

@@ -205,7 +205,7 @@ def _stretches(problem: Problem, point: Point) -> tuple[PacedStretch, ...]:
     twice = np.append(np.diff(times) == 0.0, False)
     turned = np.linalg.norm(np.diff(velocities / safe[:, None], axis=0, append=0.0), axis=1) > KINK
     is_corner = twice & np.append(~rests[1:] & ~rests[:-1], False) & turned
-    is_corner[[part.start - 1 for part in problem.parts[1:]]] = True
+    is_corner[[part.start - 1 for part in problem.transfers.parts[1:]]] = True
     ends = np.unique([0, *np.flatnonzero(rests), *(np.flatnonzero(is_corner) + 1), len(times) - 1])
     stretches = []
     for first, last in pairwise(ends.tolist()):

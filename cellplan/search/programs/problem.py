@@ -66,12 +66,8 @@ class Problem(Varied, Protocol):
         """Times of the nodes in [s], from 0 to the end, shape (N,); two nodes may share one where speeds jump."""
 
     @property
-    def parts(self) -> tuple[slice, ...]:
-        """Nodes of its motions, one after the other: those of the phases of a program, else all."""
-
-    @property
     def transfers(self) -> Transfers:
-        """What leads from one of its motions to the next; none where there is one alone."""
+        """Its motions, those of the phases of a program or a single one, and what leads from one to the next."""
 
     @property
     def limits(self) -> JointLimits:

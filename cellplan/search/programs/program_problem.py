@@ -33,17 +33,15 @@ class ProgramProblem:
     acceleration: Array = field(init=False)
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
-    parts: tuple[slice, ...] = field(init=False)
     is_dense: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Put the nodes of the phases one after the other."""
         shared = ("names", "lower", "upper", "scale", "cost", "given", "acceleration", "limits")
         derive(self, **{name: getattr(self.phases[0], name) for name in shared})
-        edges = [0, *accumulate(len(phase.times) for phase in self.phases)]
         begins = accumulate((float(phase.times[-1]) for phase in self.phases), initial=0.0)
         times = [begin + phase.times for begin, phase in zip(begins, self.phases, strict=False)]
-        derive(self, times=np.concatenate(times), parts=tuple(slice(*edge) for edge in pairwise(edges)))
+        derive(self, times=np.concatenate(times))
 
     def evaluate(self, x: Array, start: Array, near: Point | None = None) -> Point | None:
         """See ``Problem``."""
@@ -63,7 +61,7 @@ class ProgramProblem:
     def distances(self, point: Point, nodes: Indices, within: float) -> Distances:
         """See ``Problem``; a tool and the part that it works on may touch: of them the task sets the distance."""
         all_near = list[Distances]()
-        for place, (phase, rows) in enumerate(zip(self.phases, self.parts, strict=True)):
+        for place, (phase, rows) in enumerate(zip(self.phases, self.transfers.parts, strict=True)):
             chosen = nodes[(nodes >= rows.start) & (nodes < rows.stop)] - rows.start
             near = phase.distances(self._of_phase(point, place), chosen, within)
             may_touch = (near.demands <= 0.0) & (phase.bodies.most_demanded > 0.0)
@@ -81,14 +79,14 @@ class ProgramProblem:
         return np.concatenate(
             [
                 phase.bodies.derivatives(pairs.near, point.x, by_joints.q[rows][pairs.nodes])
-                for phase, rows, pairs in zip(self.phases, self.parts, details, strict=True)
+                for phase, rows, pairs in zip(self.phases, self.transfers.parts, details, strict=True)
             ]
         )
 
     def arms(self, point: Point) -> "ProgramArms":
         """See ``Problem``."""
         arms = [phase.arms(self._of_phase(point, place)) for place, phase in enumerate(self.phases)]
-        return ProgramArms(arms=arms, parts=self.parts)
+        return ProgramArms(arms=arms, parts=self.transfers.parts)
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """See ``Problem``."""
@@ -111,7 +109,7 @@ class ProgramProblem:
 
     def _of_phase(self, point: Point, place: int) -> Point:
         """The part of a point that is the motion of one phase."""
-        rows = self.parts[place]
+        rows = self.transfers.parts[place]
         return Point(
             x=point.x,
             start=point.start.reshape(len(self.phases), -1)[place],

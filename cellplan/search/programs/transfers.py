@@ -22,7 +22,7 @@ from cellplan.search.distances.cell_distances import CellDistances
 NORM: Final = 24.0  # [-] p: six joints as slow as each other take 8 % more
 SHORTEST: Final = 1e-9  # [rad] or [m] of a move: what is shorter stands still
 STEP: Final = 1e-6  # [rad] or [m] to either side, by which the time is differentiated
-SAMPLES: Final = 15  # [-] configurations along a transfer whose bodies are looked at
+SAMPLES: Final = 15  # [-] configurations along a transfer at which distances are asked
 DEPTH_NORM: Final = 4.0  # [-] p of depths: nearly the deepest
 DEEP: Final = 0.1  # [m] D: depth with which a transfer lasts longer by a half
 HOME: Final = -1  # in place of a node
@@ -30,8 +30,9 @@ HOME: Final = -1  # in place of a node
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Transfers:
-    """The T transfers of a program."""
+    """The motions of a program, and the T transfers between them."""
 
+    parts: tuple[slice, ...]  # nodes of the motions
     ends: Indices  # nodes that each joint of a transfer moves from and to, or ``HOME``, shape (2, T, nq)
     home: Array  # homes of all robots in [rad] or [m], shape (nq,)
     bounds: JointLimitsInTime  # limits of the joints
@@ -39,11 +40,12 @@ class Transfers:
     bodies: tuple[CellDistances, ...]  # the bodies during each of them
 
     @classmethod
-    def none(cls, joints: int) -> "Transfers":
+    def none(cls, joints: int, *, nodes: int) -> "Transfers":
         """Those of a single motion."""
         nothing = np.zeros(joints)
         bounds = JointLimitsInTime(velocity=nothing, acceleration=nothing, jerk=nothing)
-        return cls(ends=np.zeros((2, 0, joints), dtype=np.intp), home=nothing, bounds=bounds, step=1.0, bodies=())
+        ends, parts = np.zeros((2, 0, joints), dtype=np.intp), (slice(0, nodes),)
+        return cls(parts=parts, ends=ends, home=nothing, bounds=bounds, step=1.0, bodies=())
 
     def seconds(self, x: Array, q: Array) -> float:
         """Time of them all in [s], for variables of shape (n,) and joint positions at the nodes, shape (N, nq)."""

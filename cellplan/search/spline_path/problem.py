@@ -63,14 +63,13 @@ class PathProblem:
     is_dense: bool = field(init=False, default=True)  # its nodes are cheap; wrists near a singularity make peaks narrow
     times: Array = field(init=False)
     limits: JointLimits = field(init=False)
-    parts: tuple[slice, ...] = field(init=False)
     transfers: Transfers = field(init=False)
 
     def __post_init__(self) -> None:
         """Put the variables one after the other."""
         job = self.nodes.job
-        derive(self, times=job.times, limits=job.limits, parts=(slice(0, len(job.times)),))
-        derive(self, transfers=Transfers.none(job.cell.joint_count))
+        derive(self, times=job.times, limits=job.limits)
+        derive(self, transfers=Transfers.none(job.cell.joint_count, nodes=len(job.times)))
         path, layout = self.path, self.layout
         given = np.concatenate([path.given.coefficients.ravel(), layout.given])
         derive(self, names=(*path.names, *layout.names), given=given)

@@ -39,7 +39,7 @@ def test_phases_are_as_they_are_alone(ready: PreparedSearch, problem: ProgramPro
     assert point is not None
     starts = ready.given_start.reshape(len(problem.phases), -1)
     derivatives = problem.derivatives(point)
-    for phase, start, rows in zip(problem.phases, starts, problem.parts, strict=True):
+    for phase, start, rows in zip(problem.phases, starts, problem.transfers.parts, strict=True):
         alone = phase.evaluate(x, start)
         assert alone is not None
         assert np.array_equal(alone.q, point.q[rows])
@@ -116,7 +116,9 @@ def test_pairs_of_all_phases_have_their_names(ready: PreparedSearch, problem: Pr
     assert point is not None
     distances = problem.distances(point, np.arange(len(problem.times)), 0.2)
     worst = int(distances.values.argmin())
-    rows = next(place for place, part in enumerate(problem.parts) if part.start <= distances.nodes[worst] < part.stop)
+    rows = next(
+        place for place, part in enumerate(problem.transfers.parts) if part.start <= distances.nodes[worst] < part.stop
+    )
     phase = problem.phases[rows]
     alone = phase.distances(problem._of_phase(point, rows), np.arange(len(phase.times)), 0.2)
     assert distances.values[worst] == pytest.approx(alone.values.min(), abs=1e-12)

@@ -28,7 +28,9 @@ class _Nothing:
 def _seconds(begin: np.ndarray, end: np.ndarray) -> float:
     ends = np.array([[np.zeros(JOINTS)], [np.ones(JOINTS)]], dtype=int)
     bodies: tuple = (_Nothing(),)
-    transfers = Transfers(ends=ends, home=np.zeros(JOINTS), bounds=BOUNDS, step=STEP, bodies=bodies)
+    transfers = Transfers(
+        parts=(slice(0, 1), slice(1, 2)), ends=ends, home=np.zeros(JOINTS), bounds=BOUNDS, step=STEP, bodies=bodies
+    )
     return transfers.seconds(np.zeros(2), np.array([begin, end]))
 
 
@@ -43,7 +45,7 @@ def test_robots_that_stay_where_they_are_need_no_time() -> None:
 
 
 def test_one_motion_has_no_transfers() -> None:
-    transfers = Transfers.none(JOINTS)
+    transfers = Transfers.none(JOINTS, nodes=4)
     q, dq = np.ones((4, JOINTS)), np.ones((4, JOINTS, 2))
     assert transfers.seconds(np.zeros(2), q) == 0.0
     assert np.array_equal(transfers.derivatives(np.zeros(2), q, dq), np.zeros(2))

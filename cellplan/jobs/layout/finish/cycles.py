@@ -2,7 +2,7 @@
 
 from cellplan.jobs.fastest.time_laws import from_both_sides
 from cellplan.jobs.fastest.timed_program import Law, TimedProgram, scaled_values, whole_steps
-from cellplan.jobs.layout.trials.prepared import PreparedSearch
+from cellplan.jobs.layout.trials.prepared import PreparedSearch, is_fastest
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress
 from cellplan.runs.early_clearance import EarlyClearance
@@ -29,8 +29,8 @@ def draft(
     """
     is_cycle = ready.request.objective is Objective.CYCLE
     if ready.phases is not None:
-        law = Law.COMMON_SPEED if ready.is_fastest else Law.AS_WRITTEN
-        retimed: dict[str, object] = {"motion.timing": "fastest"} if ready.is_fastest else {}
+        law = Law.COMMON_SPEED if is_fastest(ready) else Law.AS_WRITTEN
+        retimed: dict[str, object] = {"motion.timing": "fastest"} if is_fastest(ready) else {}
         return TimedProgram.solved(cell, law, retimed, task=None, progress=progress, early=early)
     if ready.request.timing is CycleTiming.RETIMED:
         timing: object = "fastest" if is_cycle else {"cycle_s": ready.duration}

@@ -1,6 +1,7 @@
 """The phases of a program with work, made ready for a search: their jobs, starts and bodies, and what lies between."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -127,6 +128,7 @@ class ProgramPhases:
         retimer = transfer_retimer(self.work.scenes.held)
         home = np.concatenate([robot.home for robot in cell.robots if robot.home is not None])
         return Transfers(
+            parts=tuple(slice(*edge) for edge in pairwise(firsts.tolist())),
             ends=np.swapaxes(np.array(ends), 0, 1),
             home=home,
             bounds=retimer.bounds,

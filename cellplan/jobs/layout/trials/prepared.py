@@ -63,13 +63,15 @@ class PreparedSearch:
     moving: tuple[str, ...]  # names of the robots that move
     unled: "PreparedSearch | None" = None  # the same without the joint path; None where no path varies
     solved_start: Array | None = None  # start of the given layout that a solve finds, shape (nq,); or None
-    phases: ProgramPhases | None = None  # of a program from home to home; its first phase is ``schedule``, ``moving``
+    phases: ProgramPhases | None = (
+        None  # of a program from home to home; ``schedule`` and ``moving`` are its first block's
+    )
 
     @classmethod
     def of(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
         """Make a cell ready."""
         if cell.program.is_home_to_home:
-            return cls._of_program(request, cell)
+            return _of_program(request, cell)
         unled = without_path(cell)
         variables = Variables.of(cell, without=() if unled is None else resolving(cell))
         scene = Scene.from_cell(variables.base)
@@ -89,29 +91,6 @@ class PreparedSearch:
             variable.kind is VariableKind.START and variable.given is None for variable in variables.tied.ranges
         )
         return _with_solved_start(prepared) if needs_start else prepared
-
-    @classmethod
-    def _of_program(cls, request: LayoutRequest, cell: Cell) -> "PreparedSearch":
-        """Make a program ready."""
-        variables = Variables.of(cell)
-        scene = Scene.from_cell(variables.base)
-        bodies = CellDistances.of(scene, variables)
-        phases = ProgramPhases.of(variables.base, variables, bodies)
-        robots = [replace(robot, start=phases.work.cell.robot(robot.name).start) for robot in variables.base.robots]
-        given = variables.read_from(replace(variables.base, robots=tuple(robots)))
-        variables = replace(variables, given=given)
-        first = phases.work.stages[0]
-        return cls(
-            request=request,
-            cell=cell,
-            variables=variables,
-            scene=scene,
-            bodies=bodies,
-            schedule=first.schedule,
-            moving=tuple(first.stage.phase.moving),
-            solved_start=phases.start,
-            phases=replace(phases, variables=variables),
-        )
 
     def problem(self, nodes: int = NODES) -> LayoutProblem | ProgramProblem | PathProblem:
         """The problem at about so many nodes: of the layout, or of the joint path and whatever else varies."""
@@ -200,25 +179,6 @@ class PreparedSearch:
         """Duration of the job in [s], as the cell has it; of a program that of its phases with work."""
         return float(self.schedule.times[-1]) if self.phases is None else self.phases.duration
 
-    @property
-    def is_fastest(self) -> bool:
-        """Whether the motions go as fast along their paths as the limits allow, not as time laws have it."""
-        return self.request.timing is CycleTiming.RETIMED or self.cell.motion.timing is Timing.FASTEST
-
-    @property
-    def _clock(self) -> dict[str, Any]:
-        """How the motions are timed, and what they may last.
-
-        Of a program as it is written, and of one whose tasks have demanded speeds, the transfers alone become shorter.
-        """
-        is_cycle, timing = self.request.objective is Objective.CYCLE, self.request.timing
-        if self.phases is None:
-            return {"duration": None if is_cycle else self.duration, "timing": timing}
-        has_speeds = any(task.feed is not None or task.process is not None for task in self.cell.tasks)
-        if self.is_fastest and is_cycle and not has_speeds:
-            return {"duration": None, "timing": CycleTiming.RETIMED}
-        return {"duration": UNLIMITED if self.is_fastest else self.duration, "timing": CycleTiming.LAWS}
-
     def demands(self, **changes: Any) -> Demands:
         """What is demanded of a layout."""
         values: dict[str, Any] = {
@@ -226,7 +186,48 @@ class PreparedSearch:
             "margin": self.variables.margin,
             "singular": _singular(self),
         }
-        return Demands(**(values | self._clock | changes))
+        return Demands(**(values | _clock(self) | changes))
+
+
+def _of_program(request: LayoutRequest, cell: Cell) -> PreparedSearch:
+    """A program made ready."""
+    variables = Variables.of(cell)
+    base, scene = variables.base, Scene.from_cell(variables.base)
+    bodies = CellDistances.of(scene, variables)
+    phases = ProgramPhases.of(base, variables, bodies)
+    robots = [replace(robot, start=phases.work.cell.robot(robot.name).start) for robot in base.robots]
+    variables = replace(variables, given=variables.read_from(replace(base, robots=tuple(robots))))
+    first = next(planned for planned in phases.work.stages if planned.stage.move is None)
+    return PreparedSearch(
+        request=request,
+        cell=cell,
+        variables=variables,
+        scene=scene,
+        bodies=bodies,
+        schedule=first.schedule,
+        moving=tuple(first.stage.phase.moving),
+        solved_start=phases.start,
+        phases=replace(phases, variables=variables),
+    )
+
+
+def is_fastest(ready: PreparedSearch) -> bool:
+    """Whether the motions go as fast along their paths as the limits allow, not as time laws have it."""
+    return ready.request.timing is CycleTiming.RETIMED or ready.cell.motion.timing is Timing.FASTEST
+
+
+def _clock(ready: PreparedSearch) -> dict[str, Any]:
+    """How the motions are timed, and what they may last.
+
+    Of a program as it is written, and of one whose tasks have demanded speeds, the transfers alone become shorter.
+    """
+    is_cycle, timing = ready.request.objective is Objective.CYCLE, ready.request.timing
+    if ready.phases is None:
+        return {"duration": None if is_cycle else ready.duration, "timing": timing}
+    has_speeds = any(task.feed is not None or task.process is not None for task in ready.cell.tasks)
+    if is_fastest(ready) and is_cycle and not has_speeds:
+        return {"duration": None, "timing": CycleTiming.RETIMED}
+    return {"duration": UNLIMITED if is_fastest(ready) else ready.duration, "timing": CycleTiming.LAWS}
 
 
 def demands_near(ready: PreparedSearch, point: Point, **changes: Any) -> Demands:
