@@ -1,6 +1,7 @@
 """Jobs that a search can judge: motions by the weighted pseudo-inverse, and of these one synchronous motion alone."""
 
 from collections.abc import Collection
+from dataclasses import replace
 
 from cellplan.errors import InputError
 from cellplan.model.cell.cell import Cell, Mode, Timing
@@ -39,9 +40,14 @@ def refuse_other_methods(cell: Cell, what: str, *, paths: Collection[str] = ()) 
 
 
 def is_searchable(cell: Cell) -> bool:
-    """Whether the job is one that a search can judge; see ``refuse_other_jobs``."""
+    """Whether the job is one that a search can judge, a program among them; see ``refuse_other_jobs``."""
+    refuse, motion = refuse_other_jobs, cell.motion
+    if cell.program.is_home_to_home:
+        refuse = refuse_other_methods
+        if motion.timing is Timing.FASTEST:  # of a program the search knows this too
+            motion = replace(motion, timing=Timing.AS_WRITTEN)
     try:
-        refuse_other_jobs(cell, "a search")
+        refuse(replace(cell, motion=motion), "a search")
     except InputError:
         return False
     return True

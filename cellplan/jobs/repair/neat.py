@@ -41,10 +41,16 @@ def neat(ready: PreparedSearch, x: Array, start: Array) -> tuple[Array, Array]:
 
 
 def changed_values(ready: PreparedSearch, x: Array, start: Array) -> dict[str, object]:
-    """What to write into the cell file, by address; nothing that stands in it already."""
+    """What to write into the cell file, by address; nothing that stands in it already, or that a program begins at."""
     written = values_of(ready, x, start)
     document: Any = ready.cell.origin.document
-    return {address: value for address, value in written.items() if not _is_same(written_at(document, address), value)}
+    begun = {} if ready.phases is None else values_of(ready, ready.variables.given, ready.given_start)
+    return {
+        address: value
+        for address, value in written.items()
+        if not _is_same(written_at(document, address), value)
+        and not (address.startswith("tasks.") and _is_same(begun.get(address), value))
+    }
 
 
 def written_at(document: Any, address: str) -> Any:

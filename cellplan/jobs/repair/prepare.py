@@ -11,6 +11,7 @@ from cellplan.errors import InputError, NoSolutionError
 from cellplan.geometry.arrays import Array
 from cellplan.jobs.layout.request import LayoutRequest
 from cellplan.jobs.layout.trials.joint_path import without_path
+from cellplan.jobs.layout.trials.phases import ProgramPhases
 from cellplan.jobs.layout.trials.prepared import PreparedSearch
 from cellplan.jobs.layout.trials.searched import searched_cell
 from cellplan.jobs.repair.attempts import Attempt
@@ -20,7 +21,6 @@ from cellplan.planning.start.inverse_kinematics import finite_limits
 from cellplan.search.distances.cell_distances import CellDistances
 from cellplan.search.kernel.run import run
 from cellplan.search.programs.layout_problem import LayoutProblem
-from cellplan.search.synchronous import refuse_other_jobs
 
 DRAWS: Final = 48  # [-] layouts nearby that are tried side by side where there is no motion
 SPREADS: Final = (0.5, 1.0, 2.0, 4.0)  # [-] usual steps by which they differ, more and more
@@ -33,10 +33,11 @@ def ready_cell(request: LayoutRequest) -> PreparedSearch:
     """The cell of a request with all that it lets a layout search change but joint paths; made once in each process.
 
     Where a joint path may change, so may the start posture of its robot, which decides the motion without one.
+
+    Raises:
+        NoSolutionError: A phase of a program has no start, or a tool loses its path.
     """
     cell = searched_cell(request)
-    if cell.program.is_home_to_home:
-        refuse_other_jobs(cell, "--repair")
     for robot in cell.robots:
         if robot.path is not None:
             where = cell.origin.at(f"robots.{robot.name}.path")
@@ -44,7 +45,13 @@ def ready_cell(request: LayoutRequest) -> PreparedSearch:
                 f"{where}: expected no joint path for --repair, which begins with the motion without one: leave it "
                 "out, or search on from it with cellplan layout"
             )
-    return PreparedSearch.of(request, without_path(cell) or cell)
+    try:
+        return PreparedSearch.of(request, without_path(cell) or cell)
+    except NoSolutionError as error:  # of a program, whose phases are planned first
+        raise type(error)(
+            f"{error}; --repair of a program begins with tasks that can be followed one by one: cellplan map --robot "
+            "NAME shows from where"
+        ) from error
 
 
 def start_posture(ready: PreparedSearch) -> tuple[Array, str]:
@@ -63,7 +70,10 @@ def with_attempt(ready: PreparedSearch, attempt: Attempt) -> PreparedSearch:
     """The cell ready for a search of what one attempt may change."""
     if attempt.addresses:
         variables = ready.variables.among(frozenset(attempt.addresses))
-        return replace(ready, variables=variables, bodies=CellDistances.of(ready.scene, variables))
+        bodies, phases = CellDistances.of(ready.scene, variables), ready.phases
+        if phases is not None:
+            phases = ProgramPhases.of_work(phases.work, variables, bodies)
+        return replace(ready, variables=variables, bodies=bodies, phases=phases)
     return PreparedSearch.of(ready.request, _varied(ready.cell, attempt.vary))
 
 

@@ -39,7 +39,11 @@ class EffectRecord(TypedDict):
 
 def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[EffectRecord]:
     """What a remedy does to the checks that fail as the cell is given."""
-    after = {(check["name"], check["subject"]): check for check in figures["checks"]}
+    after = dict[tuple[str, str], Mapping[str, Any]]()
+    for check in figures["checks"]:  # all phases have the same ones: of each the one that is nearest to its limit
+        key = (check["name"], check["subject"])
+        if key not in after or _left(check) < _left(after[key]):
+            after[key] = check
     effects: list[EffectRecord] = []
     for check in given["failed"]:
         subject = check["subject"]
@@ -63,6 +67,12 @@ def effects(given: Mapping[str, Any], figures: Mapping[str, Any]) -> list[Effect
                 _effect(check, old, now["value"], unit, f"{name} {subject} {old:.3g} -> {now['value']:.3g} {unit}")
             )
     return effects
+
+
+def _left(check: Mapping[str, Any]) -> float:
+    """How far a check is from its limit, in its unit; infinitely far without numbers."""
+    value, limit = check["value"], check["limit"]
+    return float("inf") if value is None or limit is None else abs(float(value) - float(limit))
 
 
 class RemedyRecord(TypedDict):
@@ -271,9 +281,9 @@ def _changes(cell: Cell, attempt: Attempt, values: Mapping[str, Any]) -> Iterato
             yield from _of_pose(name.removesuffix(".base"), parts)
         elif name.endswith(".tool.rod"):
             yield f"rod of {name.removesuffix('.tool.rod')}: {_arrows(parts)}"
-        elif entry.startswith("tasks."):
+        elif entry.startswith("tasks.") and not {"start", "start_deg"} & parts.keys():
             yield f"tool of task {entry.removeprefix('tasks.')}: {_arrows(parts)}"
-        else:
+        elif not entry.startswith("tasks."):
             yield from _of_robot(cell, name, attempt, parts)
 
 

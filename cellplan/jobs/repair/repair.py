@@ -41,7 +41,6 @@ KINDS: Final = list(RemedyKind)
 WITH_LIMITS: Final = "quadratic_program"  # the method that keeps joints within their limits
 CLEARLY: Final = 1e-4  # [rad] or [m] by which a demand is missed for sure
 KEEPS_START: Final = frozenset({RemedyKind.WEIGHTS, RemedyKind.METHOD, RemedyKind.DURATION})
-FIRST: Final = np.array([0], dtype=np.intp)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -200,16 +199,17 @@ def _size(tried: Tried) -> tuple[bool, int, float, int]:
 
 
 def start_faults(ready: PreparedSearch, point: Point) -> tuple[StartFault, ...]:
-    """What the start of a motion misses of the demands."""
+    """What the starts of its motions, of the phases of a program one after the other, miss of the demands."""
     problem, cell, margin = ready.coarse, ready.variables.base, ready.demands().margin
     holder = set(cell.positioners) or {PART}
-    left = np.minimum(point.q[0] - problem.limits.lower, problem.limits.upper - point.q[0])
+    first = np.array([part.start for part in problem.parts], dtype=np.intp)
+    left = np.minimum(point.q[first] - problem.limits.lower, problem.limits.upper - point.q[first])
     faults = []
-    for column in np.flatnonzero(left - margin < -CLEARLY).tolist():
+    for column in np.flatnonzero(left.min(axis=0) - margin < -CLEARLY).tolist():
         robot, joint = problem.joint_names(column)
         text = f"joint {robot}/{joint} has too little room in the start posture, which this does not change"
         faults.append(StartFault(robots=frozenset({robot, *holder}), text=text))
-    near = problem.distances(point, FIRST, 0.0)
+    near = problem.distances(point, first, 0.0)
     missing = near.demands - near.values
     for row in np.argsort(-missing, kind="stable").tolist():
         if missing[row] > CLEARLY:

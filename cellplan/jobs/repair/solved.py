@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -29,8 +29,8 @@ class SolvedCell:
 
     @property
     def checks(self) -> list[Check]:
-        """All checks that were made, and those of demanded margins."""
-        made = [check for run in self.solution.runs for check in run.report.checks]
+        """All checks that were made, with the phase of a program, and those of demanded margins."""
+        made = [_of_phase(run.report.phase, check) for run in self.solution.runs for check in run.report.checks]
         return made + self._margin_checks()
 
     @property
@@ -77,28 +77,32 @@ class SolvedCell:
         return number(MM * min((value for value in distances if value is not None), default=np.inf))
 
     def _margin_checks(self) -> list[Check]:
-        """One check for each joint with a demanded margin."""
-        uses = [(use, run.report) for run in self.solution.runs for use in run.report.joints]
+        """One check for each joint with a demanded margin, in the phase in which it leaves least."""
         checks = []
-        for place, (use, _) in enumerate(uses):
-            demanded = float(self.margin[place % len(self.margin)])
+        for place, demanded in enumerate(self.margin.tolist()):
+            uses = ((run.report.joints[place], run.report.phase) for run in self.solution.runs)
+            use, phase = min(uses, key=lambda one: one[0].margin)
             if not demanded > 0.0 or not np.isfinite(use.margin):
                 continue
             unit, scale = use.display_unit
-            checks.append(
-                Check(
-                    name=MARGIN,
-                    subject=f"{use.robot}/{use.joint}",
-                    passed=use.margin >= demanded - ROUNDING,
-                    value=scale * use.margin,
-                    limit=scale * demanded,
-                    unit=unit,
-                    at_s=use.margin_at_s,
-                    message=f"joint {use.robot}/{use.joint} stays {scale * use.margin:.4g} {unit} inside its limits, "
-                    f"{scale * demanded:.4g} {unit} demanded, worst at {use.margin_at_s:.3f} s",
-                )
+            check = Check(
+                name=MARGIN,
+                subject=f"{use.robot}/{use.joint}",
+                passed=use.margin >= demanded - ROUNDING,
+                value=scale * use.margin,
+                limit=scale * demanded,
+                unit=unit,
+                at_s=use.margin_at_s,
+                message=f"joint {use.robot}/{use.joint} stays {scale * use.margin:.4g} {unit} inside its limits, "
+                f"{scale * demanded:.4g} {unit} demanded, worst at {use.margin_at_s:.3f} s",
             )
+            checks.append(_of_phase(phase, check))
         return checks
+
+
+def _of_phase(phase: str | None, check: Check) -> Check:
+    """A check that says in which phase it was made; None for the only one."""
+    return check if phase is None else replace(check, message=f"{phase}: {check.message}")
 
 
 def demanded_margin(cell: Cell) -> Array:

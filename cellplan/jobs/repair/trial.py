@@ -133,9 +133,11 @@ def _of_branch(ready: PreparedSearch, attempt: Attempt) -> Confirmed | str:
         return f"{NOT_FOLLOWED} from there"
     if left := violations(ready, point):
         return left[0]["text"]
+    cost = float(np.abs(start - given).sum() / np.radians(10.0))
+    if ready.phases is not None:
+        return _of_values(ready, changed_values(ready, ready.variables.given, start), cost)
     key = next(iter(attempt.values))
     values = written_starts(ready.cell, ready.variables.settings, start)
-    cost = float(np.abs(start - given).sum() / np.radians(10.0))
     return _of_values(ready, {key: values[key]}, cost)
 
 
@@ -253,7 +255,8 @@ def _tightened(solved: SolvedCell, demands: Demands, effort: Effort) -> tuple[De
     reserve = replace(
         effort.reserve, distance=effort.reserve.distance + _missing(near), time=effort.reserve.time + _late(failed)
     )
-    at = (check.at_s for check in near if check.at_s is not None)
+    is_program = len(solved.solution.runs) > 1  # whose phases have clocks of their own
+    at = (check.at_s for check in near if check.at_s is not None and not is_program)
     also_at = tuple(sorted({*effort.also_at, *at}))
     return replace(demands, margin=margin), replace(effort, reserve=_most(reserve), also_at=also_at)
 

@@ -44,7 +44,11 @@ class ProgramPhases:
         Raises:
             NoSolutionError: A phase has no start, or a tool loses its path.
         """
-        work = plan_work(cell)
+        return cls.of_work(plan_work(cell), variables, bodies)
+
+    @classmethod
+    def of_work(cls, work: PlannedProgram, variables: Variables, bodies: CellDistances) -> "ProgramPhases":
+        """The phases of planned work with all that may change; see ``of``."""
         of_phases = [
             bodies if planned.stage.move is None else CellDistances.of(planned.scene, _variables(variables, planned))
             for planned in work.stages
