@@ -202,7 +202,7 @@ def start_faults(ready: PreparedSearch, point: Point) -> tuple[StartFault, ...]:
     """What the starts of its motions, of the phases of a program one after the other, miss of the demands."""
     problem, cell, margin = ready.coarse, ready.variables.base, ready.demands().margin
     holder = set(cell.positioners) or {PART}
-    first = np.array([part.start for part in problem.parts], dtype=np.intp)
+    first = np.array([part.start for part in problem.transfers.parts], dtype=np.intp)
     left = np.minimum(point.q[first] - problem.limits.lower, problem.limits.upper - point.q[first])
     faults = []
     for column in np.flatnonzero(left.min(axis=0) - margin < -CLEARLY).tolist():

@@ -8,7 +8,6 @@ from cellplan import CellplanError, LayoutRequest
 from cellplan.cli.main import run
 from cellplan.cli.options.quantities import read_angle, read_length, read_misplacement, read_time
 from cellplan.jobs.layout.trials.searched import searched_cell, written_vary
-from cellplan.jobs.repair.prepare import ready_cell
 from cellplan.search.programs.objective import Objective
 
 CELLS = Path(__file__).resolve().parents[3] / "cells"
@@ -106,11 +105,6 @@ def test_an_unknown_key_that_is_to_change_is_located() -> None:
 
     with pytest.raises(CellplanError, match=r"find_a_layout\.yaml.*layout\.vary.*kuka\.bose"):
         searched_cell(request)
-
-
-def test_a_program_is_not_repaired() -> None:
-    with pytest.raises(CellplanError, match=r"three_tasks_each\.yaml:\d+: program: expected a cell without a program"):
-        ready_cell(LayoutRequest(cell=CELLS / "three_tasks_each.yaml"))
 
 
 def test_keys_are_added_and_fixed() -> None:
