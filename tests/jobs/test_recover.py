@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders.stored_cells import solve_into
+from builders.view_pages import data_of
 from recoveries import judged as brute_force
 from recoveries import random_stops
 
+from cellplan.cli.main import run as run_command
 from cellplan.errors import InputError
 from cellplan.files.run.joint_tables import TableHeader, parse_table, render_table
 from cellplan.jobs.recover.judge import judged
@@ -118,6 +120,28 @@ def test_the_same_stop_gives_the_same_bytes(pen: VerifiedRun, stopped: Recovery,
     assert [str(name) for name in files] == ["recovery.json", "tables/clock.csv", "tables/pen.csv"]
     for name in files:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+def test_a_transfer_that_is_not_found_has_its_pair_its_place_and_a_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    home = "home_deg: [10, 45, 0, -56, -90, -79]  # the arm reaches down into the floor\n    start_deg"
+    (tmp_path / "pen.yaml").write_text(PEN.replace("start_deg", home), encoding="utf-8")
+    solve_into(tmp_path / "pen.yaml", tmp_path / "run")
+
+    arguments = ["recover", str(tmp_path / "run"), "--cell", str(tmp_path / "pen.yaml"), "-q", "--at", "0.73"]
+    assert run_command([*arguments, "-o", str(tmp_path / "out")]) == 3
+
+    page, said = tmp_path / "out" / "view.html", capsys.readouterr().out
+    assert said.rstrip().endswith(f"3-D page of the best try: {page}")
+    record = json.loads((tmp_path / "out" / "recovery.json").read_text(encoding="utf-8"))
+    assert "floor" in record["blocked"]["pair"]
+    assert record["blocked"]["place_mm"][2] < 5.0
+    assert "the goal of the transfer move of 'pen' comes too close: " in record["reason"]
+    (scene,) = data_of(page.read_text(encoding="utf-8"))["scenes"]
+    (failure,) = scene["failures"]
+    assert {scene["bodies"][body]["name"] for body in failure["bodies"]} == set(record["blocked"]["pair"])
+    assert run_command([*arguments, "-o", str(tmp_path / "out")]) == 3  # it is replaced, its page too
 
 
 def test_the_clock_names_the_phase_of_each_row(stopped: Recovery, tmp_path: Path) -> None:

@@ -61,6 +61,8 @@ def recover(options: RecoverOptions) -> Result:
     from cellplan.jobs.recover.recover import recover as recovered
     from cellplan.jobs.recover.result import default_folder, recovery_lines, refuse_unless_recoverable, write_recovery
     from cellplan.jobs.recover.state import refuse_state
+    from cellplan.jobs.view.write import write_view_of_blocked
+    from cellplan.report.page.render import VIEW_PAGE
     from cellplan.runs.gate.open_gate import open_gate
 
     at, frozen, keep = options.at, frozen_times(options.frozen), options.keep
@@ -79,11 +81,14 @@ def recover(options: RecoverOptions) -> Result:
         transfer = run.cell.program.transfer.changed(**limits)
         recovery = recovered(run, at=at, frozen=frozen, keep=keep, transfer=transfer, progress=progress)
         record = write_recovery(recovery, folder)
+        page = folder / VIEW_PAGE
+        is_shown = recovery.blocked is not None and write_view_of_blocked(recovery.blocked, page)
     status = ExitStatus.PASSED if recovery.succeeded else ExitStatus.NO_SOLUTION
     verdict, *lines = recovery_lines(record)
     place = f"tables: {folder / 'tables'}" if recovery.succeeded else f"reason: {folder / 'recovery.json'}"
     about = {"exit": int(status), "folder": str(folder), "remarks": list(run.remarks)}
-    return Result(status, [verdict, *notes(run.remarks), *lines, place], {**record, **about})
+    shown = [f"3-D page of the best try: {page}"] if is_shown else []
+    return Result(status, [verdict, *notes(run.remarks), *lines, place, *shown], {**record, **about})
 
 
 def speed_limits(speed: str | None, tcp_speed: float | None) -> dict[str, float]:

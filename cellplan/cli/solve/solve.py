@@ -111,7 +111,7 @@ def _with_page(error: "BlockedTransferError", folder: Path) -> "BlockedTransferE
 
     page = folder.with_name(f"{folder.name}-{error.name or 'transfer'}.html")
     shown = f"; 3-D page of the best try: {page}" if write_view_of_blocked(error, page) else ""
-    return type(error)(error.place, f"{error.what}{shown}", name=error.name)
+    return type(error)(error.place, f"{error.what}{shown}", error.best, name=error.name)
 
 
 def _result(options: SolveOptions, changed: "Cell", solution: "Solution", record: "Record", folder: Path) -> Result:

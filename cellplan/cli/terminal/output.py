@@ -109,7 +109,8 @@ def json_failure(schema: str, *, desired: bool) -> Iterator[None]:
     except (Exception, KeyboardInterrupt) as error:
         if desired and not hasattr(error, "exit_code"):  # typer ends commands by exceptions with an exit code
             lines = error_lines(error)
-            say_json({"schema": schema, "status": "error", "exit": int(exit_status(error)), "errors": lines})
+            record = {"schema": schema, "status": "error", "exit": int(exit_status(error)), "errors": lines}
+            say_json({**record, **getattr(error, "details", {})})
         raise
 
 

@@ -15,6 +15,7 @@ from cellplan.jobs.recover.state import RunPlaces, StoppedState
 from cellplan.model.progress import Progress
 from cellplan.planning.recovery.retract import find_retract
 from cellplan.planning.recovery.rows_path import RowsPath, retract_rows, timed_rows
+from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.planning.transfer.plan import plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
 from cellplan.runs.plan.retiming import transfer_retimer
@@ -35,6 +36,7 @@ class RecoveryPlanner:
         self._fixed = {*state.standing, *(held if set(held) & set(state.standing) and self._group else ())}
         self._off_start: Array | None = None
         self.refused: list[str] = []  # why ways were not taken, in the order of trying
+        self.blocked: BlockedTransferError | None = None  # the first transfer move that was not found
 
     def phases(self) -> tuple[RecoveryPhase, ...]:
         """The first way that is found: straight off and home; else back along the program, then off and home."""
@@ -43,6 +45,7 @@ class RecoveryPlanner:
             try:
                 phases = (*back, *self._off_and_home(q))
             except TransferNotFoundError as error:
+                self.blocked = self.blocked or (error if isinstance(error, BlockedTransferError) else None)
                 where = f"from {back[-1].words.split(' to ')[-1]}: " if back else ""
                 self.refused.append(f"{where}{error}")
                 if not self._is_at_start(q):

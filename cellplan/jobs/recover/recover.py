@@ -16,6 +16,7 @@ from cellplan.model.progress import Progress, silent
 from cellplan.model.report.verified_run import VerifiedRun
 from cellplan.model.settings.program import TransferEntry
 from cellplan.planning.timing.schedule import TIME_DECIMALS
+from cellplan.planning.transfer.best_try import BlockedTransferError
 from cellplan.report.record.sections.rests_on import zero_text
 
 
@@ -31,6 +32,7 @@ class Recovery:
         judgement: What was found on these tables; None where no recovery was found.
         reason: Why none was found; empty otherwise.
         tried: What was tried before the way that was taken, and why it was not.
+        blocked: The first transfer move that was not found, where no recovery was.
     """
 
     cell: Cell
@@ -40,6 +42,7 @@ class Recovery:
     judgement: RecoveryJudgement | None
     reason: str
     tried: tuple[str, ...]
+    blocked: BlockedTransferError | None = None
 
     @property
     def succeeded(self) -> bool:
@@ -94,7 +97,14 @@ def recover(
         phases = planner.phases()
     except TransferNotFoundError as error:
         return Recovery(
-            cell=places.cell, run=run.digest, state=state, tables={}, judgement=None, reason=str(error), tried=()
+            cell=places.cell,
+            run=run.digest,
+            state=state,
+            tables={},
+            judgement=None,
+            reason=str(error),
+            tried=(),
+            blocked=planner.blocked,
         )
     tables = _tables(places.cell, phases, state, run=run.digest)
     progress("verifying the recovery", 0.0)

@@ -43,7 +43,8 @@ def recovery_record(recovery: Recovery) -> dict[str, Any]:
         "limits": recovery.cell.program.transfer.model_dump(),
     }
     if recovery.judgement is None:
-        return record | {"reason": recovery.reason, "files": {}, "caution": CAUTION}
+        blocked = {"blocked": None} if recovery.blocked is None else recovery.blocked.details
+        return record | {"reason": recovery.reason, **blocked, "files": {}, "caution": CAUTION}
     judgement = recovery.judgement
     record["duration_s"] = recovery.duration
     record["phases"] = [_phase(phase) for phase in judgement.phases]

@@ -8,7 +8,7 @@ else straight.
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.arrays import Array
 from cellplan.model.units import MM
+from cellplan.planning.path.formatting import in_mm
+from cellplan.scene.collision.distance import nearest_points, point_above
 from cellplan.scene.collision.overlap.depth import ground_depth, overlap_depth
 from cellplan.scene.pairs import ScenePair
 from cellplan.scene.scene import Scene
@@ -42,7 +44,19 @@ class BlockedTry:
     bodies: tuple[str, str]  # names of the pair
     missing: float  # by how much the pair falls short of its demand in [m], its depth included
     row: int  # row of the try at which it does
-    words: str  # the pair and the amount
+    words: str  # the pair, the amount and the place
+    place: Array | None = None  # where that is in the world in [m], shape (3,); None where nothing is in the way
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The same as data in mm, for scripts."""
+        return {
+            "pair": list(self.bodies),
+            "missing_mm": self.missing * MM,
+            "place_mm": None if self.place is None else (self.place * MM).tolist(),
+            "share_of_try": self.row / (len(self.tried.q) - 1),
+            "try": self.tried.words,
+        }
 
 
 class BlockedTransferError(TransferNotFoundError):
@@ -61,6 +75,11 @@ class BlockedTransferError(TransferNotFoundError):
     def __reduce__(self) -> tuple[type["BlockedTransferError"], tuple[str, str]]:
         """Cross to another process as words."""
         return BlockedTransferError, (self.place, self.what)
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """What a script reads of it beside its words."""
+        return {"blocked": None if self.best is None else {"phase": self.name or None, **self.best.record}}
 
     def of_phase(self, name: str, between: str) -> "BlockedTransferError":
         """The same with the name of the phase, and between what it is."""
@@ -84,8 +103,11 @@ def blocked_try(scene: Scene, tried: Try) -> BlockedTry:
     held = f"is {depth * MM:.3g} mm deep in" if is_deep else f"is {pair.proved * MM:.3g} mm from"
     held = "touches" if pair.touches and not is_deep else held
     demand = f", {pair.demand * MM:g} mm are demanded" if pair.keeps_clearance else ""
-    words = f"'{first}' {held} '{second}'{demand}"
-    return BlockedTry(scene=scene, tried=tried, bodies=(first, second), missing=missing, row=row, words=words)
+    place = _place(scene, pair.pair, tried.q[[row]])
+    share = f" at {100.0 * row / (len(tried.q) - 1):.0f} % of the try" if np.any(tried.q != tried.q[0]) else ""
+    words = f"'{first}' {held} '{second}' near {in_mm(np.round(place, 3))}{share}{demand}"
+    bodies = first, second
+    return BlockedTry(scene=scene, tried=tried, bodies=bodies, missing=missing, row=row, words=words, place=place)
 
 
 def _shortfall(bound: Bound, pair: PairBound) -> tuple[float, float, int, PairBound]:
@@ -100,6 +122,21 @@ def _shortfall(bound: Bound, pair: PairBound) -> tuple[float, float, int, PairBo
     near = np.array([np.interp(at, np.arange(last + 1), column) for column in bound.q.T]).T
     depth = float(_depths(bound.scene, pair.pair, near).max())
     return pair.demand + depth, depth, deepest, pair
+
+
+def _place(scene: Scene, pair: ScenePair, q: Array) -> Array:
+    """Where a pair is nearest at one configuration of shape (1, nq), in the world in [m], shape (3,).
+
+    Of bodies that touch it is the middle of the smaller one.
+    """
+    if pair.solids is None:
+        poses = scene.pair_poses((pair.first, pair.first), q)
+        return point_above(scene.engine, pair.first, poses, X_WS=scene.bodies[pair.second].X_BS, sample=0).first
+    poses, (first, second) = scene.pair_poses(pair.solids, q), pair.solids
+    nearest = nearest_points(scene.engine, pair.solids, poses, sample=0)
+    if nearest.distance > 0.0:
+        return 0.5 * (nearest.first + nearest.second)
+    return nearest.first if scene.engine.radii[first] <= scene.engine.radii[second] else nearest.second
 
 
 def _depths(scene: Scene, pair: ScenePair, q: Array) -> Array:

@@ -66,7 +66,8 @@ def blocked_error(
     return BlockedTransferError(
         query.place,
         f"found no transfer move of {query.named}: at the best try ({best.tried.words}) {best.words}; tried were: "
-        f"{'; '.join(words)}{most}: give another home or start, move what is in the way, or lower the clearance",
+        f"{'; '.join(words)}{most}: state via points of the task, give another home or start, move what is in the "
+        "way, or lower the clearance",
         best,
     )
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -196,11 +197,12 @@ def test_a_wall_without_a_gap_is_refused_with_what_was_tried(monkeypatch: pytest
 
     assert str(refused.value) == (
         "<cell>: robots.a: found no transfer move of 'a': at the best try ('a', straight over the gap between its "
-        "trees) 'a/disc' is 124 mm deep in 'wall', 5 mm are demanded; tried were: straight, 'a/disc' touches 'wall', "
+        "trees) 'a/disc' is 124 mm deep in 'wall' near (12, 137, 0) mm at 54 % of the try, 5 mm are "
+        "demanded; tried were: straight, 'a/disc' touches 'wall', "
         "5 mm are demanded; by "
         "trees in its joint space, 200 configurations drawn (41 reached from the start of 'a' and 36 from its goal); "
-        "most often 'a/disc' too close to 'wall' (201 times): give another home or start, move what is in the way, or "
-        "lower the clearance"
+        "most often 'a/disc' too close to 'wall' (201 times): state via points of the task, give another home or "
+        "start, move what is in the way, or lower the clearance"
     )
 
 
@@ -213,10 +215,12 @@ def test_discs_that_cannot_pass_each_other_are_refused(monkeypatch: pytest.Monke
         transfer(scene, [-0.5, 0.0, 0.5, 0.0], [0.5, 0.0, -0.5, 0.0])
 
     words = str(refused.value)
-    assert words.startswith(
-        "<cell>: robots: found no transfer move of 'a', 'b': at the best try (all at once, straight) 'a/disc' is 50 mm "
-        "deep in 'b/disc', 5 mm are demanded; tried were: straight, 'a/disc' touches 'b/disc', 5 mm are demanded; one "
-        "robot after the other, in 2 orders; all at once in joint space and time, in 4 orders "
+    assert re.match(
+        r"<cell>: robots: found no transfer move of 'a', 'b': at the best try \(all at once, straight\) 'a/disc' is "
+        r"50 mm deep in 'b/disc' near \(.*, 0, 0\) mm at \d+ % of the try, 5 mm are demanded; tried were: straight, "
+        "'a/disc' touches 'b/disc', 5 mm are demanded; one robot after the other, in 2 orders; all at once "
+        "in joint space and time, in 4 orders ",
+        words,
     )
     assert "'a/disc' too close to 'b/disc'" in words
 
@@ -231,6 +235,9 @@ def test_a_pair_in_the_way_is_as_deep_as_the_closed_form_says(x: float) -> None:
 
     assert blocked.missing == pytest.approx(RADIUS + 0.025 + CLEARANCE, abs=2e-3)  # 25 samples about the deepest row
     assert blocked.bodies == ("a/disc", "wall")
+    assert blocked.place == pytest.approx([x, 0.0, 0.0], abs=1.8 / 39)  # the middle of the disc, within a row
+    assert blocked.record["share_of_try"] == pytest.approx(0.5 + x / 1.8, abs=1.0 / 39)
+    assert blocked.record["pair"] == ["a/disc", "wall"]
 
 
 def test_the_try_that_misses_least_is_the_best() -> None:
@@ -242,5 +249,7 @@ def test_the_try_that_misses_least_is_the_best() -> None:
     blocked = best_try(scene, [through, near_miss])
 
     assert blocked.tried is near_miss
-    assert blocked.words == "'a/disc' is 3 mm from 'wall', 5 mm are demanded"
+    assert blocked.words.startswith("'a/disc' is 3 mm from 'wall' near (")
+    assert blocked.words.endswith(") mm at 53 % of the try, 5 mm are demanded")
+    assert blocked.place[:2] == pytest.approx([0.025, 0.2015], abs=2e-3)  # half way between disc and corner of the wall
     assert blocked.missing == pytest.approx(0.002, abs=1e-4)

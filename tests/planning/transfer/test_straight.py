@@ -11,6 +11,7 @@ from cellplan.certify.certify import certify
 from cellplan.errors import TransferNotFoundError
 from cellplan.geometry.shapes import Cylinder, Sphere
 from cellplan.geometry.transforms import Array, pose
+from cellplan.planning.path.formatting import in_mm
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.plan import PlannedTransfer, Rung, plan_transfer
 from cellplan.planning.transfer.query import TransferQuery
@@ -157,10 +158,12 @@ def test_an_end_that_is_too_close_is_refused_with_the_pair_and_the_distance() ->
     at = pose(tuple(tip[:3, 3] + 0.103 * tip[:3, 2]))  # 3 mm before the face of the tool
     near = scene_of(arm("kuka", "kuka_kr6"), things=(replace(ball, X_WS=at),))
 
+    between = tip[:3, 3] + 0.0015 * tip[:3, 2]
     with pytest.raises(TransferNotFoundError) as refused:
         plan_transfer(TransferQuery.of(near, HOME, AWAY, seed=0), retimer=transfer_retimer(near))
 
     assert str(refused.value).endswith(
-        "robots.kuka: the goal of the transfer move of 'kuka' comes too close: 'kuka/tool' is 3 mm from 'ball', "
-        "5 mm are demanded: let approach and retract leave more room, or move one of the two"
+        "robots.kuka: the goal of the transfer move of 'kuka' comes too close: 'kuka/tool' is 3 mm from 'ball' near "
+        f"{in_mm(np.round(between, 3))}, 5 mm are demanded: let approach and retract leave more "
+        "room, or move one of the two"
     )
