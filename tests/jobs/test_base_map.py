@@ -180,6 +180,18 @@ def test_a_place_of_a_program_passes_where_it_does_for_each_of_its_tasks_alone(t
     assert failing == {"circle", "ring"}  # the task by which a place fails is named
 
 
+def test_no_place_is_too_fast_for_a_program_that_is_as_fast_as_its_limits_allow(two_tasks: Cell) -> None:
+    hurried = two_tasks.with_values({"motion.duration_s": 1.5, "motion.step_s": 0.004})
+    fastest = hurried.with_values({"motion.timing": "fastest"})
+
+    written, retimed = (base_map(cell, "right", WIDE)["places"] for cell in (hurried, fastest))
+
+    verdicts = [(one["verdict"], other["verdict"]) for one, other in zip(written, retimed, strict=True)]
+    assert ("speed", "passes") in verdicts
+    assert all(one == other for one, other in verdicts if one != "speed")
+    assert all(other != "speed" for _, other in verdicts)
+
+
 def test_a_place_of_a_program_is_written_with_the_start_of_every_task(two_tasks: Cell) -> None:
     places = base_map(two_tasks, "right", WIDE)
     best = places["best"][0]

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from cellplan.geometry.arrays import Array, Flags, Indices
-from cellplan.model.cell.cell import joint_at
+from cellplan.model.cell.cell import Timing, joint_at
 from cellplan.model.cell.joint_limits import acceleration_limits
 from cellplan.scene.scene import Scene
 from cellplan.search.base_map.contacts import contacts
@@ -220,7 +220,7 @@ def _known(job: MapJob, start: Array, margins: Array, speeds: Array, rates: Arra
     )
     if margins[tight] < 0.0:
         return replace(known, verdict=Verdict.LIMIT)
-    if times[fastest] > 1.0:
+    if times[fastest] > 1.0 and cell.motion.timing is Timing.AS_WRITTEN:
         return replace(known, verdict=Verdict.SPEED)
     return known
 
