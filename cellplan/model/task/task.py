@@ -299,6 +299,11 @@ class Task:
         """Time in [s] after the end of the path that the delay of the process, the dwell and a retreat take."""
         return self.off_delay + self.dwell + (self.retract.duration if self.retract else 0.0)
 
+    @property
+    def is_on_part(self) -> bool:
+        """Whether its path is given on the part."""
+        return self.relative_to is Frame.PART
+
     def time_for_path(self, clock: float | None) -> float | None:
         """Time for the whole path in [s]: its own, or the rest of the common clock; None when neither is given.
 

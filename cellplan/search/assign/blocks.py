@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from cellplan.search.assign.cliques import cliques_at
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.rule_rows import add_rule_rows
+from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
 
@@ -81,6 +81,9 @@ class _BlockModel:
         cost = sum(lead * (instance.steps(task) + least) for (task, _), lead in self.leads.items()) + self._tour(least)
         objective = self.model.new_int_var(0, HORIZON, "")
         self.model.add(objective >= cost)
+        self.begins = add_rest_rows(
+            self.model, instance, leads=self.leads, joins=self.joins, least=least, objective=objective
+        )
         self.model.minimize(objective)
 
     def schedule(self, solved: Solved, answer: int) -> BlockSchedule:
@@ -89,7 +92,10 @@ class _BlockModel:
         blocks = {leader: [leader] for leader, _ in solved.true(self.leads, answer)}
         for task, leader in solved.true(self.joins, answer):
             blocks[leader].append(task)
-        ordered = in_order(list(map(tuple, blocks.values())), self.instance.goals)
+        values = solved.answers[answer]
+        begins = {task: values[it.index] for task, it in self.begins.items()}
+        sorted_blocks = sorted(map(tuple, blocks.values()), key=lambda block: begins.get(block[0], 0))
+        ordered = in_order(sorted_blocks, self.instance.goals)
         return BlockSchedule(blocks=ordered or (), chosen=chosen)
 
     def hints(self, schedule: BlockSchedule) -> list[tuple[Any, bool]]:

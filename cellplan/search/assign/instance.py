@@ -100,12 +100,17 @@ class Instance:
 
 
 def with_rules(instance: Instance, rules: TaskRules) -> Instance:
-    """The same with rules between tasks; tasks of one robot keep the modes of robots that can do all of them."""
+    """The same with rules: robots that can do all tasks of a group, and conflicts where the part must cool."""
     modes = dict(instance.modes)
     for group in rules.same_robot:
         able = set.intersection(*({by for name, by, _ in modes if name == task} for task in group))
         modes = {key: it for key, it in modes.items() if key[0] not in group or key[1] in able}
-    return replace(instance, modes=modes, rules=rules)
+    hot = {
+        frozenset((first, second))
+        for first, second in combinations(modes, 2)
+        if (first[0], second[0]) in rules.lags and first[1] != second[1] and first[2] == second[2]
+    }
+    return replace(instance, modes=modes, rules=rules, conflicts=instance.conflicts | hot)
 
 
 def least_transfer(instance: Instance) -> int:

@@ -40,6 +40,7 @@ class SequencedBlocks:
     schedule: BlockSchedule
     stops: tuple[Stop, ...]  # one for each block
     steps: int  # from home to home
+    waits: tuple[int, ...] = ()  # steps for which all robots stand before each block, as the part must cool
 
 
 @dataclass(eq=False)
@@ -56,23 +57,26 @@ class Sequencer:
     def sequenced(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The blocks in their order with the modes and directions that take least time."""
         layers = [(None, self._at_home()), *self._layers(schedule), (None, self._at_home())]
-        cost, back = np.zeros([1] * len(self.instance.robots), dtype=np.int64), []
+        cost, back, costs = np.zeros([1] * len(self.instance.robots), dtype=np.int64), [], []
         for before, after in pairwise(layers):
             cost, came = self._step(cost, before, after)
             back.append(came)
-        stops, place = list[Stop](), tuple([0] * len(self.instance.robots))
-        for came, (station, ends) in zip(reversed(back), reversed(layers[1:]), strict=True):
+            costs.append(cost)
+        stops, place, moved = list[Stop](), tuple([0] * len(self.instance.robots)), list[int]()
+        for came, cost, (station, ends) in zip(reversed(back), reversed(costs), reversed(layers[1:]), strict=True):
+            moved.append(int(cost[place]))
             stops.append((station, tuple(choices[k] for choices, k in zip(ends, place, strict=True))))
             shape = tuple(map(len, layers[len(back) - len(stops)][1]))
             place = tuple(int(k) for k in np.unravel_index(came[place], shape))
-        work = schedule.work(self.instance)
-        return SequencedBlocks(schedule=schedule, stops=tuple(reversed(stops[1:])), steps=work + int(cost.ravel()[0]))
+        waits = waits_of(self.instance, schedule, moved[:0:-1])
+        steps = schedule.work(self.instance) + moved[0] + sum(waits)
+        return SequencedBlocks(schedule=schedule, stops=tuple(reversed(stops[1:])), steps=steps, waits=waits)
 
     def ordered(self, schedule: BlockSchedule) -> SequencedBlocks:
         """The best order found: stations in a short tour, blocks of a station relocated while that saves time."""
         best = min((self.sequenced(tour) for tour in self.tours(schedule)), key=lambda it: it.steps)
         while True:
-            trials = (self.sequenced(trial) for trial in relocations(best.schedule, self.instance.goals))
+            trials = (self.sequenced(trial) for trial in self.relocations(best.schedule))
             better = next((trial for trial in trials if trial.steps < best.steps), None)
             if better is None:
                 return best
@@ -140,6 +144,10 @@ class Sequencer:
     def _coming(self, robot: str, end: End | None) -> Array:
         return self.instance.homes[robot] if end is None else end.begin
 
+    def relocations(self, schedule: BlockSchedule) -> Iterator[BlockSchedule]:
+        """Schedules with one block at another place: of its station, or anywhere that may hide a rest of the part."""
+        return relocations(schedule, self.instance.goals, anywhere=bool(self.instance.rules.lags))
+
     def tours(self, schedule: BlockSchedule) -> list[BlockSchedule]:
         """The blocks with their stations in the shortest tours; where tasks must follow others, as soon as they may."""
         stations = list(dict.fromkeys(schedule.station_of(block) for block in schedule.blocks))
@@ -147,7 +155,7 @@ class Sequencer:
             orders = [self._nearest_first(stations)]
         else:
             orders = sorted(permutations(stations), key=lambda order: (self._length(order), order))
-        tours = list[BlockSchedule]()
+        tours = [schedule] if self.instance.rules.lags else list[BlockSchedule]()
         for order in orders:
             blocks = sorted(schedule.blocks, key=lambda block: order.index(schedule.station_of(block)))
             if (ordered := in_order(blocks, self.instance.goals)) is not None and len(tours) < TOURS:
@@ -169,12 +177,30 @@ class Sequencer:
         return tuple(order)
 
 
-def relocations(schedule: BlockSchedule, goals: Mapping[str, TaskGoal]) -> Iterator[BlockSchedule]:
-    """Schedules in which one block is at another place among those of its station."""
+def waits_of(instance: Instance, schedule: BlockSchedule, moved: Sequence[int]) -> tuple[int, ...]:
+    """Steps for which all robots stand before each block, until the part has cooled where it goes on.
+
+    Args:
+        moved: Steps of the transfers up to each block.
+    """
+    begins, waits, worked = dict[str, int](), list[int](), 0
+    for block, steps in zip(schedule.blocks, moved, strict=True):
+        begin = steps + worked + sum(waits)
+        lags = (it for it in instance.rules.lags.items() if it[0][0] in begins and it[0][1] in block)
+        waits.append(max([0, *(begins[first] + lag - begin for (first, _), lag in lags)]))
+        begins |= dict.fromkeys(block, begin + waits[-1])
+        worked += max(instance.steps(task) for task in block)
+    return tuple(waits)
+
+
+def relocations(
+    schedule: BlockSchedule, goals: Mapping[str, TaskGoal], *, anywhere: bool = False
+) -> Iterator[BlockSchedule]:
+    """Schedules in which one block is at another place, among those of its station or anywhere."""
     stations = [schedule.station_of(block) for block in schedule.blocks]
     for source, station in enumerate(stations):
         for target, other in enumerate(stations):
-            if source != target and station == other:
+            if source != target and (anywhere or station == other):
                 blocks = list(schedule.blocks)
                 blocks.insert(target, blocks.pop(source))
                 if in_order(blocks, goals) == tuple(blocks):

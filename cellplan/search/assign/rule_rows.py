@@ -34,3 +34,40 @@ def add_rule_rows(
                 both = [joins[it, leader] for it in (task, longest) if (it, leader) in joins]
                 if both:
                     model.add(both[0] == (both[1] if len(both) > 1 else 0))
+
+
+def add_rest_rows(
+    model: Any, instance: Instance, *, leads: Literals, joins: Literals, least: int, objective: Any
+) -> dict[str, Any]:
+    """Blocks follow one another, later where the part must cool, and the cycle lasts to the end of the last one.
+
+    Args:
+        least: Steps that every transfer between two blocks takes at least.
+        objective: Steps of the cycle.
+
+    Returns:
+        The begin of the block of each task, less a transfer; none where nothing must cool.
+    """
+    lags, tasks = instance.rules.lags, instance.tasks
+    if not lags:
+        return {}
+    horizon = sum(instance.steps(task) + least for task in tasks) + sum(lags.values())
+    begins = {task: model.new_int_var(0, horizon, "") for task in tasks}
+    sizes = {task: instance.steps(task) + least for task in tasks}
+    model.add_no_overlap(
+        [
+            model.new_optional_fixed_size_interval_var(begins[task], sizes[task], lead, "")
+            for (task, _), lead in leads.items()
+        ]
+    )
+    for (task, leader), join in joins.items():
+        model.add(begins[task] == begins[leader]).only_enforce_if(join)
+    for task in tasks:
+        model.add(objective >= begins[task] + sizes[task])
+        for first in (it for it in instance.goals[task].after if it in begins):
+            model.add(begins[task] >= begins[first] + sizes[first])
+    for first, later in (pair for pair in lags if pair[0] < pair[1] and begins.keys() >= {*pair}):
+        comes_first = model.new_bool_var("")
+        model.add(begins[later] >= begins[first] + lags[first, later]).only_enforce_if(comes_first)
+        model.add(begins[first] >= begins[later] + lags[later, first]).only_enforce_if(comes_first.negated())
+    return begins

@@ -1,13 +1,20 @@
 """Rules of a program between its tasks, as an assignment keeps them."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations, product
-from typing import Self
+from typing import Final, Self
 
+import numpy as np
+
+from cellplan.measures.near_paths import POINTS, resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.settings.program import groups_of
+from cellplan.planning.path.build import build_toolpath
+from cellplan.planning.timing.schedule import clock_paths
 from cellplan.search.assign.table import Key
+
+ROUNDING: Final = 1e-9  # [steps] of a time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,6 +23,8 @@ class TaskRules:
 
     same_robot: tuple[tuple[str, ...], ...] = ()  # groups of which one robot does all tasks
     together: tuple[tuple[str, ...], ...] = ()  # groups that are done in one block
+    lags: Mapping[tuple[str, str], int] = field(default_factory=dict)  # steps from the begin of the block of the first
+    # to that of the second at least, where it comes later; such tasks share a block only where they are together
     where: str = "program"  # where they stand
 
     @classmethod
@@ -24,6 +33,7 @@ class TaskRules:
         return cls(
             same_robot=groups_of(cell.program.same_robot),
             together=groups_of(cell.program.together),
+            lags=_lags(cell),
             where=cell.origin.at("program"),
         )
 
@@ -62,6 +72,28 @@ class TaskRules:
         return all(len({chosen[task][0] for task in group}) == 1 for group in self.same_robot) and all(
             len({block_of[task] for task in group}) == 1 for group in self.together
         )
+
+
+def _lags(cell: Cell) -> dict[tuple[str, str], int]:
+    """Steps between the begins of blocks that let the part cool in between."""
+    program = cell.program
+    if program.rest_s is None:
+        return {}
+    toolpaths = {task.name: build_toolpath(task, cell.part) for task in cell.tasks if task.is_on_part}
+    clocked = clock_paths(cell, toolpaths.values())
+    paths = {name: toolpath.spread(POINTS)[:, :3, 3] for name, toolpath in toolpaths.items()}
+    lags = {}
+    for pair in resting_pairs(paths, program.apart):
+        if not any({*pair} <= {*group} for group in groups_of(program.together)):
+            for first, later in (pair, pair[::-1]):
+                end = clocked[first].end + cell.task(first).off_delay
+                lags[first, later] = steps_over(end + program.rest_s - cell.task(later).start, cell.motion.step)
+    return lags
+
+
+def steps_over(time: float, step: float) -> int:
+    """Whole steps that take at least a time in [s]."""
+    return int(np.ceil(time / step - ROUNDING))
 
 
 def tasks_before(cell: Cell) -> dict[str, tuple[str, ...]]:

@@ -15,7 +15,7 @@ from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line, straight_steps
 from cellplan.scene.scene import Scene
-from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop, relocations
+from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
 from cellplan.search.assign.schedule import BlockSchedule
 
 MOST_SETTLED: Final = 200  # choices of modes until no transfer of the best one is newly refused
@@ -60,7 +60,7 @@ class TransferCertifier:
             better = next(
                 (
                     settled
-                    for trial in relocations(best.schedule, sequencer.instance.goals)
+                    for trial in sequencer.relocations(best.schedule)
                     if sequencer.sequenced(trial).steps < best.steps
                     and (settled := self.settle(sequencer, trial)).steps < best.steps
                 ),

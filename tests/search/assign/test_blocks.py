@@ -11,7 +11,7 @@ from cellplan.search.assign.blocks import solve_blocks
 from cellplan.search.assign.cliques import cliques_at, excludes
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import Instance
-from cellplan.search.assign.order import Sequencer
+from cellplan.search.assign.order import Sequencer, waits_of
 from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.schedule import BlockSchedule, in_order, refuse_impossible
 
@@ -46,7 +46,14 @@ def model_cycle(instance: Instance, schedule: BlockSchedule) -> int:
         places = [None, *order]
         steps = sum(max(instance.station_steps(a, b) - LEAST, 0) for a, b in pairwise(places))
         tours.append(steps + instance.station_steps(places[-1], None))
-    return schedule.work(instance) + LEAST * len(schedule.blocks) + min(tours)
+    cost = schedule.work(instance) + LEAST * len(schedule.blocks) + min(tours)
+    if not instance.rules.lags:
+        return cost
+    orders = (BlockSchedule(blocks=it, chosen=schedule.chosen) for it in permutations(schedule.blocks))
+    allowed = [it for it in orders if in_order(it.blocks, instance.goals) == it.blocks]
+    moved = [LEAST * (place + 1) for place in range(len(schedule.blocks))]
+    waits = min(sum(waits_of(instance, it, moved)) for it in allowed)
+    return max(cost, schedule.work(instance) + moved[-1] + waits)
 
 
 def best_by_enumeration(instance: Instance) -> int | None:
@@ -76,7 +83,15 @@ def test_the_model_is_as_good_as_enumeration(seed: int, chained: bool) -> None:
     assert answer.bound == model_cycle(instance, answer.schedule) == best_by_enumeration(instance)
 
 
+def lags(*pairs: tuple[str, str], steps: int) -> dict[tuple[str, str], int]:
+    """Rests of the part, longer in one direction."""
+    return {(a, b): steps + 7 * (a > b) for pair in pairs for a, b in (pair, pair[::-1])}
+
+
 RULES = {
+    "rest": TaskRules(lags=lags(("t0", "t1"), steps=110)),
+    "rests of all": TaskRules(lags=lags(("t0", "t1"), ("t1", "t2"), ("t2", "t3"), ("t0", "t3"), steps=90)),
+    "rest and together": TaskRules(lags=lags(("t0", "t1"), steps=140), together=(("t1", "t3"),)),
     "same robot": TaskRules(same_robot=(("t0", "t1", "t3"),)),
     "together": TaskRules(together=(("t1", "t3"),)),
     "both": TaskRules(same_robot=(("t0", "t3"),), together=(("t2", "t3"),)),
@@ -150,10 +165,11 @@ def test_two_of_a_clique_are_never_at_work_together(seed: int) -> None:
             assert len(clique) > 1
 
 
+@pytest.mark.parametrize("rules", [TaskRules(), RULES["rests of all"]], ids=["free", "rests"])
 @pytest.mark.parametrize("seed", range(3))
-def test_the_bound_is_below_every_sequence_of_blocks(seed: int) -> None:
+def test_the_bound_is_below_every_sequence_of_blocks(seed: int, rules: TaskRules) -> None:
     pytest.importorskip("ortools")
-    instance = small_instance(seed, 6, modes=2)
+    instance = small_instance(seed, 6, modes=2, rules=rules)
     sequencer = Sequencer(instance)
 
     answer = solve_blocks(instance, least=0, effort=5.0)

@@ -11,6 +11,7 @@ from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.greedy import greedy_schedule
 from cellplan.search.assign.instance import End, Instance, least_transfer
 from cellplan.search.assign.order import Refusal, Sequencer, relocations
+from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.schedule import BlockSchedule, in_order
 
 
@@ -101,3 +102,27 @@ def test_no_transfer_is_shorter_than_the_least_one(seed: int) -> None:
         moves = [int(instance.transfer_steps(robot, at[robot], goal)) for robot, goal in goals.items()]
         assert max([*moves, instance.station_steps(first, station)]) >= least
         at = {robot: goals[robot] if end is None else end.end for robot, end in zip("ab", ends, strict=True)}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_between_blocks_the_part_has_cooled_and_no_order_found_is_longer_than_as_it_was(seed: int) -> None:
+    """Begins of blocks from the moves and waits of a sequence, against each rest between its tasks."""
+    rests = {("t0", "t1"): 150, ("t1", "t0"): 160, ("t2", "t3"): 120, ("t3", "t2"): 120}
+    instance = small_instance(seed, 6, rules=TaskRules(lags=rests))
+    schedule, sequencer = greedy_schedule(instance), Sequencer(instance)
+
+    sequenced = sequencer.sequenced(schedule)
+
+    free = Sequencer(small_instance(seed, 6)).sequenced(schedule)
+    assert sequenced.steps == free.steps + sum(sequenced.waits)
+    assert sequencer.ordered(schedule).steps <= sequenced.steps
+    begins, worked = dict[str, int](), 0
+    for block, wait in zip(schedule.blocks, sequenced.waits, strict=True):
+        worked += wait
+        begins |= dict.fromkeys(block, worked)  # without the moves, which add to each rest
+        worked += max(instance.steps(task) for task in block)
+    moves = sequenced.steps - schedule.work(instance) - sum(sequenced.waits)
+    for (first, later), lag in rests.items():
+        if begins[later] > begins[first]:
+            assert begins[later] - begins[first] + moves >= lag
+    assert any(sequenced.waits) or sequencer.ordered(schedule).steps == sequenced.steps

@@ -80,6 +80,10 @@ def changes(program: str, *, order: str = "", second: str = "", third: str = "")
                 "'ring with third' before 'second' before 'ring with third'"
             ],
         ),
+        (
+            {"program": "{apart_mm: 30}"},
+            ["program.apart_mm: unexpected key without rest_s, the rest between tasks that are nearer"],
+        ),
         ({"program": "{tacks_first: true}"}, ["program.tacks_first: expected tasks with tack: true, got none"]),
         (
             {"program": "{order: {alternate: [[ring]]}}"},
