@@ -29,8 +29,8 @@ from cellplan.search.assign.clearance import AssignmentClearance
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
 from cellplan.search.assign.instance import End, Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.order import SequencedBlocks, Sequencer
-from cellplan.search.assign.rules import TaskRules, steps_over, tasks_before
+from cellplan.search.assign.order import SequencedBlocks, Sequencer, order_values
+from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.stations import choose_stations
@@ -303,22 +303,13 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
 def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
     """The program of a schedule, read from the draft's document with the chosen values."""
     values: dict[str, object] = {}
-    orders: dict[str, list[str]] = {}
     before: tuple[str, ...] = ()
-    marks, at_work = list[dict[str, object]](), dict.fromkeys(by for by, _ in sequenced.schedule.chosen.values())
-    for number, (block, wait) in enumerate(zip(sequenced.schedule.blocks, sequenced.waits, strict=True), start=1):
-        station, ends = sequenced.stops[number - 1]
-        if wait:
-            marks.append({"name": f"rest-{number}", "dwell_s": round(wait * instance.step, 9)})
-            for robot in at_work:
-                orders.setdefault(robot, []).append(f"rest-{number}")
+    for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
         for robot, end in zip(instance.robots, ends, strict=True):
             if end is not None:
                 values |= _task_values(draft.cell, robot, end, before, _holder(instance, station))
-                orders.setdefault(robot, []).append(end.mode.task)
         before = block
-    values |= {"program.marks": marks} if marks else {}
-    return draft.cell.with_values(values | {f"robots.{robot}.order": tasks for robot, tasks in orders.items()})
+    return draft.cell.with_values(values | order_values(sequenced, instance.step))
 
 
 def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None:
@@ -374,8 +365,9 @@ def _solved(cell: Cell, progress: Progress) -> Solution | str:
 
 def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Solution | str) -> Instance:
     """The instance without the choices of blocks that failed; where the part cooled too shortly, with longer rests."""
-    if not isinstance(solution, str) and (lags := longer_lags(instance, solution)):
-        return replace(instance, rules=replace(instance.rules, lags=lags))
+    checks = () if isinstance(solution, str) else [check for run in solution.runs for check in run.report.checks]
+    if (rules := instance.rules.with_longer_rests(checks, instance.step)) != instance.rules:
+        return replace(instance, rules=rules)
     failed = set(range(len(sequenced.stops)))
     if not isinstance(solution, str):
         works = [run for run in solution.runs if run.schedule.tasks]
@@ -395,16 +387,6 @@ def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Sol
             elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):
                 del modes[keys[0]]
     return replace(instance, modes=modes, conflicts=frozenset(conflicts))
-
-
-def longer_lags(instance: Instance, solution: Solution) -> dict[tuple[str, str], int]:
-    """Steps between blocks with what rests of a program fell short of; none where each was long enough."""
-    checks = [check for run in solution.runs for check in run.report.checks if check.name == "rest"]
-    lags = dict(instance.rules.lags)
-    for check in (it for it in checks if not it.passed):
-        first, later = check.subject.split(", ")
-        lags[first, later] += steps_over(check.limit - check.value, instance.step)
-    return {} if lags == instance.rules.lags else lags
 
 
 def _passed(run: Run) -> bool:

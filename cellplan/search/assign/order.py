@@ -43,6 +43,26 @@ class SequencedBlocks:
     waits: tuple[int, ...] = ()  # steps for which all robots stand before each block, as the part must cool
 
 
+def order_values(sequenced: SequencedBlocks, step: float) -> dict[str, object]:
+    """Orders of the robots, and the marks at which all of them stand while the part cools, by address in a cell file.
+
+    Args:
+        step: Time between two rows in [s].
+    """
+    chosen = sequenced.schedule.chosen
+    orders: dict[str, list[str]] = {robot: [] for robot, _ in chosen.values()}
+    marks = list[dict[str, object]]()
+    for number, (block, wait) in enumerate(zip(sequenced.schedule.blocks, sequenced.waits, strict=True), start=1):
+        if wait:
+            marks.append({"name": f"rest-{number}", "dwell_s": round(wait * step, 9)})
+            for order in orders.values():
+                order.append(f"rest-{number}")
+        for task in block:
+            orders[chosen[task][0]].append(task)
+    values: dict[str, object] = {f"robots.{robot}.order": order for robot, order in orders.items()}
+    return values | ({"program.marks": marks} if marks else {})
+
+
 @dataclass(eq=False)
 class Sequencer:
     """Times of blocks in an order.

@@ -1,7 +1,7 @@
 """Rules of a program between its tasks, as an assignment keeps them."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 from typing import Final, Self
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from cellplan.measures.near_paths import POINTS, resting_pairs
 from cellplan.model.cell.cell import Cell
+from cellplan.model.report.report import Check
 from cellplan.model.settings.program import groups_of
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
@@ -36,6 +37,11 @@ class TaskRules:
             lags=_lags(cell),
             where=cell.origin.at("program"),
         )
+
+    def with_longer_rests(self, checks: Iterable[Check], step: float) -> Self:
+        """The rules with rests that are longer by what those of a program, by its checks, fell short of; step in [s]."""
+        short = max((it.limit - it.value for it in checks if it.name == "rest" and not it.passed), default=0.0)
+        return replace(self, lags={pair: lag + steps_over(short, step) for pair, lag in self.lags.items()})
 
     @property
     def grouped(self) -> int:
