@@ -39,7 +39,7 @@ class TaskRules:
         )
 
     def with_longer_rests(self, checks: Iterable[Check], step: float) -> Self:
-        """The rules with rests that are longer by what those of a program, by its checks, fell short of; step in [s]."""
+        """The rules with rests that are longer by what those of a program fell short of, by its checks; step in [s]."""
         short = max((it.limit - it.value for it in checks if it.name == "rest" and not it.passed), default=0.0)
         return replace(self, lags={pair: lag + steps_over(short, step) for pair, lag in self.lags.items()})
 
