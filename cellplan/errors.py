@@ -1,6 +1,6 @@
 """All errors as one hierarchy; each class has the exit status with which it ends the program."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import IntEnum
 
 
@@ -19,6 +19,11 @@ class CellplanError(Exception):
     """Base class of all errors; the message is one line: where, what, the value found and the values allowed."""
 
     status = ExitStatus.INTERNAL
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        """What a script reads of it beside its message."""
+        return {}
 
 
 class InputError(CellplanError):

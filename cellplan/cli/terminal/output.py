@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from cellplan.cli.terminal.errors import OutputError, error_lines, exit_status
-from cellplan.errors import ExitStatus
+from cellplan.errors import CellplanError, ExitStatus
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -110,7 +110,7 @@ def json_failure(schema: str, *, desired: bool) -> Iterator[None]:
         if desired and not hasattr(error, "exit_code"):  # typer ends commands by exceptions with an exit code
             lines = error_lines(error)
             record = {"schema": schema, "status": "error", "exit": int(exit_status(error)), "errors": lines}
-            say_json({**record, **getattr(error, "details", {})})
+            say_json({**record, **(error.details if isinstance(error, CellplanError) else {})})
         raise
 
 

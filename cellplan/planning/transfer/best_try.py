@@ -5,7 +5,7 @@ that was found for it, else along both trees with a straight line from the one t
 else straight.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final
@@ -77,7 +77,7 @@ class BlockedTransferError(TransferNotFoundError):
         return BlockedTransferError, (self.place, self.what)
 
     @property
-    def details(self) -> dict[str, Any]:
+    def details(self) -> Mapping[str, object]:
         """What a script reads of it beside its words."""
         return {"blocked": None if self.best is None else {"phase": self.name or None, **self.best.record}}
 
