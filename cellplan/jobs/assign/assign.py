@@ -5,31 +5,30 @@ modes, and the transfers are certified; the program is then solved as any other.
 again.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Final
-
-import numpy as np
+from typing import Final
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
-from cellplan.files.cell.write import in_file_units
-from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.model.cell.cell import Cell
+from cellplan.jobs.assign.written import written_cell, written_points
+from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
-from cellplan.model.robot.robot import RobotModel, start_keys
-from cellplan.runs.plan.retiming import transfer_retimer
+from cellplan.runs.plan.retiming import joint_bounds, transfer_retimer
 from cellplan.runs.solution import Run, Solution
 from cellplan.runs.solve import solve
 from cellplan.scene.scene import Scene
 from cellplan.search.assign.blocks import BlockAnswer, solve_blocks
 from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.durations import with_stand_offs
 from cellplan.search.assign.goals import TaskGoal, task_goals
 from cellplan.search.assign.greedy import greedy_schedule, improved
-from cellplan.search.assign.instance import End, Instance, find_conflicts, least_transfer, with_rules
-from cellplan.search.assign.order import SequencedBlocks, Sequencer, order_values
+from cellplan.search.assign.instance import Instance, find_conflicts, least_transfer, with_rules
+from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
@@ -119,7 +118,7 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
     counts = search.counts
     for number in range(1, ROUNDS + 1):
         progress("blocks", (number - 1) / ROUNDS)
-        planned = search.planned(instance)
+        planned = search.planned(instance, is_refined=number == 1)
         cell = written_cell(draft, instance, planned.sequenced)
         solution = _solved(cell, progress)
         if number == 1:
@@ -179,9 +178,12 @@ class _Search:
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
-        table = ModeSearch(
+        search = ModeSearch(
             cell=cell, goals=goals, stations=stations, spins=draft.spins(), tool_fits=clearance.tool_fits
-        ).table()
+        )
+        table = search.table()
+        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
+        self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)
         progress("stations", 0.0)
         rules = TaskRules.of(cell)
         used, modes = choose_stations(table, goals, clearance, most=settings.most_stations, rules=rules)
@@ -189,6 +191,9 @@ class _Search:
         progress("conflicts", 0.0)
         columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
         bounds = transfer_retimer(self._scene).bounds
+        if cell.motion.timing is not Timing.AS_WRITTEN:
+            limits = {name: joint_bounds(cell).of(at) for name, at in columns.items()}
+            goals = [with_stand_offs(goal, modes, limits, cell.motion.step) for goal in goals]
         instance = Instance(
             goals={goal.name: goal for goal in goals},
             robots=draft.operators,
@@ -211,21 +216,27 @@ class _Search:
         }
         return instance
 
-    def planned(self, instance: Instance) -> _Planned:
+    def planned(self, instance: Instance, *, is_refined: bool) -> _Planned:
         """The best schedule of an instance, with certified transfers."""
-        draft, sequencer = self.draft, Sequencer(instance)
+        sequencer, least = Sequencer(instance), least_transfer(instance)
         greedy = greedy_schedule(instance)
         nearest = sequencer.sequenced(greedy).steps
         exchanged = sequencer.ordered(improved(instance, greedy)).schedule
         answer = BlockAnswer(schedule=None, bound=None, is_proved=False)
         if is_installed():
-            answer = solve_blocks(instance, least=least_transfer(instance), effort=self._effort, hint=exchanged)
-        certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
+            answer = solve_blocks(instance, least=least, effort=self._effort, hint=exchanged)
+        certifier = self._refinement.certifier
         schedules = [exchanged] if answer.schedule is None else [exchanged, answer.schedule]
         certified = sorted((certifier.best(sequencer, it) for it in schedules), key=lambda it: it.steps)
+        best, refined = certified[0], instance
+        if is_refined:
+            best, refined = self._refinement.shortened(best, sequencer)
+        bound = answer.bound
+        if bound is not None and (shorter := least_transfer(refined)) < least:
+            bound = solve_blocks(refined, least=shorter, effort=self._effort, hint=best.schedule).bound
         return _Planned(
-            sequenced=certified[0],
-            bound=answer.bound,
+            sequenced=best,
+            bound=bound,
             is_proved=answer.is_proved,
             greedy=nearest,
             others=(*certified[1:], *map(sequencer.ordered, answer.others)),
@@ -300,61 +311,6 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
         raise ImpossibleTasksError(lines)
 
 
-def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
-    """The program of a schedule, read from the draft's document with the chosen values."""
-    values: dict[str, object] = {}
-    before: tuple[str, ...] = ()
-    for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
-        for robot, end in zip(instance.robots, ends, strict=True):
-            if end is not None:
-                values |= _task_values(draft.cell, robot, end, before, _holder(instance, station))
-        before = block
-    return draft.cell.with_values(values | order_values(sequenced, instance.step))
-
-
-def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None:
-    """Holder and its configuration at a station; None for a part that is fixed."""
-    holder = instance.stations.holder
-    return None if holder is None or station is None else (holder, instance.stations.q[station])
-
-
-def _task_values(
-    cell: Cell, robot: str, end: End, before: tuple[str, ...], holder: tuple[str, Array] | None
-) -> dict[str, object]:
-    """Values of one task by address."""
-    task = cell.task(end.mode.task)
-    place = f"tasks.{task.name}"
-    values: dict[str, object] = {f"{place}.robot": robot}
-    spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
-    if end.mode.spin and not task.is_spin_free:
-        values[f"{place}.spin_deg"] = spin
-    if task.start_posture is None:
-        values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)
-    if holder is not None and task.holder_posture is None:
-        values |= _configuration(f"{place}.holder", cell.robot(holder[0]).model, holder[1])
-    if after := tuple(dict.fromkeys((*task.after, *before))):
-        values[f"{place}.after"] = after
-    points = written_points(cell, task.name)
-    if end.is_reversed and points is not None:
-        values[f"{place}.path.polyline.points_mm"] = points[::-1]
-    return values
-
-
-def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:
-    """Points of the path of a task as they stand in the file; None where it is no polyline."""
-    tasks: Any = cell.origin.document["tasks"]
-    polyline = tasks[task]["path"].get("polyline")
-    return None if polyline is None else tuple(polyline["points_mm"])
-
-
-def _configuration(address: str, model: RobotModel, q: Array) -> dict[str, object]:
-    """A configuration by address, under the key that suits the joints of the robot; the other key is left out."""
-    values = in_file_units(model, q)
-    if all(joint.is_revolute for joint in model.joints):
-        return {f"{address}_deg": values, address: None}
-    return {address: dict(zip(start_keys(model), values, strict=True)), f"{address}_deg": None}
-
-
 def _solved(cell: Cell, progress: Progress) -> Solution | str:
     """The program, solved and verified; why there is none."""
     try:
@@ -368,20 +324,28 @@ def without_failed(instance: Instance, sequenced: SequencedBlocks, solution: Sol
     checks = () if isinstance(solution, str) else [check for run in solution.runs for check in run.report.checks]
     if (rules := instance.rules.with_longer_rests(checks, instance.step)) != instance.rules:
         return replace(instance, rules=rules)
-    failed = set(range(len(sequenced.stops)))
-    if not isinstance(solution, str):
+    blocks = sequenced.schedule.blocks
+    failed = set(range(len(blocks)))
+    if isinstance(solution, str):
+        words = set(re.findall(r"[\w-]+", solution))
+        failed = {place for place, block in enumerate(blocks) if words.intersection(block)} or failed
+    else:
         works = [run for run in solution.runs if run.schedule.tasks]
         failed = {place for place, run in enumerate(works) if not _passed(run)} or failed
     modes, conflicts = dict(instance.modes), set(instance.conflicts)
     for place in failed:
-        keys = [
-            (end.mode.task, end.mode.robot, end.mode.station) for end in sequenced.stops[place][1] if end is not None
-        ]
+        chosen = {
+            (end.mode.task, end.mode.robot, end.mode.station): end.mode
+            for end in sequenced.stops[place][1]
+            if end is not None
+        }
+        keys = list(chosen)
+        if any(mode not in instance.modes[key] for key, mode in chosen.items()):
+            continue  # a finer mode: the next round has none
         if len(keys) > 1:
             conflicts |= {frozenset(pair) for pair in pairwise(keys)}
         else:
-            chosen = next(end.mode for end in sequenced.stops[place][1] if end is not None)
-            left = tuple(mode for mode in modes[keys[0]] if mode is not chosen)
+            left = tuple(mode for mode in modes[keys[0]] if mode is not chosen[keys[0]])
             if left:
                 modes[keys[0]] = left
             elif any(key[0] == keys[0][0] for key in modes if key != keys[0]):

@@ -10,11 +10,14 @@ import numpy as np
 from cellplan.errors import InputError
 from cellplan.files.cell.load import load_open_cell
 from cellplan.geometry.arrays import Array
+from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
 from cellplan.search.assign.goals import Stations
+from cellplan.search.assign.table import BranchFollower
 
+POSE_KEYS = ("x_mm", "y_mm", "z_mm", "roll_deg", "pitch_deg", "yaw_deg")  # of the part in the world
 RESTS = (Mode.SEMI_COORDINATED, Mode.PART_AT_REST)  # modes in which the part rests while tools are at work
 
 
@@ -78,6 +81,8 @@ class AssignmentDraft:
         where, is_free = self.cell.origin.at("assign.stations"), "station" in self.settings.free
         if written is None or not is_free:
             compared = self.holder_start[None]
+        elif isinstance(written, Mapping) and set(written) & set(POSE_KEYS) - set(start_keys(holder.model)):
+            compared = _at_poses(self.cell, holder, written, where)
         elif isinstance(written, Mapping):
             compared = _grid(holder, written, where)
         else:
@@ -107,7 +112,7 @@ def refuse_unless_assignable(cell: Cell) -> None:
         raise InputError(
             f"{at('program')}: missing, expected program: {{}}, as an assignment is made from home to home"
         )
-    if cell.motion.mode not in RESTS:
+    if cell.positioners and cell.motion.mode not in RESTS:
         raise InputError(
             f"{at('motion.mode')}: expected semi_coordinated or part_at_rest, got {cell.motion.mode}: in what an "
             "assignment plans the part rests while tools are at work"
@@ -149,30 +154,62 @@ def _listed(holder: Robot, configurations: Sequence[Sequence[float]], where: str
 
 def _grid(holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
     """All configurations of a grid, in [rad] or [m], shape (K, n)."""
-    keys = start_keys(holder.model)
-    for key, (first, last, step) in ranges.items():
-        if key not in keys:
-            raise InputError(f"{where}.{key}: expected a joint of '{holder.name}': {', '.join(keys)}")
-        if not step > 0.0 or last < first:
-            raise InputError(
-                f"{where}.{key}: expected [first, last, step] with a step above 0, got [{first:g}, {last:g}, {step:g}]"
-            )
-    count = np.prod([np.floor((ranges[key][1] - ranges[key][0]) / ranges[key][2] + 1e-9) + 1 for key in ranges])
-    if count > POSTURE_LIMIT:
-        raise InputError(
-            f"{where}: expected at most {POSTURE_LIMIT} configurations, got {count:.0f}: take longer steps"
-        )
-    start = _start(holder)
+    keys, start = start_keys(holder.model), _start(holder)
+    written = _spanned(ranges, keys, f"a joint of '{holder.name}'", where)
     values = []
     for column, key in enumerate(keys):
-        if key in ranges:
-            first, last, step = ranges[key]
-            written = first + step * np.arange(int(np.floor((last - first) / step + 1e-9)) + 1)
-            values.append([float(configuration_in_si(holder.model, [it] * len(keys))[column]) for it in written])
-        else:
-            values.append([float(start[column])])
+        given = [[it] * len(keys) for it in written.get(key, ())]
+        values.append([float(configuration_in_si(holder.model, it)[column]) for it in given] or [float(start[column])])
     configurations = np.array(list(product(*values)))
     inside = np.all((configurations >= holder.model.lower) & (configurations <= holder.model.upper), axis=1)
     if not inside.any():
         raise InputError(f"{where}: expected a configuration within the joint limits of '{holder.name}', got none")
     return configurations[inside]
+
+
+def _at_poses(cell: Cell, holder: Robot, ranges: Mapping[str, Sequence[float]], where: str) -> Array:
+    """Configurations that bring the part to the poses of a grid, the nearest to the start, in [rad] or [m], (K, n)."""
+    X_PT, start = cell.part.held_by[0].X_PT, _start(holder)
+    written = _spanned(ranges, POSE_KEYS, "a coordinate or an angle of the part", where)
+    X_WP = Stations.of(cell, start[None]).X_WP[0]
+    given = {key: [1e3 * float(it)] for key, it in zip(POSE_KEYS, X_WP[:3, 3], strict=False)}
+    values = product(*(written.get(key, given.get(key, [0.0])) for key in POSE_KEYS))
+    X_WP_each = np.array([pose(np.array(it[:3]) / 1e3, np.radians(it[3:])) for it in values])
+    reached = BranchFollower.of(holder).follow((X_WP_each @ X_PT)[:, None])
+    far = np.abs(reached.q[:, 0] - start).max(axis=1, initial=0.0)
+    nearest: dict[int, int] = {}
+    for index in np.argsort(far, kind="stable").tolist():
+        nearest.setdefault(int(reached.rows[index]), index)
+    if not nearest:
+        raise InputError(
+            f"{where}: expected a pose of the part to which '{holder.name}' can bring it within its joint limits, got "
+            f"none of {len(X_WP_each)}: give x_mm, y_mm and z_mm nearer to it, or other angles"
+        )
+    return reached.q[[nearest[row] for row in sorted(nearest)], 0]
+
+
+def _spanned(
+    ranges: Mapping[str, Sequence[float]], keys: Sequence[str], what: str, where: str
+) -> dict[str, list[float]]:
+    """The values that each key spans, in the units of the file.
+
+    Args:
+        keys: Keys that may be given.
+        what: What they stand for, in words.
+    """
+    spanned: dict[str, list[float]] = {}
+    for key, (first, last, step) in ranges.items():
+        if key not in keys:
+            raise InputError(f"{where}.{key}: expected {what}: {', '.join(keys)}")
+        if not step > 0.0 or last < first:
+            raise InputError(
+                f"{where}.{key}: expected [first, last, step] with a step above 0, got [{first:g}, {last:g}, {step:g}]"
+            )
+    counts = {key: np.floor((last - first) / step + 1e-9) + 1 for key, (first, last, step) in ranges.items()}
+    if (count := np.prod(list(counts.values()))) > POSTURE_LIMIT:
+        raise InputError(
+            f"{where}: expected at most {POSTURE_LIMIT} configurations, got {count:.0f}: take longer steps"
+        )
+    for key, (first, _, step) in ranges.items():
+        spanned[key] = (first + step * np.arange(int(counts[key]))).tolist()
+    return spanned

@@ -10,7 +10,10 @@ from cellplan.model.settings.units import Deg, Mm, Within
 STATION_LIMIT: Final = 40  # poses of the part in use
 POSTURE_LIMIT: Final = 1000  # that are compared
 WIDEST_CONFLICT_MM: Final = 1000.0
-STATION_WORDS: Final = "a list of configurations or a mapping of joints to [first, last, step] (tilt_deg, rail_mm)"
+STATION_WORDS: Final = (
+    "a list of configurations or a mapping of joints (tilt_deg, rail_mm) or angles of the part (yaw_deg) to "
+    "[first, last, step]"
+)
 
 StationChoice = Annotated[
     Annotated[tuple[tuple[float, ...], ...], Field(min_length=1, max_length=POSTURE_LIMIT), Tag("<list>")]
@@ -27,7 +30,10 @@ class AssignEntry(Entry):
         default=None,
         description="Poses of the part that are compared, as configurations of its first holder: a list of them, one "
         "value per joint, or a grid of its joints, [first, last, step] for each key (tilt_deg, rail_mm); a joint "
-        "without a key stays at its start. When absent those that the tasks and the start of the holder give.",
+        "without a key stays at its start. Instead of joints the grid may have the pose of the part in the world: "
+        "roll_deg, pitch_deg and yaw_deg, zero without a key, and x_mm, y_mm and z_mm, those at the start of the "
+        "holder without a key; the configuration nearest to the start is taken, poses out of reach are left out. "
+        "When absent those that the tasks and the start of the holder give.",
     )
     free: tuple[FreeWord, ...] = Field(
         default=("direction", "spin", "station"),

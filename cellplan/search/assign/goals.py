@@ -9,8 +9,9 @@ import numpy as np
 from cellplan.geometry.arrays import Array, Flags
 from cellplan.geometry.transforms import inverse
 from cellplan.measures.weld_position import torch_angles, weld_angles
-from cellplan.model.cell.cell import Cell
+from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.settings.task import TorchEntry, WeldPositionEntry
+from cellplan.model.task.clocked_path import ClockedPath, demanded_spans, fixed_rests
 from cellplan.model.task.toolpath import Toolpath
 from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
@@ -28,7 +29,7 @@ class TaskGoal:
     name: str
     robots: tuple[str, ...]  # that may do it, in the order of the cell
     X_PT: Array  # tool poses at the end of the approach's way, along the path, and after the retraction, (S + 2, 4, 4)
-    steps: int  # whole steps from the begin of the approach to the end of the retraction
+    steps: int  # whole steps from the begin of the approach to the end of the retraction; the least where it is retimed
     is_reversible: bool  # whether it may be done from its end to its begin with the same tool poses
     after: tuple[str, ...] = ()  # tasks that must be done before it begins
     torch: TorchEntry | None = None  # how its tool is held to gravity
@@ -105,7 +106,7 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
                 name=task.name,
                 robots=able,
                 X_PT=np.concatenate([ends[:1], on_path, ends[1:]]),
-                steps=int(np.ceil(clocked[task.name].over / cell.motion.step - 1e-9)),
+                steps=int(np.ceil(_seconds(cell, clocked[task.name]) / cell.motion.step - 1e-9)),
                 is_reversible=is_reversible(toolpath, on_path),
                 after=task.after,
                 torch=task.torch,
@@ -113,6 +114,17 @@ def task_goals(cell: Cell, robots: Mapping[str, Sequence[str]]) -> list[TaskGoal
             )
         )
     return goals
+
+
+def _seconds(cell: Cell, path: ClockedPath) -> float:
+    """Time of a task; of one that is retimed, what its process or its feed and its rests take at least."""
+    task = path.task
+    if cell.motion.timing is Timing.AS_WRITTEN:
+        return path.over
+    rests = sum(end - begin for begin, end in fixed_rests(task, path.corners))
+    if task.process is not None:
+        return rests + sum(end - begin for begin, end in demanded_spans(task, path.corners))
+    return rests + (0.0 if task.feed is None else task.repeat * float(path.behind[-1]) / task.feed)
 
 
 def is_reversible(toolpath: Toolpath, on_path: Array) -> bool:

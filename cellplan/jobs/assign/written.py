@@ -1,0 +1,68 @@
+"""The cell that an assignment writes: its draft with the values that were chosen."""
+
+from typing import Any
+
+import numpy as np
+
+from cellplan.files.cell.write import in_file_units
+from cellplan.geometry.arrays import Array
+from cellplan.jobs.assign.draft import AssignmentDraft
+from cellplan.model.cell.cell import Cell
+from cellplan.model.robot.robot import RobotModel, start_keys
+from cellplan.search.assign.instance import End, Instance
+from cellplan.search.assign.order import SequencedBlocks, order_values
+
+
+def written_cell(draft: AssignmentDraft, instance: Instance, sequenced: SequencedBlocks) -> Cell:
+    """The program of a schedule, read from the draft's document with the chosen values."""
+    values: dict[str, object] = {}
+    before: tuple[str, ...] = ()
+    for block, (station, ends) in zip(sequenced.schedule.blocks, sequenced.stops, strict=True):
+        for robot, end in zip(instance.robots, ends, strict=True):
+            if end is not None:
+                values |= _task_values(draft.cell, robot, end, before, _holder(instance, station))
+        before = block
+    return draft.cell.with_values(values | order_values(sequenced, instance.step))
+
+
+def _holder(instance: Instance, station: int | None) -> tuple[str, Array] | None:
+    """Holder and its configuration at a station; None for a part that is fixed."""
+    holder = instance.stations.holder
+    return None if holder is None or station is None else (holder, instance.stations.q[station])
+
+
+def _task_values(
+    cell: Cell, robot: str, end: End, before: tuple[str, ...], holder: tuple[str, Array] | None
+) -> dict[str, object]:
+    """Values of one task by address."""
+    task = cell.task(end.mode.task)
+    place = f"tasks.{task.name}"
+    values: dict[str, object] = {f"{place}.robot": robot}
+    spin = float(np.round(np.degrees(np.remainder(task.spin + end.mode.spin + np.pi, 2.0 * np.pi) - np.pi), 9))
+    if end.mode.spin and not task.is_spin_free:
+        values[f"{place}.spin_deg"] = spin
+    if task.start_posture is None:
+        values |= _configuration(f"{place}.start", cell.robot(robot).model, end.begin)
+    if holder is not None and task.holder_posture is None:
+        values |= _configuration(f"{place}.holder", cell.robot(holder[0]).model, holder[1])
+    if after := tuple(dict.fromkeys((*task.after, *before))):
+        values[f"{place}.after"] = after
+    points = written_points(cell, task.name)
+    if end.is_reversed and points is not None:
+        values[f"{place}.path.polyline.points_mm"] = points[::-1]
+    return values
+
+
+def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:
+    """Points of the path of a task as they stand in the file; None where it is no polyline."""
+    tasks: Any = cell.origin.document["tasks"]
+    polyline = tasks[task]["path"].get("polyline")
+    return None if polyline is None else tuple(polyline["points_mm"])
+
+
+def _configuration(address: str, model: RobotModel, q: Array) -> dict[str, object]:
+    """A configuration by address, under the key that suits the joints of the robot; the other key is left out."""
+    values = in_file_units(model, q)
+    if all(joint.is_revolute for joint in model.joints):
+        return {f"{address}_deg": values, address: None}
+    return {address: dict(zip(start_keys(model), values, strict=True)), f"{address}_deg": None}

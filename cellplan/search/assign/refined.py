@@ -1,0 +1,87 @@
+"""More modes of what a schedule chose, at finer turns of the tools, so that transfers get shorter."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from cellplan.search.assign.clearance import AssignmentClearance
+from cellplan.search.assign.goals import Stations
+from cellplan.search.assign.instance import Instance
+from cellplan.search.assign.order import SequencedBlocks, Sequencer
+from cellplan.search.assign.table import Key, ModeSearch, TaskMode
+from cellplan.search.assign.transfers import TransferCertifier
+
+FINER: Final = 2  # turns of the tool for one that was compared before
+CHOICES: Final = 600  # of modes and directions of all robots in a block together
+TRIES: Final = 8  # sequences of which robots meet in a block, until the first one is kept
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Refinement:
+    """Finer modes of one cell."""
+
+    search: ModeSearch  # what the modes so far were looked for among
+    clearance: AssignmentClearance
+    certifier: TransferCertifier
+
+    def shortened(self, best: SequencedBlocks, sequencer: Sequencer) -> tuple[SequencedBlocks, Instance]:
+        """The same blocks in the same order with more modes, and the instance that has them.
+
+        Args:
+            best: Blocks with certified transfers.
+            sequencer: By which they were sequenced.
+        """
+        instance = self._with_more_modes(sequencer.instance, best)
+        for _ in range(TRIES):
+            finer = Sequencer(instance, refusals=sequencer.refusals)
+            shorter = self.certifier.settle(finer, best.schedule)
+            if shorter.steps >= best.steps:
+                break
+            met = self._met(instance, shorter)
+            if not met:
+                return shorter, instance
+            instance = replace(instance, modes={**instance.modes, **met})
+        return best, instance
+
+    def _with_more_modes(self, instance: Instance, best: SequencedBlocks) -> Instance:
+        """The instance with more modes of every task that is done, free of collisions."""
+        most = max(1, int(CHOICES ** (1.0 / len(instance.robots))) // 2)
+        modes = dict(instance.modes)
+        for task, (robot, station) in best.schedule.chosen.items():
+            key = task, robot, station
+            more = list(modes[key])
+            for mode in self._finer(key):
+                is_new = all(np.abs(mode.q[0] - other.q[0]).max() > 0.0 for other in more)
+                if len(more) < most and is_new and self.clearance.is_free(mode):
+                    more.append(mode)
+            modes[key] = tuple(more)
+        return replace(instance, modes=modes)
+
+    def _finer(self, key: Key) -> list[TaskMode]:
+        """Modes of one robot for one task at one station at finer turns of the tool, largest margins first."""
+        (task, robot, station), search = key, self.search
+        goal = next(it for it in search.goals if it.name == task)
+        every = search.stations
+        count = FINER * len(search.spins) if len(search.spins) > 1 else 1
+        table = replace(
+            search,
+            goals=[replace(goal, robots=(robot,))],
+            stations=Stations(holder=every.holder, q=every.q[[station]], X_WP=every.X_WP[[station]]),
+            spins=np.linspace(0.0, 2.0 * np.pi, count, endpoint=False),
+        ).table()
+        return [replace(mode, station=station) for mode in table.modes.get((task, robot, 0), ())]
+
+    def _met(self, instance: Instance, sequenced: SequencedBlocks) -> dict[Key, tuple[TaskMode, ...]]:
+        """Modes that are left of tasks whose robots would come too near each other in a block."""
+        left: dict[Key, tuple[TaskMode, ...]] = {}
+        for _, ends in sequenced.stops:
+            modes = [end.mode for end in ends if end is not None]
+            for first, second in combinations(modes, 2):
+                if self.clearance.meet(first, second):
+                    for mode in (first, second):
+                        key = mode.task, mode.robot, mode.station
+                        others = tuple(it for it in left.get(key, instance.modes[key]) if it is not mode)
+                        left |= {key: others} if others else {}
+        return left

@@ -1,0 +1,108 @@
+"""Generated cells whose part is brought by a table, an arm or a rail, or is fixed: from open tasks to a program."""
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from cellplan.errors import InputError
+from cellplan.geometry.transforms import pose
+from cellplan.jobs.assign.assign import assign
+from cellplan.jobs.assign.draft import AssignmentDraft
+from cellplan.search.assign.schedule import refuse_impossible
+
+SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "assign.py"
+ROUNDING = 1e-6  # [m, rad] errors that configurations are searched down to
+
+
+@pytest.fixture(scope="module")
+def cells() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("assigned_cells", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def draft(folder: Path, values: dict[str, Any]) -> AssignmentDraft:
+    (folder / "cell.yaml").write_text(yaml.safe_dump(values, sort_keys=False))
+    return AssignmentDraft.load(folder / "cell.yaml")
+
+
+def test_an_arm_brings_the_part_to_the_poses_of_the_grid(tmp_path: Path, cells: ModuleType) -> None:
+    values = cells.generated_cell(8, 2, 0, "arm")
+    values["assign"]["stations"] |= {"roll_deg": [-30, 30, 30], "pitch_deg": [0, 0, 1], "yaw_deg": [0, 0, 1]}
+
+    stations = draft(tmp_path, values).stations()
+
+    grid = [pose([0.0, 0.0, 1.0], np.radians([roll, 0, 0])) for roll in (-30, 0, 30)]
+    nearest = [np.abs(X_WP - np.array(grid)).max(axis=(1, 2)) for X_WP in stations.X_WP]
+    assert len(stations.q) == len(grid)
+    assert np.max(np.min(nearest, axis=1)) < ROUNDING
+    assert sorted(np.argmin(nearest, axis=1).tolist()) == list(range(len(grid)))
+
+
+def test_a_place_without_a_key_is_the_one_at_the_start_of_the_holder(tmp_path: Path, cells: ModuleType) -> None:
+    values = cells.generated_cell(8, 2, 0, "arm")
+    values["assign"]["stations"] = {"pitch_deg": [60, 90, 30]}
+
+    stations = draft(tmp_path, values).stations()
+
+    values["assign"]["stations"] = [values["robots"]["arm"]["start_deg"]]
+    at_start = draft(tmp_path, values).stations()
+    assert len(stations.q) == 2
+    assert np.abs(stations.X_WP[:, :3, 3] - at_start.X_WP[:, :3, 3]).max() < ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("stations", "words"),
+    [
+        ({"x_mm": [9000, 9000, 1]}, "assign.stations: expected a pose of the part to which 'arm' can bring it"),
+        (
+            {"yaw_deg": [0, 90, 45], "A1_deg": [0, 1, 1]},
+            "stations.A1_deg: expected a coordinate or an angle of the part",
+        ),
+        ({"yaw_deg": [90, 0, 45]}, "stations.yaw_deg: expected [first, last, step] with a step above 0"),
+        ({"yaw_deg": [-180, 180, 1], "roll_deg": [0, 90, 1]}, "expected at most 1000 configurations, got 32851"),
+    ],
+)
+def test_poses_that_an_arm_cannot_take(
+    tmp_path: Path, cells: ModuleType, stations: dict[str, list[float]], words: str
+) -> None:
+    values = cells.generated_cell(8, 2, 0, "arm")
+    values["assign"]["stations"] = stations
+
+    with pytest.raises(InputError) as refused:
+        draft(tmp_path, values)
+
+    assert words in str(refused.value)
+
+
+def test_sixty_cells_are_generated_by_kind_and_seed(cells: ModuleType) -> None:
+    texts = {yaml.safe_dump(_cell(cells, it)) for it in cells.ALL}
+
+    assert len(texts) == 60
+    assert yaml.safe_dump(_cell(cells, cells.ALL[-1])) in texts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "text", ["8:2:0:table", "8:2:0:arm", "8:2:0:rail", "8:2:0:fixed", "12:3:1:table", "12:2:1:rail"]
+)
+def test_a_generated_cell_becomes_a_program_that_passes(tmp_path: Path, cells: ModuleType, text: str) -> None:
+    result = assign(draft(tmp_path, _cell(cells, text)), effort=1)
+
+    refuse_impossible(result.instance, result.sequenced.schedule)
+    assert result.passed
+    assert (result.bound or 0.0) <= result.cycle <= 1.03 * result.model_cycle
+
+
+def _cell(cells: ModuleType, text: str) -> dict[str, Any]:
+    seams, arms, seed, kind = text.split(":")
+    values: dict[str, Any] = cells.generated_cell(int(seams), int(arms), int(seed), kind)
+    return values
