@@ -95,7 +95,7 @@ def carriage(kind: str) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]
     if kind == "arm":
         arm = {"model": "kuka_kr16_2", "base": {"xyz_mm": [-1100, 0, 0]}, "home_deg": [0, -90, 90, 0, 0, 0]}
         held = {"held_by": [{"robot": "arm", "at": {"xyz_mm": [0, 0, -HALF_CARRIED[2]]}}]}
-        poses = {"x_mm": [0, 0, 1], "y_mm": [0, 0, 1], "z_mm": [1000, 1000, 1]}
+        poses = {"x_mm": [0, 0, 1], "y_mm": [0, 0, 1], "z_mm": [1200, 1200, 1]}
         return (
             {"arm": arm | {"start_deg": [0, -90, 90, 0, 0, 0]}},
             held,

@@ -6,7 +6,7 @@ again.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
@@ -33,7 +33,7 @@ from cellplan.search.assign.rules import TaskRules, tasks_before
 from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.stations import choose_stations
-from cellplan.search.assign.table import ModeSearch, ModeTable
+from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
 from cellplan.search.assign.transfers import TransferCertifier
 
 ROUNDS: Final = 4  # programs that are solved until one passes
@@ -191,11 +191,8 @@ class _Search:
         progress("conflicts", 0.0)
         columns = {robot.name: cell.columns(robot.name) for robot in cell.robots}
         bounds = transfer_retimer(self._scene).bounds
-        if cell.motion.timing is not Timing.AS_WRITTEN:
-            limits = {name: joint_bounds(cell).of(at) for name, at in columns.items()}
-            goals = [with_stand_offs(goal, modes, limits, cell.motion.step) for goal in goals]
         instance = Instance(
-            goals={goal.name: goal for goal in goals},
+            goals={goal.name: self._timed(goal, modes) for goal in goals},
             robots=draft.operators,
             modes=modes,
             stations=stations,
@@ -257,6 +254,14 @@ class _Search:
             least = least_transfer(others)
             schedule = solve_blocks(others, least=least, effort=EFFORT[0], hint=schedule).schedule or schedule
         return Sequencer(others).ordered(schedule).steps * others.step
+
+    def _timed(self, goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]]) -> TaskGoal:
+        """The goal with the time that it takes at least where its program is retimed."""
+        cell = self.draft.cell
+        if cell.motion.timing is Timing.AS_WRITTEN:
+            return goal
+        limits = {robot.name: joint_bounds(cell).of(cell.columns(robot.name)) for robot in cell.robots}
+        return with_stand_offs(goal, modes, limits, cell.motion.step)
 
     def _as_given(self, goal: TaskGoal) -> TaskGoal:
         """The goal with what its task states, and with what is not free: direction, spin, station and start."""

@@ -11,6 +11,8 @@ from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.goals import TaskGoal
 from cellplan.search.assign.table import Key, TaskMode
 
+ROUNDED = 2  # steps that a straight move has beyond its time at most
+
 
 def with_stand_offs(
     goal: TaskGoal, modes: Mapping[Key, Sequence[TaskMode]], bounds: Mapping[str, JointLimitsInTime], step: float
@@ -30,8 +32,8 @@ def with_stand_offs(
 
 
 def _stand_off_steps(mode: TaskMode, limits: JointLimitsInTime, step: float) -> int:
-    """Steps of both ends of a mode, each joint by itself; whole ones, and one less for each end."""
+    """Steps of both ends of a mode, each joint by itself, without those that rounding up and a limit of jerk add."""
     ends: Array = mode.q[[1, -1]] - mode.q[[0, -2]]
     alone = ends[:, :, None] * np.eye(ends.shape[1])
     one_by_one = straight_steps(np.zeros((2, *alone.shape[1:])), alone, limits, step)
-    return int(np.maximum(one_by_one.max(axis=1, initial=0) - 1, 0).sum())
+    return int(np.maximum(one_by_one.max(axis=1, initial=0) - ROUNDED, 0).sum())

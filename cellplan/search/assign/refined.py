@@ -15,6 +15,7 @@ from cellplan.search.assign.transfers import TransferCertifier
 
 FINER: Final = 2  # turns of the tool for one that was compared before
 CHOICES: Final = 600  # of modes and directions of all robots in a block together
+MOST_TRIED: Final = 60  # orders of the blocks, with these modes
 TRIES: Final = 8  # sequences of which robots meet in a block, until the first one is kept
 
 
@@ -27,7 +28,7 @@ class Refinement:
     certifier: TransferCertifier
 
     def shortened(self, best: SequencedBlocks, sequencer: Sequencer) -> tuple[SequencedBlocks, Instance]:
-        """The same blocks in the same order with more modes, and the instance that has them.
+        """The same tasks of the same robots with more modes, and the instance that has them.
 
         Args:
             best: Blocks with certified transfers.
@@ -36,7 +37,7 @@ class Refinement:
         instance = self._with_more_modes(sequencer.instance, best)
         for _ in range(TRIES):
             finer = Sequencer(instance, refusals=sequencer.refusals)
-            shorter = self.certifier.settle(finer, best.schedule)
+            shorter = self.certifier.shortened(finer, self.certifier.settle(finer, best.schedule), most=MOST_TRIED)
             if shorter.steps >= best.steps:
                 break
             met = self._met(instance, shorter)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import chain, combinations, pairwise, product
 from typing import Final
 
 import numpy as np
@@ -15,9 +15,11 @@ from cellplan.planning.transfer.query import TransferQuery
 from cellplan.planning.transfer.reasons import Tried
 from cellplan.planning.transfer.straight_time import straight_line, straight_steps
 from cellplan.scene.scene import Scene
+from cellplan.search.assign.instance import Instance
 from cellplan.search.assign.order import Refusal, SequencedBlocks, Sequencer, Stop
-from cellplan.search.assign.schedule import BlockSchedule
+from cellplan.search.assign.schedule import BlockSchedule, refuse_impossible
 
+MOST_TRIED: Final = 400  # orders of blocks, and tasks exchanged between them
 MOST_SETTLED: Final = 200  # choices of modes until no transfer of the best one is newly refused
 
 
@@ -54,21 +56,30 @@ class TransferCertifier:
         return sequencer.sequenced(schedule)
 
     def best(self, sequencer: Sequencer, schedule: BlockSchedule) -> SequencedBlocks:
-        """The best order that is found with certified transfers: of short tours, and by relocation of blocks."""
+        """The best order that is found with certified transfers: of short tours, then as ``shortened``."""
         best = min((self.settle(sequencer, tour) for tour in sequencer.tours(schedule)), key=lambda it: it.steps)
+        return self.shortened(sequencer, best, most=MOST_TRIED)
+
+    def shortened(self, sequencer: Sequencer, best: SequencedBlocks, *, most: int) -> SequencedBlocks:
+        """Blocks relocated, and tasks exchanged between them, while that shortens the transfers.
+
+        Args:
+            most: Number of orders that are tried.
+        """
+        tried, instance = 0, sequencer.instance
         while True:
-            better = next(
-                (
-                    settled
-                    for trial in sequencer.relocations(best.schedule)
-                    if sequencer.sequenced(trial).steps < best.steps
+            for trial in chain(sequencer.relocations(best.schedule), exchanges(best.schedule, instance)):
+                if tried == most:
+                    return best
+                tried += 1
+                if (
+                    sequencer.sequenced(trial).steps < best.steps
                     and (settled := self.settle(sequencer, trial)).steps < best.steps
-                ),
-                None,
-            )
-            if better is None:
+                ):
+                    best = settled
+                    break
+            else:
                 return best
-            best = better
 
     def refusals(self, sequencer: Sequencer, sequenced: SequencedBlocks) -> list[Refusal]:
         """Transfers of a sequence that are not free straight and were not known to be, with the least they may take."""
@@ -138,3 +149,28 @@ class TransferCertifier:
             if end is not None:
                 q[cell.columns(robot)] = end.end if leaves else end.begin
         return q
+
+
+def exchanges(schedule: BlockSchedule, instance: Instance) -> Iterator[BlockSchedule]:
+    """Schedules in which a robot does two of its tasks at one station in each other's block, in no longer time."""
+    work = schedule.work(instance)
+    for (i, first), (j, second) in combinations(enumerate(schedule.blocks), 2):
+        for a, b in product(first, second):
+            if schedule.chosen[a] == schedule.chosen[b]:
+                blocks = list(schedule.blocks)
+                blocks[i], blocks[j] = (
+                    tuple({old: new}.get(task, task) for task in block)
+                    for block, old, new in ((first, a, b), (second, b, a))
+                )
+                trial = replace(schedule, blocks=tuple(blocks))
+                if trial.work(instance) <= work and is_possible(instance, trial):
+                    yield trial
+
+
+def is_possible(instance: Instance, schedule: BlockSchedule) -> bool:
+    """Whether a schedule is one of an instance."""
+    try:
+        refuse_impossible(instance, schedule)
+    except ValueError:
+        return False
+    return True

@@ -40,7 +40,7 @@ def test_an_arm_brings_the_part_to_the_poses_of_the_grid(tmp_path: Path, cells: 
 
     stations = draft(tmp_path, values).stations()
 
-    grid = [pose([0.0, 0.0, 1.0], np.radians([roll, 0, 0])) for roll in (-30, 0, 30)]
+    grid = [pose([0.0, 0.0, 1.2], np.radians([roll, 0, 0])) for roll in (-30, 0, 30)]
     nearest = [np.abs(X_WP - np.array(grid)).max(axis=(1, 2)) for X_WP in stations.X_WP]
     assert len(stations.q) == len(grid)
     assert np.max(np.min(nearest, axis=1)) < ROUNDING
@@ -53,7 +53,7 @@ def test_a_place_without_a_key_is_the_one_at_the_start_of_the_holder(tmp_path: P
 
     stations = draft(tmp_path, values).stations()
 
-    values["assign"]["stations"] = [values["robots"]["arm"]["start_deg"]]
+    values["assign"]["stations"] = [list(values["robots"]["arm"]["start_deg"])]
     at_start = draft(tmp_path, values).stations()
     assert len(stations.q) == 2
     assert np.abs(stations.X_WP[:, :3, 3] - at_start.X_WP[:, :3, 3]).max() < ROUNDING
