@@ -13,7 +13,7 @@ STEP = 0.01  # [s]
 
 
 def test_each_joint_takes_at_least_its_time_from_rest_to_rest() -> None:
-    """Of 0.6 rad at 1 rad/s and 4 rad/s2: 0.6 s and 0.25 s to get going; up to two steps less at each end for rounding."""
+    """Of 0.6 rad at 1 rad/s and 4 rad/s2: 0.6 s and 0.25 s to get going; rounding takes up to two steps at each end."""
     goal = next(iter(small_instance(0, 2).goals.values()))
     limits = JointLimitsInTime(velocity=np.ones(2), acceleration=np.full(2, 4.0), jerk=np.full(2, np.inf))
     q = np.array([[0.0, 0.0], [0.6, 0.1], [0.7, 0.1], [0.7, 0.7]])
