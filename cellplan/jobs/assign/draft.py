@@ -174,8 +174,8 @@ def _at_poses(cell: Cell, holder: Robot, ranges: Mapping[str, Sequence[float]], 
     X_WP = Stations.of(cell, start[None]).X_WP[0]
     given = {key: [1e3 * float(it)] for key, it in zip(POSE_KEYS, X_WP[:3, 3], strict=False)}
     values = product(*(written.get(key, given.get(key, [0.0])) for key in POSE_KEYS))
-    X_WP_each = np.array([pose(np.array(it[:3]) / 1e3, np.radians(it[3:])) for it in values])
-    reached = BranchFollower.of(holder).follow((X_WP_each @ X_PT)[:, None])
+    X_WP_grid = np.array([pose(np.array(it[:3]) / 1e3, np.radians(it[3:])) for it in values])
+    reached = BranchFollower.of(holder).follow((X_WP_grid @ X_PT)[:, None])
     far = np.abs(reached.q[:, 0] - start).max(axis=1, initial=0.0)
     nearest: dict[int, int] = {}
     for index in np.argsort(far, kind="stable").tolist():
@@ -183,7 +183,7 @@ def _at_poses(cell: Cell, holder: Robot, ranges: Mapping[str, Sequence[float]], 
     if not nearest:
         raise InputError(
             f"{where}: expected a pose of the part to which '{holder.name}' can bring it within its joint limits, got "
-            f"none of {len(X_WP_each)}: give x_mm, y_mm and z_mm nearer to it, or other angles"
+            f"none of {len(X_WP_grid)}: give x_mm, y_mm and z_mm nearer to it, or other angles"
         )
     return reached.q[[nearest[row] for row in sorted(nearest)], 0]
 
