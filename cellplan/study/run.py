@@ -103,9 +103,17 @@ class Flight:
 
 
 @contextmanager
-def outcomes(variants: Sequence[Variant], evaluate: Evaluate, workers: int) -> Iterator[Iterator[TrialOutcome]]:
-    """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself."""
-    if min(workers, len(variants)) <= 1:
+def outcomes(
+    variants: Sequence[Variant], evaluate: Evaluate, workers: int | Executor
+) -> Iterator[Iterator[TrialOutcome]]:
+    """Outcomes in the order of the variants, for a ``with`` statement; one worker is this process itself.
+
+    Args:
+        workers: Number of processes; or an executor, which stays open.
+    """
+    if isinstance(workers, Executor):
+        yield _in_order(Flight(evaluate, workers, Limits()).outcomes(variants))
+    elif min(workers, len(variants)) <= 1:
         yield (evaluate(variant) for variant in variants)
     else:
         with Workers(min(workers, len(variants))) as executor:

@@ -15,7 +15,11 @@ import pytest
 from builders.study_trials import Killer, Wrong, halved, rounds
 
 from cellplan.errors import InputError, StudyStoppedError
+from cellplan.jobs.layout.request import LayoutRequest
+from cellplan.jobs.layout.request import files_of as layout_files
+from cellplan.jobs.repair.repair import repair
 from cellplan.jobs.sweep.sweep import SweepJob, files_of, sweep
+from cellplan.search.programs.objective import Objective
 from cellplan.study.cluster import Cluster
 from cellplan.study.folder import JOURNAL
 from cellplan.study.study import Stop
@@ -142,6 +146,31 @@ def test_workers_need_no_file_of_the_study_although_one_is_killed(
 def test_a_cluster_that_has_workers_is_never_given_up_for_having_none(cluster: LocalCluster) -> None:
     with Cluster(cluster.address) as executor:
         assert executor._workers() == 2
+
+
+@pytest.mark.slow
+def test_a_repair_on_workers_without_the_cell_is_the_one_that_is_made_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    shutil.copytree(CELLS, tmp_path / "job")
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "job")
+    settings = ("motion.duration_s=2", "motion.step_s=0.02", "tasks.circle.tolerance.position_mm=0.1")
+    request = LayoutRequest(
+        cell=Path("planar_pair.yaml"), objective=Objective.CHANGE, clearance=50.0, settings=settings
+    )
+    started = LocalCluster()
+    try:
+        started.start_scheduler()
+        for _ in range(2):
+            started.start_worker(tmp_path / "empty")
+        with Cluster(started.address, layout_files(request)) as executor:
+            there = repair(request, workers=executor).record
+    finally:
+        started.end()
+    assert there == repair(request, workers=1).record
+    assert there["status"] == "repaired"
 
 
 @pytest.mark.slow

@@ -16,7 +16,6 @@ from cellplan.errors import ExitStatus, InputError
 from cellplan.files.cell.load import load_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.run.folder import refuse_unless_replaceable
-from cellplan.guard import processors
 from cellplan.jobs.layout.request import LayoutRequest, files_of
 from cellplan.jobs.layout.result import layout_lines
 from cellplan.jobs.layout.search import layout_workers, refuse_search, search_layout
@@ -88,8 +87,11 @@ def repaired(options: "LayoutOptions", request: LayoutRequest) -> Result:
     """Repair a cell, and write the folder."""
     folder = study_folder(options, "repair")
     refuse_unless_replaceable(folder)
-    with progress_listener(quiet=options.quiet) as progress:
-        outcome = repair(request, workers=options.workers or processors(), progress=progress)
+    with (
+        crew(options.workers, options.scheduler, partial(files_of, request)) as workers,
+        progress_listener(quiet=options.quiet) as progress,
+    ):
+        outcome = repair(request, workers=workers, progress=progress)
         record = write_repair(outcome, request, folder)
     lines = advice_lines(record, folder, request.cell)
     return result_of_folder(SCHEMA, REPAIRED[record["status"]], lines, folder / "advice.html", advice=record)
