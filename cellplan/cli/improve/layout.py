@@ -68,6 +68,10 @@ class LayoutOptions(Options):
     repair: Annotated[
         bool, option("--repair", "Find the smallest change with which the cell passes, and other remedies.")
     ] = False
+    assign: Annotated[
+        bool,
+        option("--assign", "Assign open tasks (robot: any) and search the layout in turn, until neither gains."),
+    ] = False
     resume: shared.ResumeSearch = False
     status: Annotated[bool, option("--status", "Say how far the search in the folder is, and do nothing.")] = False
     as_json: shared.AsJson = False
@@ -82,7 +86,7 @@ def layout(options: LayoutOptions) -> Result | None:
     layout that is the fastest by velocity alone may be slow. Exit status: 0 a certified layout was found, 1 none
     passed, 2 bad input, 3 no start at all, 130 interrupted (--resume goes on).
     """
-    from cellplan.cli.improve.layout_search import layout_request, repaired, searched, study_folder
+    from cellplan.cli.improve.layout_search import alternated, layout_request, repaired, searched, study_folder
     from cellplan.study.status import read_status
 
     if options.status:
@@ -90,4 +94,6 @@ def layout(options: LayoutOptions) -> Result | None:
         say(f"{folder}: {read_status(folder).text()}")
         return None
     request = layout_request(options, objective="change" if options.repair else options.objective)
+    if options.assign:
+        return alternated(options, request)
     return repaired(options, request) if options.repair else searched(options, request)

@@ -13,9 +13,11 @@ from cellplan.cli.terminal.errors import resumable
 from cellplan.cli.terminal.output import Result, result_of_folder
 from cellplan.cli.terminal.progress import progress_listener
 from cellplan.errors import ExitStatus, InputError
-from cellplan.files.cell.load import load_cell
+from cellplan.files.cell.load import load_cell, load_open_cell
 from cellplan.files.input.findings import did_you_mean, listed, shown
 from cellplan.files.run.folder import refuse_unless_replaceable
+from cellplan.guard import processors
+from cellplan.jobs.alternate import alternate, alternation_lines, alternation_record, best_step
 from cellplan.jobs.layout.request import LayoutRequest, files_of
 from cellplan.jobs.layout.result import layout_lines
 from cellplan.jobs.layout.search import layout_workers, refuse_search, search_layout
@@ -95,6 +97,32 @@ def repaired(options: "LayoutOptions", request: LayoutRequest) -> Result:
         record = write_repair(outcome, request, folder)
     lines = advice_lines(record, folder, request.cell)
     return result_of_folder(SCHEMA, REPAIRED[record["status"]], lines, folder / "advice.html", advice=record)
+
+
+def alternated(options: "LayoutOptions", request: LayoutRequest) -> Result:
+    """Assign the tasks of a cell and search its layout in turn.
+
+    Raises:
+        InputError: The options do not go together, or the cell cannot be assigned or searched.
+    """
+    beside = {"--repair": options.repair, "--resume": options.resume, "--set": options.settings}
+    if unexpected := [option for option, given in beside.items() if given]:
+        raise InputError(f"{unexpected[0]}: unexpected beside --assign; leave it out, or write it into the cell")
+    name = load_open_cell(options.cell, allow_dirs=options.allow_dirs)[0].name
+    folder = options.output or Path("outputs") / f"{name}-layout"
+    stop = Stop(trials=options.trials, seconds=_quantity("--budget", options.budget, read_time))
+    with progress_listener(quiet=options.quiet) as progress:
+        steps = alternate(
+            request,
+            folder,
+            stop=None if stop == Stop() else stop,
+            workers=options.workers or processors(),
+            progress=progress,
+        )
+    best = best_step(steps)
+    status = ExitStatus.CHECK_FAILED if best is None else ExitStatus.PASSED
+    about = {"exit": int(status), "folder": str(folder)}
+    return Result(status, alternation_lines(steps), {**alternation_record(steps), **about})
 
 
 def study_folder(options: SearchOptions, what: str) -> Path:
