@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 NODES: Final = 129  # [-] of the finish
 FINISH: Final = Effort(iterations=25, keys=25, trust=0.2)  # of a layout that is nearly at its best
+FINER: Final = (2, 4)  # [-] times as many nodes of a program whose tools lose their paths
 REFINED: Final = 3  # [-] times that nodes are added for a shorter cycle before it is certified
 GAIN: Final = 0.001  # [-] share of the cycle that each of them must gain
 ROUNDS: Final = 4  # [-] times that a layout is improved and solved before it is given up
@@ -245,6 +246,10 @@ class Finish:
             if point is not None:
                 return x, start, standing_of(problem, point, demands, effort), demands
         improved = improve(problem, x, start, demands, refinement.effort)
+        for finer in FINER if self.ready.phases is not None else ():
+            if improved is None:
+                problem = problem_of(self.ready, finer * refinement.nodes)
+                improved = improve(problem, x, start, demands, refinement.effort)
         if improved is None:
             problem = self.ready.coarse
             point = problem.evaluate(x, start)
