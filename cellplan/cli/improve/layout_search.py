@@ -105,8 +105,8 @@ def alternated(options: "LayoutOptions", request: LayoutRequest) -> Result:
     Raises:
         InputError: The options do not go together, or the cell cannot be assigned or searched.
     """
-    beside = {"--repair": options.repair, "--resume": options.resume, "--set": options.settings}
-    if unexpected := [option for option, given in beside.items() if given]:
+    others = {"--repair": options.repair, "--resume": options.resume, "--set": options.settings}
+    if unexpected := [option for option, value in others.items() if value]:
         raise InputError(f"{unexpected[0]}: unexpected beside --assign; leave it out, or write it into the cell")
     name = load_open_cell(options.cell, allow_dirs=options.allow_dirs)[0].name
     folder = options.output or Path("outputs") / f"{name}-layout"
