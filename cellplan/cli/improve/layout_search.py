@@ -105,7 +105,12 @@ def alternated(options: "LayoutOptions", request: LayoutRequest) -> Result:
     Raises:
         InputError: The options do not go together, or the cell cannot be assigned or searched.
     """
-    others = {"--repair": options.repair, "--resume": options.resume, "--set": options.settings}
+    others = {
+        "--repair": options.repair,
+        "--resume": options.resume,
+        "--set": options.settings,
+        "--scheduler": options.scheduler,
+    }
     if unexpected := [option for option, value in others.items() if value]:
         raise InputError(f"{unexpected[0]}: unexpected beside --assign; leave it out, or write it into the cell")
     name = load_open_cell(options.cell, allow_dirs=options.allow_dirs)[0].name
