@@ -13,7 +13,7 @@ from typing import Final
 
 from cellplan.errors import ImpossibleTasksError, NoSolutionError
 from cellplan.jobs.assign.draft import AssignmentDraft
-from cellplan.jobs.assign.written import written_cell, written_points
+from cellplan.jobs.assign.written import mirrored_goals, written_cell, written_points
 from cellplan.model.cell.cell import Cell, Timing
 from cellplan.model.presented import Presented
 from cellplan.model.progress import Progress, silent
@@ -178,9 +178,8 @@ class _Search:
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
-        search = ModeSearch(
-            cell=cell, goals=goals, stations=stations, spins=draft.spins(), tool_fits=clearance.tool_fits
-        )
+        ways, fits = [*goals, *mirrored_goals(draft, goals)], clearance.tool_fits
+        search = ModeSearch(cell=cell, goals=ways, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
         self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)

@@ -1,5 +1,7 @@
 """The cell that an assignment writes: its draft with the values that were chosen."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +11,7 @@ from cellplan.geometry.arrays import Array
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.model.cell.cell import Cell
 from cellplan.model.robot.robot import RobotModel, start_keys
+from cellplan.search.assign.goals import STRAIGHT, TaskGoal, task_goals
 from cellplan.search.assign.instance import End, Instance
 from cellplan.search.assign.order import SequencedBlocks, order_values
 
@@ -47,10 +50,46 @@ def _task_values(
         values |= _configuration(f"{place}.holder", cell.robot(holder[0]).model, holder[1])
     if after := tuple(dict.fromkeys((*task.after, *before))):
         values[f"{place}.after"] = after
-    points = written_points(cell, task.name)
-    if end.is_reversed and points is not None:
-        values[f"{place}.path.polyline.points_mm"] = points[::-1]
-    return values
+    return values | ((backwards_values(cell, task.name) or {}) if end.is_reversed else {})
+
+
+def backwards_values(cell: Cell, task: str) -> dict[str, object] | None:
+    """Values with which a polyline is gone through from its end to its begin; None where that is not known.
+
+    A tool that pushes or drags does so backwards too, as it is mirrored across the path: on a straight one, with an
+    axis that is written as a vector.
+    """
+    points = written_points(cell, task)
+    if points is None:
+        return None
+    place, at = f"tasks.{task}", np.array(points, dtype=float)
+    values: dict[str, object] = {f"{place}.path.polyline.points_mm": points[::-1]}
+    document: Any = cell.origin.document["tasks"]
+    written = document[task].get("tool_axis")
+    if not isinstance(written, tuple | list):
+        return values
+    axis, steps = np.array(written, dtype=float), np.diff(at, axis=0)
+    along = steps @ axis / np.maximum(np.linalg.norm(steps, axis=1) * np.linalg.norm(axis), STRAIGHT)
+    if np.all(np.abs(along) <= STRAIGHT):
+        return values
+    travel = (at[-1] - at[0]) / max(float(np.linalg.norm(at[-1] - at[0])), STRAIGHT)
+    if np.any(np.linalg.norm(np.cross(steps, travel), axis=1) > STRAIGHT * np.linalg.norm(steps, axis=1)):
+        return None
+    mirrored = axis - 2.0 * (axis @ travel) * travel
+    return values | {f"{place}.tool_axis": [float(it) for it in np.round(mirrored, 9) + 0.0]}
+
+
+def mirrored_goals(draft: AssignmentDraft, goals: Sequence[TaskGoal]) -> list[TaskGoal]:
+    """The ways back of tasks whose tool pushes or drags, with the tool mirrored across the path."""
+    cell, values = draft.cell, dict[str, object]()
+    for goal in goals:
+        if not goal.is_reversible and goal.start_q is None and "direction" in draft.settings.free:
+            values |= backwards_values(cell, goal.name) or {}
+    if not values:
+        return []
+    back = {goal.name: goal.X_PT[::-1] for goal in task_goals(cell.with_values(values), draft.robots)}
+    turned = [goal for goal in goals if f"tasks.{goal.name}.tool_axis" in values]
+    return [replace(goal, X_PT=back[goal.name], is_mirrored=True) for goal in turned]
 
 
 def written_points(cell: Cell, task: str) -> tuple[object, ...] | None:

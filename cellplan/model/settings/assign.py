@@ -38,7 +38,8 @@ class AssignEntry(Entry):
     free: tuple[FreeWord, ...] = Field(
         default=("direction", "spin", "station"),
         description="What may be chosen anew for every task: the direction of an open polyline whose tool stands "
-        "across it, the turn of the tool about its axis, the pose of the part.",
+        "across it, or is mirrored across it for the way back, the turn of the tool about its axis, the pose of the "
+        "part.",
     )
     spin_step_deg: Annotated[Deg, Within(ge=5.0, le=360.0)] = Field(
         default=Deg(60.0), description="Step of the turns of the tool about its axis that are compared."

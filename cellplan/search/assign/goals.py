@@ -31,6 +31,7 @@ class TaskGoal:
     X_PT: Array  # tool poses at the end of the approach's way, along the path, and after the retraction, (S + 2, 4, 4)
     steps: int  # whole steps from the begin of the approach to the end of the retraction; the least where it is retimed
     is_reversible: bool  # whether it may be done from its end to its begin with the same tool poses
+    is_mirrored: bool = False  # whether it is its way back, with the tool mirrored across the path
     after: tuple[str, ...] = ()  # tasks that must be done before it begins
     torch: TorchEntry | None = None  # how its tool is held to gravity
     weld_position: WeldPositionEntry | None = None  # how its weld lies to gravity

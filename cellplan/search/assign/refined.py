@@ -63,12 +63,12 @@ class Refinement:
     def _finer(self, key: Key) -> list[TaskMode]:
         """Modes of one robot for one task at one station at finer turns of the tool, largest margins first."""
         (task, robot, station), search = key, self.search
-        goal = next(it for it in search.goals if it.name == task)
+        goals = [replace(goal, robots=(robot,)) for goal in search.goals if goal.name == task]
         every = search.stations
         count = FINER * len(search.spins) if len(search.spins) > 1 else 1
         table = replace(
             search,
-            goals=[replace(goal, robots=(robot,))],
+            goals=goals,
             stations=Stations(holder=every.holder, q=every.q[[station]], X_WP=every.X_WP[[station]]),
             spins=np.linspace(0.0, 2.0 * np.pi, count, endpoint=False),
         ).table()

@@ -89,7 +89,9 @@ class ModeSearch:
         follower = BranchFollower.of(robot)
         for goal in goals:
             allowed = self.stations.allowed(goal)
-            places = np.flatnonzero(allowed[False] | (allowed[True] & goal.is_reversible))
+            possible = {False: not goal.is_mirrored, True: goal.is_reversible or goal.is_mirrored}
+            allowed = {way: flags & possible[way] for way, flags in allowed.items()}
+            places = np.flatnonzero(allowed[False] | allowed[True])
             spins = self.spins if goal.is_spin_free else np.zeros(1)
             table.note("torch and weld position", [goal.name] * (len(places) * len(spins)))
             for places_now in np.array_split(places, max(1, -(-len(places) * len(spins) // AT_ONCE))):
@@ -128,7 +130,7 @@ class ModeSearch:
                 spin=spin,
                 q=result.q[index],
                 margin=float(result.margins[index]),
-                directions=tuple(it for it in (False, True) if allowed[it][place] and (goal.is_reversible or not it)),
+                directions=tuple(it for it in (False, True) if allowed[it][place]),
             )
             if self.tool_fits(mode):
                 table.note("tool by the part", [goal.name])

@@ -13,6 +13,8 @@ from cellplan.errors import InputError
 from cellplan.geometry.transforms import pose
 from cellplan.jobs.assign.assign import assign
 from cellplan.jobs.assign.draft import AssignmentDraft
+from cellplan.jobs.assign.written import mirrored_goals
+from cellplan.search.assign.goals import task_goals
 from cellplan.search.assign.schedule import refuse_impossible
 
 SCRIPT = Path(__file__).resolve().parents[3] / "benchmarks" / "assign.py"
@@ -100,6 +102,46 @@ def test_a_generated_cell_becomes_a_program_that_passes(tmp_path: Path, cells: M
     refuse_impossible(result.instance, result.sequenced.schedule)
     assert result.passed
     assert (result.bound or 0.0) <= result.cycle <= 1.03 * result.model_cycle
+
+
+def pushing(cells: ModuleType) -> dict[str, Any]:
+    """A cell in which the tool pushes along every seam."""
+    values = cells.generated_cell(8, 2, 0, "table")
+    for task in values["tasks"].values():
+        first, last = np.array(task["path"]["polyline"]["points_mm"])
+        task["tool_axis"] = (task["tool_axis"] - 0.15 * (last - first) / np.linalg.norm(last - first)).tolist()
+    return dict(values)
+
+
+def test_on_the_way_back_the_tool_is_mirrored_across_the_path(tmp_path: Path, cells: ModuleType) -> None:
+    """The points are the same, and so is the axis but for its part along the path, which has the other sign."""
+    given = draft(tmp_path, pushing(cells))
+    goals = {goal.name: goal for goal in task_goals(given.cell, given.robots)}
+
+    ways_back = mirrored_goals(given, list(goals.values()))
+
+    assert {goal.name for goal in ways_back} == set(goals)
+    for back in ways_back:
+        there, here = goals[back.name].X_PT[1:-1], back.X_PT[1:-1]
+        travel = there[-1, :3, 3] - there[0, :3, 3]
+        travel /= np.linalg.norm(travel)
+        assert np.abs(there[:, :3, 3] - here[:, :3, 3]).max() < ROUNDING
+        assert np.max(there[:, :3, 2] @ travel) < -0.05
+        across = np.eye(3) - 2.0 * np.outer(travel, travel)
+        assert np.abs(here[:, :3, 2] - there[:, :3, 2] @ across).max() < ROUNDING
+    assert mirrored_goals(draft(tmp_path, cells.generated_cell(8, 2, 0, "table")), list(goals.values())) == []
+
+
+@pytest.mark.slow
+def test_a_tool_that_pushes_does_so_in_both_directions(tmp_path: Path, cells: ModuleType) -> None:
+    result = assign(draft(tmp_path, pushing(cells)), effort=1)
+
+    goals = task_goals(result.cell, {})
+    assert result.passed
+    assert any(end is not None and end.is_reversed for _, ends in result.sequenced.stops for end in ends)
+    for goal in goals:
+        travel = goal.X_PT[-2, :3, 3] - goal.X_PT[1, :3, 3]
+        assert goal.X_PT[1, :3, 2] @ travel < -0.05 * np.linalg.norm(travel)
 
 
 def _cell(cells: ModuleType, text: str) -> dict[str, Any]:
