@@ -178,8 +178,8 @@ class _Search:
         clearance = AssignmentClearance(
             scene=self._scene, home=draft.home, stations=stations, conflict=settings.conflict_mm.si
         )
-        ways, fits = [*goals, *mirrored_goals(draft, goals)], clearance.tool_fits
-        search = ModeSearch(cell=cell, goals=ways, stations=stations, spins=draft.spins(), tool_fits=fits)
+        directed, fits = [*goals, *mirrored_goals(draft, goals)], clearance.tool_fits
+        search = ModeSearch(cell=cell, goals=directed, stations=stations, spins=draft.spins(), tool_fits=fits)
         table = search.table()
         certifier = TransferCertifier(scene=self._scene, home=draft.home, retimer=transfer_retimer(self._scene))
         self._refinement = Refinement(search=search, clearance=clearance, certifier=certifier)

@@ -90,7 +90,7 @@ class ModeSearch:
         for goal in goals:
             allowed = self.stations.allowed(goal)
             possible = {False: not goal.is_mirrored, True: goal.is_reversible or goal.is_mirrored}
-            allowed = {way: flags & possible[way] for way, flags in allowed.items()}
+            allowed = {is_reversed: flags & possible[is_reversed] for is_reversed, flags in allowed.items()}
             places = np.flatnonzero(allowed[False] | allowed[True])
             spins = self.spins if goal.is_spin_free else np.zeros(1)
             table.note("torch and weld position", [goal.name] * (len(places) * len(spins)))

@@ -118,10 +118,10 @@ def test_on_the_way_back_the_tool_is_mirrored_across_the_path(tmp_path: Path, ce
     given = draft(tmp_path, pushing(cells))
     goals = {goal.name: goal for goal in task_goals(given.cell, given.robots)}
 
-    ways_back = mirrored_goals(given, list(goals.values()))
+    mirrored = mirrored_goals(given, list(goals.values()))
 
-    assert {goal.name for goal in ways_back} == set(goals)
-    for back in ways_back:
+    assert {goal.name for goal in mirrored} == set(goals)
+    for back in mirrored:
         there, here = goals[back.name].X_PT[1:-1], back.X_PT[1:-1]
         travel = there[-1, :3, 3] - there[0, :3, 3]
         travel /= np.linalg.norm(travel)
