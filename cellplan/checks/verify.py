@@ -19,6 +19,7 @@ from cellplan.checks.joints.limits import check_joints, check_shown
 from cellplan.checks.joints.locked import check_locked, with_locked_joints
 from cellplan.checks.joints.payload import check_payload, load_uses
 from cellplan.checks.joints.transfer_speeds import check_transfer_speeds
+from cellplan.checks.tools.arcs import check_arcs
 from cellplan.checks.tools.between_checks import (
     check_between_rows,
     check_closures_between,
@@ -111,6 +112,7 @@ def verify_motion(
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
     checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
     checks += [*check_payload(loads), *check_weld_positions(schedule, scene.chains, q, X_WP)]
+    checks += check_arcs(cell, schedule, scene.chains, q)
     checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cellplan.files.cell.load import load_cell
@@ -96,3 +97,18 @@ def test_paths_at_once_leave_no_rest_unless_they_begin_together_by_a_rule() -> N
     assert not rest.passed
     assert rest.value in (pytest.approx(-4.0), pytest.approx(-5.0))
     assert checks_of(together, "rest") == []
+
+
+def test_tips_at_once_keep_the_distance_of_their_paths_on_the_part() -> None:
+    near, far = solved({}, arcs_apart_mm=Mm(250)), solved({}, arcs_apart_mm=Mm(700))
+    tasks, times = near.runs[1].schedule.tasks, near.runs[1].schedule.times
+    rows = (times >= 0.5) & (times <= min(it.end for it in tasks))
+    gaps = np.linalg.norm(tasks[0].X_PT[rows, :3, 3] - tasks[1].X_PT[rows, :3, 3], axis=1)
+
+    [(phase, passing)], [(_, failing)] = checks_of(near, "arc_distance"), checks_of(far, "arc_distance")
+
+    assert phase == "work-1"
+    assert passing.value == failing.value == pytest.approx(1e3 * gaps.min(), abs=0.2)  # the tolerance of both tools
+    assert passing.value >= 300.0
+    assert (passing.passed, failing.passed, failing.limit) == (True, False, 700.0)
+    assert checks_of(solved({"tasks.frame.after": "ring"}, arcs_apart_mm=Mm(700)), "arc_distance") == []

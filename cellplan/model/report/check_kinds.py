@@ -84,6 +84,7 @@ _LISTED: Final = (  # the gravest first
     CheckKind("same_robot", "tasks of one robot done by one", "Tasks of one robot done by several"),
     CheckKind("together", "paths that begin together do", "Paths begin apart", excess=DISTANCE),
     CheckKind("task_order", "tasks in their demanded order", "Task begins too early", excess=DISTANCE),
+    CheckKind("arc_distance", "tips of tools at work keep their distance", "Arcs too near", group="distances of arcs", excess=DISTANCE),
     CheckKind("rest", "the part cools between tasks for its time", "Rest too short", group="rests between tasks", excess=DISTANCE),
     CheckKind("stop_depth", "tool depth in the part within its limit where a robot stops", "Tool too deep in the part where a robot stops"),
     CheckKind("joint_position", "joint positions within their limits", "Joint beyond its limit", group="joint limits", excess=DISTANCE, concern=LIMIT),

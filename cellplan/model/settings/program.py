@@ -173,6 +173,11 @@ class ProgramEntry(Entry):
         default=None,
         description="Distance of two paths below which rest_s holds between them; passes only when absent.",
     )
+    arcs_apart_mm: Annotated[Mm, Within(gt=0.0, le=FARTHEST_STAND_OFF_MM)] | None = Field(
+        default=None,
+        description="Least distance of the tips of two tools that are on their paths at the same time, so that arcs do "
+        "not disturb each other; any when absent.",
+    )
 
     @model_validator(mode="after")
     def _has_groups(self) -> Self:

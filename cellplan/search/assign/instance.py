@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from typing import Self
 
 import numpy as np
@@ -100,17 +100,24 @@ class Instance:
 
 
 def with_rules(instance: Instance, rules: TaskRules) -> Instance:
-    """The same with rules: robots that can do all tasks of a group, and conflicts where the part must cool."""
+    """The same with rules: robots that can do all tasks of a group, conflicts by heat and of arcs too near."""
     modes = dict(instance.modes)
     for group in rules.same_robot:
         able = set.intersection(*({by for name, by, _ in modes if name == task} for task in group))
         modes = {key: it for key, it in modes.items() if key[0] not in group or key[1] in able}
-    hot = {
+    apart = {
         frozenset((first, second))
         for first, second in combinations(modes, 2)
-        if (first[0], second[0]) in rules.lags and first[1] != second[1] and first[2] == second[2]
+        if first[0] != second[0] and first[1] != second[1] and first[2] == second[2]
+        if (first[0], second[0]) in rules.lags or _are_crowded(rules, modes, first, second)
     }
-    return replace(instance, modes=modes, rules=rules, conflicts=instance.conflicts | hot)
+    return replace(instance, modes=modes, rules=rules, conflicts=instance.conflicts | apart)
+
+
+def _are_crowded(rules: TaskRules, modes: Mapping[Key, Sequence[TaskMode]], first: Key, second: Key) -> bool:
+    """Whether the arcs of two tasks come too near in all directions in which they may be done."""
+    a, b = ({it for mode in modes[key] for it in mode.directions} for key in (first, second))
+    return all(rules.is_crowded((first[0], second[0]), both) for both in product(a, b))
 
 
 def least_transfer(instance: Instance) -> int:

@@ -6,7 +6,7 @@ takes as long as its slowest robot, or the part. Transfers that are not free str
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise, permutations
+from itertools import combinations, pairwise, permutations, product
 from typing import Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from cellplan.search.assign.instance import End, Instance
 from cellplan.search.assign.schedule import BlockSchedule, in_order
 
 MOST_PERMUTED: Final = 7  # stations of which all tours are compared
+CROWDED: Final = 10**6  # [steps] more than any cycle that is chosen
 TOURS: Final = 4  # shortest ones that are tried
 
 Layer = tuple[int | None, list[list[End | None]]]  # station, and the ends that each operator may choose
@@ -80,6 +81,7 @@ class Sequencer:
         cost, back, costs = np.zeros([1] * len(self.instance.robots), dtype=np.int64), [], []
         for before, after in pairwise(layers):
             cost, came = self._step(cost, before, after)
+            cost += crowding(self.instance, after[1])
             back.append(came)
             costs.append(cost)
         stops, place, moved = list[Stop](), tuple([0] * len(self.instance.robots)), list[int]()
@@ -195,6 +197,21 @@ class Sequencer:
             order.append(min(left, key=lambda it: (self.instance.station_steps(last, it), it)))
             left.discard(order[-1])
         return tuple(order)
+
+
+def crowding(instance: Instance, ends: Sequence[Sequence[End | None]]) -> Indices:
+    """Steps that keep joint choices out in which two arcs come too near, shape (K, ...), an axis for each robot."""
+    extra = np.zeros(list(map(len, ends)), dtype=np.int64)
+    for a, b in combinations(range(len(ends)), 2) if instance.rules.crowded else ():
+        for (i, first), (k, second) in product(enumerate(ends[a]), enumerate(ends[b])):
+            if first is None or second is None:
+                continue
+            tasks = first.mode.task, second.mode.task
+            if instance.rules.is_crowded(tasks, (first.is_reversed, second.is_reversed)):
+                index: list[int | slice] = [slice(None)] * len(ends)
+                index[a], index[b] = i, k
+                extra[tuple(index)] = CROWDED
+    return extra
 
 
 def waits_of(instance: Instance, schedule: BlockSchedule, moved: Sequence[int]) -> tuple[int, ...]:

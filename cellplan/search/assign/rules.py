@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, product
+from itertools import combinations, permutations, product
 from typing import Final, Self
 
 import numpy as np
 
+from cellplan.geometry.arrays import Array, Flags
 from cellplan.measures.near_paths import POINTS, resting_pairs
 from cellplan.model.cell.cell import Cell
 from cellplan.model.report.report import Check
@@ -15,6 +16,7 @@ from cellplan.planning.path.build import build_toolpath
 from cellplan.planning.timing.schedule import clock_paths
 from cellplan.search.assign.table import Key
 
+ARC_TIMES: Final = 400  # at which the distance of two arcs is taken
 ROUNDING: Final = 1e-9  # [steps] of a time
 
 
@@ -26,6 +28,8 @@ class TaskRules:
     together: tuple[tuple[str, ...], ...] = ()  # groups that are done in one block
     lags: Mapping[tuple[str, str], int] = field(default_factory=dict)  # steps from the begin of the block of the first
     # to that of the second at least, where it comes later; such tasks share a block only where they are together
+    crowded: Mapping[tuple[str, str], frozenset[tuple[bool, bool]]] = field(default_factory=dict)  # of two tasks that
+    # begin together: whether each is done backwards, where their arcs then come too near
     where: str = "program"  # where they stand
 
     @classmethod
@@ -35,6 +39,7 @@ class TaskRules:
             same_robot=groups_of(cell.program.same_robot),
             together=groups_of(cell.program.together),
             lags=_lags(cell),
+            crowded=_crowded(cell),
             where=cell.origin.at("program"),
         )
 
@@ -42,6 +47,10 @@ class TaskRules:
         """The rules with rests that are longer by what those of a program fell short of, by its checks; step in [s]."""
         short = max((it.limit - it.value for it in checks if it.name == "rest" and not it.passed), default=0.0)
         return replace(self, lags={pair: lag + steps_over(short, step) for pair, lag in self.lags.items()})
+
+    def is_crowded(self, tasks: tuple[str, str], are_reversed: tuple[bool, bool]) -> bool:
+        """Whether the arcs of two tasks come too near where each is done backwards, or is not."""
+        return are_reversed in self.crowded.get(tasks, ())
 
     @property
     def grouped(self) -> int:
@@ -95,6 +104,31 @@ def _lags(cell: Cell) -> dict[tuple[str, str], int]:
                 end = clocked[first].end + cell.task(first).off_delay
                 lags[first, later] = steps_over(end + program.rest_s - cell.task(later).start, cell.motion.step)
     return lags
+
+
+def _crowded(cell: Cell) -> dict[tuple[str, str], frozenset[tuple[bool, bool]]]:
+    """Directions of two tasks that begin together in which their arcs come too near, in either order of the tasks."""
+    least = cell.program.arcs_apart_mm
+    if least is None:
+        return {}
+    clocked = clock_paths(cell, [build_toolpath(task, cell.part) for task in cell.tasks if task.is_on_part])
+    times = np.linspace(0.0, max(path.over for path in clocked.values()), ARC_TIMES)
+    on, tips = dict[str, Flags](), dict[tuple[str, bool], Array]()
+    for name, path in clocked.items():
+        begin, end = path.task.moves_from, path.end
+        on[name] = (times >= path.task.start) & (times <= end + path.task.off_delay)
+        for is_reversed in (False, True):
+            at = np.clip(begin + end - times if is_reversed else times, begin, end)
+            tips[name, is_reversed] = path.targets(at)[0][:, :3, 3]
+    crowded = {}
+    for pair in permutations(clocked, 2):
+        rows = on[pair[0]] & on[pair[1]]
+        gaps = {
+            both: np.linalg.norm(tips[pair[0], both[0]][rows] - tips[pair[1], both[1]][rows], axis=1)
+            for both in product((False, True), (False, True))
+        }
+        crowded[pair] = frozenset(both for both, gap in gaps.items() if gap.min(initial=np.inf) < least.si)
+    return crowded
 
 
 def steps_over(time: float, step: float) -> int:

@@ -92,6 +92,7 @@ RULES = {
     "rest": TaskRules(lags=lags(("t0", "t1"), steps=110)),
     "rests of all": TaskRules(lags=lags(("t0", "t1"), ("t1", "t2"), ("t2", "t3"), ("t0", "t3"), steps=90)),
     "rest and together": TaskRules(lags=lags(("t0", "t1"), steps=140), together=(("t1", "t3"),)),
+    "arcs": TaskRules(crowded={pair: frozenset({(False, False)}) for pair in permutations(("t0", "t2", "t3"), 2)}),
     "same robot": TaskRules(same_robot=(("t0", "t1", "t3"),)),
     "together": TaskRules(together=(("t1", "t3"),)),
     "both": TaskRules(same_robot=(("t0", "t3"),), together=(("t2", "t3"),)),

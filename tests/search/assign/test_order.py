@@ -1,6 +1,7 @@
 """Modes along an order of blocks by enumeration, and straight times by the planner of transfer moves."""
 
-from itertools import pairwise, product
+from dataclasses import replace
+from itertools import combinations, pairwise, permutations, product
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from builders.assignments import STEP, small_instance
 from cellplan.planning.timing.retime import JointLimitsInTime
 from cellplan.planning.transfer.straight_time import straight_steps
 from cellplan.search.assign.greedy import greedy_schedule
-from cellplan.search.assign.instance import End, Instance, least_transfer
+from cellplan.search.assign.instance import End, Instance, least_transfer, with_rules
 from cellplan.search.assign.order import Refusal, Sequencer, relocations
 from cellplan.search.assign.rules import TaskRules
 from cellplan.search.assign.schedule import BlockSchedule, in_order
@@ -126,3 +127,26 @@ def test_between_blocks_the_part_has_cooled_and_no_order_found_is_longer_than_as
         if begins[later] > begins[first]:
             assert begins[later] - begins[first] + moves >= lag
     assert any(sequenced.waits) or sequencer.ordered(schedule).steps == sequenced.steps
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_directions_in_which_arcs_come_too_near_are_not_chosen(seed: int) -> None:
+    """The best of all other choices of directions, by enumeration."""
+    names = [f"t{k}" for k in range(4)]
+    rules = TaskRules(crowded={pair: frozenset({(False, False), (True, True)}) for pair in permutations(names, 2)})
+    free = small_instance(seed, 4)
+    both = {key: tuple(replace(it, directions=(False, True)) for it in modes) for key, modes in free.modes.items()}
+    instance = with_rules(replace(free, modes=both), rules)
+    schedule = greedy_schedule(instance)
+
+    sequenced = Sequencer(instance).sequenced(schedule)
+
+    ends = [instance.ends(task, *schedule.chosen[task]) for task in instance.tasks]
+    every = (dict(zip(instance.tasks, choice, strict=True)) for choice in product(*ends))
+    allowed = [
+        it
+        for it in every
+        if all(it[a].is_reversed != it[b].is_reversed for block in schedule.blocks for a, b in combinations(block, 2))
+    ]
+    assert instance.conflicts == free.conflicts
+    assert sequenced.steps == min(steps_of(instance, schedule, it) for it in allowed)

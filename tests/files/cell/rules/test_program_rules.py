@@ -148,7 +148,8 @@ def changes(*, program: str = "{}", order: str = "", second: str = "", motion: s
         (
             {"program": "[]"},
             "c:24: program: expected a mapping with keys out of cycles, marks, attach, detach, transfer, same_robot, "
-            "together, order, tacks_first, rest_s, apart_mm, got a list of 0",
+            "together, order, tacks_first, rest_s, apart_mm, "
+            "arcs_apart_mm, got a list of 0",
         ),
     ],
 )
