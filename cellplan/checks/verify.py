@@ -110,9 +110,12 @@ def verify_motion(
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
-    checks += [*check_payload(loads), *check_weld_positions(schedule, scene.chains, q, X_WP)]
-    checks += check_arcs(cell, schedule, scene.chains, q)
+    checks += [
+        *check_feeds(scene, schedule, q, X_WP),
+        *check_idle(cell, idle, schedule.times, q),
+        *check_payload(loads),
+    ]
+    checks += [*check_weld_positions(schedule, scene.chains, q, X_WP), *check_arcs(cell, schedule, scene.chains, q)]
     checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,
