@@ -104,18 +104,14 @@ def verify_motion(
     tips, depths = standoffs(cell, schedule, scene.chains, q), tool_depths(cell, schedule, scene.chains, q)
     checks = [*_accuracy_checks(cell, schedule, accuracy), *check_depths(cell, depths), *check_standoffs(cell, tips)]
     checks += with_between(check_closure(cell, schedule.times, closures), check_closures_between(cell, closures))
-    uses, joint_checks = _joints(cell, schedule.times, q)
+    (uses, joint_checks), speeds = _joints(cell, schedule.times, q), _speeds(scene, schedule.times, q)
     accelerations = motion_accelerations(cell, scene.chains, schedule, q=q, X_WP=X_WP)
-    speeds = _speeds(scene, schedule.times, q)
     checks += [*joint_checks, *check_accelerations(cell, accelerations), *check_tool_speeds(cell, speeds)]
     drift, loads = repeatability(cell, schedule, q), load_uses(cell, scene.chains, schedule.times, q)
     checks += [*check_joint_drift(drift, is_demanded=cell.motion.cyclic), *check_locked(cell, schedule.times, q)]
-    checks += [
-        *check_feeds(scene, schedule, q, X_WP),
-        *check_idle(cell, idle, schedule.times, q),
-        *check_payload(loads),
-    ]
-    checks += [*check_weld_positions(schedule, scene.chains, q, X_WP), *check_arcs(cell, schedule, scene.chains, q)]
+    arcs, welds = check_arcs(cell, schedule, scene.chains, q), check_weld_positions(schedule, scene.chains, q, X_WP)
+    checks += [*check_feeds(scene, schedule, q, X_WP), *check_idle(cell, idle, schedule.times, q)]
+    checks += [*check_payload(loads), *welds, *arcs]
     checks += check_transfer_speeds(scene, schedule, uses, q) if moving else []
     return Report(
         cell=cell.name,
