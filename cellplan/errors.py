@@ -137,12 +137,13 @@ class ImpossibleTasksError(NoSolutionError):
 
     Attributes:
         findings: One line for each of them.
+        tasks: Their names.
     """
 
-    def __init__(self, findings: list[str]) -> None:
+    def __init__(self, findings: list[str], tasks: list[str]) -> None:
         """Join the findings, one per line."""
         super().__init__("\n".join(findings))
-        self.findings = findings
+        self.findings, self.tasks = findings, tasks
 
 
 class StartNotFoundError(NoSolutionError):

@@ -32,8 +32,9 @@ def assign(options: AssignOptions) -> Result:
     """Choose for every task the robot, the block, the direction, the spin and the pose of the part.
 
     Tasks with robot: any, or a list of robots, are open; what is given is kept. The result, best.yaml, is solved and
-    verified from home to home, and stated with a lower bound of the cycle. Exit status: 0 passed every check, 1 a check
-    failed, 2 bad input, 3 a task that no robot can do or no program, 4 internal error.
+    verified from home to home, and stated with a lower bound of the cycle. Where a robot is not available, tasks that
+    no other one can do are left out, with exit status 1. Exit status: 0 passed every check, 1 a check failed, 2 bad
+    input, 3 a task that no robot can do or no program, 4 internal error.
     """
     from cellplan.files.run.folder import refuse_unless_replaceable
     from cellplan.jobs.assign.assign import assign as assigned

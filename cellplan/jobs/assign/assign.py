@@ -61,6 +61,7 @@ class Assignment(Presented):
         without: Cycle in [s] by the model without each robot; None where it has to work.
         rounds: Number of programs that were solved.
         counts: Numbers of goals, modes, certificates and refusals.
+        left_out: Why tasks are not in the program, one line for each; empty where it has all.
     """
 
     draft: Cell
@@ -75,11 +76,12 @@ class Assignment(Presented):
     without: Mapping[str, float | None]
     rounds: int
     counts: Mapping[str, int]
+    left_out: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
-        """Whether the program passed every check."""
-        return self.solution.passed
+        """Whether the program has all tasks and passed every check."""
+        return self.solution.passed and not self.left_out
 
     @property
     def cycle(self) -> float:
@@ -101,7 +103,8 @@ class Assignment(Presented):
 def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = silent) -> Assignment:
     """Choose robots, order, directions, spins and poses of the part for all tasks.
 
-    Without OR-Tools blocks are improved by exchanges alone, and no lower bound is known.
+    Without OR-Tools blocks are improved by exchanges alone, and no lower bound is known. Where a robot is not available
+    and no other one can do some tasks, they are left out with all that come after them.
 
     Args:
         draft: The cell with open tasks.
@@ -112,6 +115,17 @@ def assign(draft: AssignmentDraft, *, effort: int = 2, progress: Progress = sile
         InputError: Something in the cell cannot be assigned.
         NoSolutionError: A task can be done by no robot at any pose of the part, or no program passed.
     """
+    try:
+        return _program_of(draft, effort, progress)
+    except ImpossibleTasksError as error:
+        partial = draft.without(error.tasks)
+        if partial is None:
+            raise
+        return replace(_program_of(partial, effort, progress), left_out=tuple(error.findings))
+
+
+def _program_of(draft: AssignmentDraft, effort: int, progress: Progress) -> Assignment:
+    """The program of all tasks of a draft."""
     progress("table of modes", 0.0)
     search = _Search(draft, effort)
     first = instance = search.instance(progress)
@@ -312,7 +326,7 @@ def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table
                 f"left after the filter '{dropped}'; give more poses of the part, other robots or bases"
             )
     if lines:
-        raise ImpossibleTasksError(lines)
+        raise ImpossibleTasksError(lines, [goal.name for goal in goals if goal.name not in able])
 
 
 def _solved(cell: Cell, progress: Progress) -> Solution | str:

@@ -1,9 +1,10 @@
 """Drafts: cells whose tasks are open to several robots, and what an assignment refuses of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,23 @@ class AssignmentDraft:
         draft = cls(cell=cell, robots=robots, file=Path(file))
         draft.stations()  # which are refused before anything is searched
         return draft
+
+    def without(self, tasks: Sequence[str]) -> "AssignmentDraft | None":
+        """The draft without some tasks and all that come after them, where a robot is missing; None where nothing is.
+
+        None too where no task is left, or where the file names the tasks elsewhere.
+        """
+        left_out = set(tasks)
+        while more := {it.name for it in self.cell.tasks if left_out.intersection(it.after)} - left_out:
+            left_out |= more
+        robots: Any = self.cell.origin.document["robots"]
+        if all(it.get("available", True) for it in robots.values()) or len(left_out) == len(self.cell.tasks):
+            return None
+        try:
+            cell = self.cell.with_values({f"tasks.{name}": None for name in left_out})
+        except InputError:
+            return None
+        return replace(self, cell=cell, robots={name: it for name, it in self.robots.items() if name not in left_out})
 
     @property
     def settings(self) -> AssignEntry:

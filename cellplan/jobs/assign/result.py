@@ -49,7 +49,8 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "cell": assignment.cell.name,
-        "status": "passed" if assignment.passed else "failed",
+        "status": "passed" if assignment.passed else "partial" if assignment.solution.passed else "failed",
+        "left_out": list(assignment.left_out),
         "cycle_time_s": number(cycle),
         "model_cycle_s": number(assignment.model_cycle),
         "bound_s": None if assignment.bound is None else number(assignment.bound),
@@ -192,6 +193,7 @@ def assign_lines(record: Record) -> list[str]:
         tasks = ", ".join(f"{robot} {it['task']}" for robot, it in block["tasks"].items())
         lines.append(f"  {block['phase']} {block['begin_s']:g} to {block['end_s']:g} s: {tasks}")
     lines += [f"  nearly as good: {_alternative_words(other)}" for other in record["alternatives"]]
+    lines += [f"  LEFT OUT {message}" for message in record["left_out"]]
     return [*lines, *(f"  FAILED {message}" for message in record["failed"])]
 
 
@@ -279,6 +281,8 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
     record, source = assign_record(assignment), assignment.cell.origin.source
     allowed = (given.parent, *(source.allow_dirs if isinstance(source, CellFile) else ()))
     head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s from home to home."
+    if assignment.left_out:
+        head += f" PARTIAL: {len(assignment.left_out)} tasks that nobody can do, and all after them, are left out."
     with RunFolder(folder) as target:
         files = result_files(assignment.cell, given, folder, head=head)
         for name, content in files.items():

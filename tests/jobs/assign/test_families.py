@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from builders.commands import run_command
 
-from cellplan.errors import InputError
+from cellplan.errors import ImpossibleTasksError, InputError
+from cellplan.files.cell.load import load_cell
 from cellplan.geometry.transforms import pose
 from cellplan.jobs.assign.assign import assign
 from cellplan.jobs.assign.draft import AssignmentDraft
 from cellplan.jobs.assign.written import mirrored_goals
+from cellplan.runs.solve import solve
 from cellplan.search.assign.goals import task_goals
 from cellplan.search.assign.schedule import refuse_impossible
 
@@ -142,6 +145,29 @@ def test_a_tool_that_pushes_does_so_in_both_directions(tmp_path: Path, cells: Mo
     for goal in goals:
         travel = goal.X_PT[-2, :3, 3] - goal.X_PT[1, :3, 3]
         assert goal.X_PT[1, :3, 2] @ travel < -0.05 * np.linalg.norm(travel)
+
+
+@pytest.mark.slow
+def test_what_only_a_missing_robot_can_do_is_left_out_and_said(tmp_path: Path, cells: ModuleType) -> None:
+    """With a robot out of order; the same cell is refused where all robots are there."""
+    values = cells.generated_cell(8, 2, 0, "table")
+    values["tasks"]["s01"]["path"]["polyline"]["points_mm"] = [[0, 0, 2000], [100, 0, 2000]]
+    values["tasks"]["s02"]["after"] = ["s01"]
+    with pytest.raises(ImpossibleTasksError, match=r"tasks\.s01: none of west, east can do it"):
+        assign(draft(tmp_path, values), effort=1)
+    values["robots"]["east"]["available"] = False
+    draft(tmp_path, values)
+
+    status, out, _ = run_command("cellplan assign cell.yaml -o out --effort 1 --quiet", tmp_path)
+
+    assert status == 1
+    assert "partial" in out
+    assert "LEFT OUT" in out
+    assert "tasks.s01: none of west can do it" in out
+    best = load_cell(tmp_path / "out" / "best.yaml")
+    assert {task.robot for task in best.tasks} == {"west"}
+    assert {task.name for task in best.tasks}.isdisjoint({"s01", "s02"})
+    assert solve(best).passed
 
 
 def _cell(cells: ModuleType, text: str) -> dict[str, Any]:
