@@ -151,7 +151,7 @@ def test_a_tool_that_pushes_does_so_in_both_directions(tmp_path: Path, cells: Mo
 def test_what_only_a_missing_robot_can_do_is_left_out_and_said(tmp_path: Path, cells: ModuleType) -> None:
     """With a robot out of order; the same cell is refused where all robots are there."""
     values = cells.generated_cell(8, 2, 0, "table")
-    values["tasks"]["s01"]["path"]["polyline"]["points_mm"] = [[0, 0, 2000], [100, 0, 2000]]
+    values["tasks"]["s01"]["path"]["polyline"]["points_mm"] = [[0, 0, 9000], [100, 0, 9000]]
     values["tasks"]["s02"]["after"] = ["s01"]
     with pytest.raises(ImpossibleTasksError, match=r"tasks\.s01: none of west, east can do it"):
         assign(draft(tmp_path, values), effort=1)
