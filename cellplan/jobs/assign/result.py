@@ -282,7 +282,7 @@ def write_assignment(assignment: Assignment, given: Path, folder: Path, *, progr
     allowed = (given.parent, *(source.allow_dirs if isinstance(source, CellFile) else ()))
     head = f"Assigned by cellplan assign: {record['cycle_time_s']:g} s from home to home."
     if assignment.left_out:
-        head += f" PARTIAL: {len(assignment.left_out)} tasks that nobody can do, and all after them, are left out."
+        head += f" PARTIAL: {len(assignment.left_out)} tasks that no robot can do, and all after them, are left out."
     with RunFolder(folder) as target:
         files = result_files(assignment.cell, given, folder, head=head)
         for name, content in files.items():
