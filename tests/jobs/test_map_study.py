@@ -90,7 +90,9 @@ def test_tiles_cover_every_place_with_a_start_once(folder: Path) -> None:
     trials = [json.loads(line) for line in (folder / "study.jsonl").read_text().splitlines()[1:]]
     record = json.loads((folder / "map.json").read_bytes())
 
-    places = [place for trial in trials for place in sorted(set(trial["values"]["places"]))]
+    phases = [[sorted(set(phase["places"])) for phase in trial["values"]["phases"]] for trial in trials]
+    assert all(tile == same[0] for same in phases for tile in same)
+    places = [place for same in phases for place in same[0]]
     moved = [number for number, place in enumerate(record["places"]) if place["figures"]]
     assert len(trials) % tiles.SHARES == 0
     assert len(places) == len(set(places))
