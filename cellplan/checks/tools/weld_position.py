@@ -1,6 +1,7 @@
 """Tools and welds to gravity along their paths: the angle of a torch, and the position of a weld."""
 
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from cellplan.model.motion.motion import Schedule, TaskSchedule
 from cellplan.model.report.report import Check
 from cellplan.scene.kinematics.screw_chain import ScrewChain
 
-MOVES = 1e-9  # [m/s] of a tool along its path: below it there is no direction of travel
+ROUNDING: Final = 1e-7  # [rad] beyond a limit that is stated in whole degrees
+MOVES: Final = 1e-9  # [m/s] of a tool along its path: below it there is no direction of travel
 
 
 def check_weld_positions(
@@ -61,7 +63,7 @@ def _within(
     return Check(
         name=name,
         subject=task,
-        passed=bool(low <= value <= high),
+        passed=bool(low - ROUNDING <= value <= high + ROUNDING),
         value=float(np.degrees(value)),
         limit=float(np.degrees(limit)),
         unit="deg",

@@ -40,3 +40,9 @@ def test_horizontal_tools_weld_all_slopes_of_a_ring_and_the_walls_of_a_frame() -
 
 def test_tasks_that_demand_nothing_have_no_check() -> None:
     assert checks_of({}) == {}
+
+
+def test_a_level_tool_keeps_a_limit_of_a_right_angle() -> None:
+    """Its angle is 90 deg but for the rounding of joint positions."""
+    assert checks_of({"tasks.frame.torch": {"within_deg": 90}})["torch_angle", "frame"].passed
+    assert not checks_of({"tasks.frame.torch": {"within_deg": 89.9999}})["torch_angle", "frame"].passed
