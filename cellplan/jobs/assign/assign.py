@@ -30,7 +30,6 @@ from cellplan.search.assign.instance import Instance, find_conflicts, least_tran
 from cellplan.search.assign.order import SequencedBlocks, Sequencer
 from cellplan.search.assign.refined import Refinement
 from cellplan.search.assign.rules import TaskRules, tasks_before
-from cellplan.search.assign.schedule import Choice
 from cellplan.search.assign.solver import is_installed
 from cellplan.search.assign.stations import choose_stations
 from cellplan.search.assign.table import Key, ModeSearch, ModeTable, TaskMode
@@ -296,17 +295,11 @@ class _Search:
 
 def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) -> tuple[SequencedBlocks, ...]:
     """Schedules with other robots or poses of the part, or other tasks together, that take little more time."""
-    different = {_assigned(best): best}
+    different = {best.schedule.identity: best}
     for other in sorted(others, key=lambda it: it.steps):
         if other.steps <= NEARLY * best.steps:
-            different.setdefault(_assigned(other), other)
+            different.setdefault(other.schedule.identity, other)
     return tuple(different.values())[1:]
-
-
-def _assigned(sequenced: SequencedBlocks) -> tuple[frozenset[frozenset[str]], frozenset[tuple[str, Choice]]]:
-    """What is done together, and by whom at which station, in whatever order."""
-    schedule = sequenced.schedule
-    return frozenset(map(frozenset, schedule.blocks)), frozenset(schedule.chosen.items())
 
 
 def refuse_impossible_tasks(draft: AssignmentDraft, goals: list[TaskGoal], table: ModeTable, able: set[str]) -> None:

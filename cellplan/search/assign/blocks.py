@@ -20,6 +20,7 @@ from cellplan.search.assign.rule_rows import add_rest_rows, add_rule_rows
 from cellplan.search.assign.schedule import BlockSchedule, Choice, in_order
 from cellplan.search.assign.solver import Solved, new_model
 
+MOST_OTHERS: Final = 3  # schedules that are nearly as good
 HORIZON: Final = 10_000_000  # [steps] no cycle is longer
 
 
@@ -43,12 +44,13 @@ def solve_blocks(instance: Instance, *, least: int, effort: float, hint: BlockSc
     """
     model = _BlockModel(instance, least)
     solved = Solved(model.model, effort, () if hint is None else model.hints(hint))
-    schedules = tuple(model.schedule(solved, answer) for answer in range(len(solved.answers)))
+    schedules = (model.schedule(solved, answer) for answer in range(len(solved.answers)))
+    different = list({schedule.identity: schedule for schedule in schedules}.values())
     return BlockAnswer(
-        schedule=next(iter(schedules), None),
+        schedule=next(iter(different), None),
         bound=solved.bound,
         is_proved=solved.is_proved,
-        others=schedules[1:],
+        others=tuple(different[1 : 1 + MOST_OTHERS]),
     )
 
 

@@ -20,6 +20,11 @@ class BlockSchedule:
         """The station at which a block is done."""
         return self.chosen[block[0]][1]
 
+    @property
+    def identity(self) -> tuple[frozenset[frozenset[str]], frozenset[tuple[str, Choice]]]:
+        """What is done together, and by whom at which station, in whatever order."""
+        return frozenset(map(frozenset, self.blocks)), frozenset(self.chosen.items())
+
     def work(self, instance: Instance) -> int:
         """Whole steps of all blocks, without what lies between them."""
         return sum(max(instance.steps(task) for task in block) for block in self.blocks)

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 WORKERS: Final = 8  # searches that take turns; their number decides the answer, not the number of processors
-POOL: Final = 4  # answers that are known at the end
+POOL: Final = 24  # answers that are known at the end
 ROUNDING: Final = 1e-6  # [steps] of a bound
 
 

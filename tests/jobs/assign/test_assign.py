@@ -84,19 +84,22 @@ def test_what_a_task_states_is_kept(assignment: Assignment, tmp_path: Path) -> N
     assert top.holder_posture is not None
     assert edge.start_posture is not None
     holder, start = (np.degrees(q).round(3).tolist() for q in (top.holder_posture, edge.start_posture))
-    text = OPEN.read_text()
+    text, turn = OPEN.read_text(), f"{np.degrees(edge.spin):.3f}"
     text = text.replace("  top_2:\n", f"  top_2:\n    holder_deg: {holder}\n    spin_deg: {np.degrees(top.spin):.3f}\n")
-    text = text.replace("  edge_1:\n    robot: any\n", f"  edge_1:\n    robot: {edge.robot}\n    start_deg: {start}\n")
+    text = text.replace(
+        "  edge_1:\n    robot: any\n",
+        f"  edge_1:\n    robot: {edge.robot}\n    start_deg: {start}\n    spin_deg: {turn}\n",
+    )
     (tmp_path / "cell.yaml").write_text(text)
 
     result = assign(AssignmentDraft.load(tmp_path / "cell.yaml"), effort=1)
 
-    written, given = result.cell.origin.source, load_open_cell(tmp_path / "cell.yaml")[0].origin.source
+    written, drafted = result.cell.origin.source, load_open_cell(tmp_path / "cell.yaml")[0].origin.source
     assert written is not None
-    assert given is not None
-    for name, keys in (("top_2", ("holder_deg", "spin_deg")), ("edge_1", ("robot", "start_deg"))):
+    assert drafted is not None
+    for name, keys in (("top_2", ("holder_deg", "spin_deg")), ("edge_1", ("robot", "start_deg", "spin_deg"))):
         assert [written.written["tasks"][name][key] for key in keys] == [
-            given.written["tasks"][name][key] for key in keys
+            drafted.written["tasks"][name][key] for key in keys
         ]
     assert result.passed
 
