@@ -52,7 +52,7 @@ class Assignment(Presented):
         instance: What was chosen from.
         sequenced: The blocks in their order, with a mode of every task.
         bound: No program in blocks at these stations, with these modes, is shorter, in [s]; None where that is not
-            known, as OR-Tools is not installed.
+            known: without OR-Tools, or where the part cools between the tasks of a retimed program.
         is_proved: Whether no schedule of the block model is better than the one that was first sequenced.
         greedy: Cycle in [s] of the greedy schedule, scarce tasks first, by the model.
         alternatives: Other schedules of the first round that are nearly as good by the model, the best one first; they
@@ -135,7 +135,8 @@ def _program_of(draft: AssignmentDraft, effort: int, progress: Progress) -> Assi
         cell = written_cell(draft, instance, planned.sequenced)
         solution = _solved(cell, progress)
         if number == 1:
-            bound = None if planned.bound is None else planned.bound * instance.step
+            steps = None if has_open_rests(draft.cell, instance) else planned.bound
+            bound = None if steps is None else steps * instance.step
             is_proved, others = planned.is_proved, planned.others
         if not isinstance(solution, str) and (solution.passed or number == ROUNDS):
             return Assignment(
@@ -291,6 +292,11 @@ class _Search:
             start_q=task.start_posture,
             is_spin_free=f"tasks.{goal.name}.spin_deg" not in cell.origin.lines,
         )
+
+
+def has_open_rests(cell: Cell, instance: Instance) -> bool:
+    """Whether tasks rest for each other whose times only the solve of the program decides: no bound counts these."""
+    return bool(instance.rules.lags) and cell.motion.timing is not Timing.AS_WRITTEN
 
 
 def alternatives_to(best: SequencedBlocks, others: Iterable[SequencedBlocks]) -> tuple[SequencedBlocks, ...]:

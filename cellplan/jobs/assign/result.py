@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from cellplan.files.cell.load import CellFile, load_cell
 from cellplan.files.run.folder import RunFolder
-from cellplan.jobs.assign.assign import Assignment
+from cellplan.jobs.assign.assign import Assignment, has_open_rests
 from cellplan.jobs.layout.result_file import BEST, result_files
 from cellplan.model.cell.cell import Cell
 from cellplan.model.progress import Progress, silent
@@ -30,6 +30,7 @@ HOLDS_FOR: Final = (
     "programs in blocks at the chosen poses of the part, with the modes that were found and the conflicts as listed"
 )
 NO_SOLVER: Final = "no lower bound is known, as OR-Tools is not installed: pip install 'cellplan[assign]'"
+OPEN_RESTS: Final = "no lower bound is known of a program that is retimed and in which the part cools between tasks"
 
 
 # The record: assign.json
@@ -54,7 +55,7 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "cycle_time_s": number(cycle),
         "model_cycle_s": number(assignment.model_cycle),
         "bound_s": None if assignment.bound is None else number(assignment.bound),
-        "bound_holds_for": NO_SOLVER if assignment.bound is None else HOLDS_FOR,
+        "bound_holds_for": _holds_for(assignment),
         "gap_percent": number(100.0 * (cycle / assignment.bound - 1.0)) if assignment.bound else None,
         "is_proved": assignment.is_proved,
         "greedy_cycle_s": number(assignment.greedy),
@@ -75,6 +76,13 @@ def assign_record(assignment: Assignment) -> dict[str, Any]:
         "inputs": dict(assignment.draft.inputs),
         "versions": versions(),
     }
+
+
+def _holds_for(assignment: Assignment) -> str:
+    """What the lower bound holds for, or why there is none."""
+    if assignment.bound is not None:
+        return HOLDS_FOR
+    return OPEN_RESTS if has_open_rests(assignment.draft, assignment.instance) else NO_SOLVER
 
 
 def _begins(runs: Sequence[Run]) -> Iterator[float]:

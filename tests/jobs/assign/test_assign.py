@@ -141,6 +141,17 @@ def test_without_the_solver_there_is_a_program_and_no_bound(
     assert "pip install 'cellplan[assign]'" in assign_record(alone)["bound_holds_for"]
 
 
+def test_rests_in_a_retimed_program_have_no_bound(tmp_path: Path) -> None:
+    text = OPEN.read_text().replace("program: {}", "program: {rest_s: 5, apart_mm: 100}")
+    (tmp_path / "cell.yaml").write_text(text.replace("motion: {", "motion: {timing: fastest, "))
+
+    result = assign(AssignmentDraft.load(tmp_path / "cell.yaml"), effort=1)
+
+    assert result.passed
+    assert result.bound is None
+    assert "the part cools between tasks" in assign_record(result)["bound_holds_for"]
+
+
 def test_a_task_that_nobody_can_do_is_named_with_its_filter(tmp_path: Path) -> None:
     text = OPEN.read_text().replace("[[-300, -150, 40], [-160, -150, 40]]", "[[-300, -150, 2040], [-160, -150, 2040]]")
     text = text.replace("within_deg: 50", "within_deg: 5")
