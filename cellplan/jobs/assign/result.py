@@ -186,7 +186,7 @@ def assign_lines(record: Record) -> list[str]:
         bound,
         f"  {len(record['blocks'])} blocks {binding['blocks_s']:g} s, transfers {binding['transfers_s']:g} s; "
         + _part_words(record),
-        f"  a greedy schedule, scarce tasks first, would take {record['greedy_cycle_s']:g} s",
+        f"  a greedy schedule, scarce tasks first, would take {record['greedy_cycle_s']:g} s by the model",
     ]
     for name, use in record["robots"].items():
         busiest = " (busiest)" if name == binding["busiest_robot"] else ""
