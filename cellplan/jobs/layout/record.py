@@ -181,7 +181,7 @@ def layout_record(
         "choices": _choices(ready, finished, tried),
         "dropped": _dropped(finished.trials),
         "misplacement": None,
-        "remarks": [*ready.variables.remarks, *_slowed(best)],
+        "remarks": [*ready.variables.remarks, *_slowed(best), *no_gain(best.cycle if best else None, given.record)],
         "drawing": _drawing(ready, given, best) if best else {},
         "files": [],
         "inputs": dict(cell.inputs),
@@ -199,6 +199,16 @@ def _slowed(best: CandidateResult | None) -> Iterator[str]:
             f"the limits of the joints alone would allow {alone:.4g} s; what the search does not know asks for "
             f"{cycle:.4g} s: errors of the tools between rows (a shorter motion.step_s makes them less), demanded "
             "feeds, jerk, or limits of tool speed and of the part's acceleration"
+        )
+
+
+def no_gain(cycle: float | None, given: GivenRecord) -> Iterator[str]:
+    """That the given layout passes in a shorter cycle than the best one of the search, in [s]; nothing otherwise."""
+    shortest = given["cycle_s"]
+    if cycle is not None and shortest is not None and given["status"] == "conforming" and shortest < cycle:
+        yield (
+            f"no gain: the given layout takes {shortest:.6g} s, less than the {cycle:.6g} s of this one; keep it, or "
+            "search on with more trials"
         )
 
 
