@@ -76,6 +76,7 @@ def test_turns_and_robots_are_judged_by_what_the_program_does() -> None:
     assert "done by left, right" in robots.message
 
 
+@pytest.mark.slow
 def test_a_rest_lasts_from_the_end_of_one_path_to_the_begin_of_the_next() -> None:
     """Paths on opposite faces of a block, 300 mm apart: the part cools while one tool leaves and the other comes."""
     solution = solved({"tasks.frame.after": "ring"}, rest_s=60.0, apart_mm=Mm(301))
@@ -90,6 +91,7 @@ def test_a_rest_lasts_from_the_end_of_one_path_to_the_begin_of_the_next() -> Non
     assert checks_of(far, "rest") == []
 
 
+@pytest.mark.slow
 def test_paths_at_once_leave_no_rest_unless_they_begin_together_by_a_rule() -> None:
     [(_, rest)] = checks_of(solved({}, rest_s=0.1, apart_mm=Mm(400)), "rest")
     together = solved({}, rest_s=0.1, apart_mm=Mm(400), together=("ring", "frame"))
@@ -99,6 +101,7 @@ def test_paths_at_once_leave_no_rest_unless_they_begin_together_by_a_rule() -> N
     assert checks_of(together, "rest") == []
 
 
+@pytest.mark.slow
 def test_tips_at_once_keep_the_distance_of_their_paths_on_the_part() -> None:
     near, far = solved({}, arcs_apart_mm=Mm(250)), solved({}, arcs_apart_mm=Mm(700))
     tasks, times = near.runs[1].schedule.tasks, near.runs[1].schedule.times

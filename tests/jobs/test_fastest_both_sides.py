@@ -84,6 +84,7 @@ def test_a_limit_binds_from_99_percent_of_it(share: float, verb: str) -> None:
     assert binding.text == f"arm A {verb} of its jerk limit"
 
 
+@pytest.mark.slow
 def test_a_feed_that_no_joint_can_hold_is_named_with_the_greatest_that_holds(tmp_path: Path) -> None:
     cell = cell_of(tmp_path, THREE_FEEDS)
 

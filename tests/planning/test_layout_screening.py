@@ -113,6 +113,7 @@ def test_what_is_out_of_reach_is_lost_and_affects_no_other(job: SimpleNamespace)
     np.testing.assert_allclose(screening.margins[[0, 1, 3]], alone.margins, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_tool_that_cannot_follow_is_lost_on_the_way(job: SimpleNamespace) -> None:
     places = np.zeros((41, 3, 3))
     places[:, 0, 1] = np.linspace(0.0, 0.8, 41)  # the first operator stands farther and farther away

@@ -56,6 +56,7 @@ def failures(text: str, folder: Path, move: str = "grip") -> list[str]:
     return [check.message for check in checks_of(text, folder, move) if not check.passed]
 
 
+@pytest.mark.slow
 def test_a_disc_on_the_holder_that_passes_through_a_lip_of_the_part_collides(tmp_path: Path) -> None:
     messages = failures(with_lip(tmp_path, f"{PIN}, {DISC}"), tmp_path)
 

@@ -100,6 +100,7 @@ def test_a_round_that_is_not_full_is_the_last_one(tmp_path: Path, count: int, tr
     assert (len(finished.trials), finished.stopped_by) == (trials, StoppedBy.SEARCH)
 
 
+@pytest.mark.slow
 def test_accidents_are_failed_trials_with_their_reasons(tmp_path: Path) -> None:
     study = rounds(tmp_path / "study")
     with Workers(2, ("builders.study_trials",)) as workers:

@@ -15,6 +15,8 @@ from cellplan.geometry.transforms import pose
 from cellplan.model.cell.cell import Cell, Mode, Robot
 from cellplan.model.robot.robot import configuration_in_si, start_keys
 from cellplan.model.settings.assign import POSTURE_LIMIT, AssignEntry
+from cellplan.runs.plan.program_faults import refuse_crowded_homes
+from cellplan.scene.scene import Scene
 from cellplan.search.assign.goals import Stations
 from cellplan.search.assign.table import BranchFollower
 
@@ -42,6 +44,7 @@ class AssignmentDraft:
 
         Raises:
             InputError: The file cannot be read, or an assignment is not made for such cells; one located line each.
+            HomeNotFoundError: Robots are too close to each other at their homes.
         """
         cell, robots = load_open_cell(file, allow_dirs=allow_dirs)
         refuse_unless_assignable(cell)
@@ -51,7 +54,8 @@ class AssignmentDraft:
                     f"{task.where('start_deg')}: unexpected key of an open task, whose robot is not known yet"
                 )
         draft = cls(cell=cell, robots=robots, file=Path(file))
-        draft.stations()  # which are refused before anything is searched
+        draft.stations()  # these and the homes are refused before anything is searched
+        refuse_crowded_homes(Scene.from_cell(cell), draft.home)
         return draft
 
     def without(self, tasks: Sequence[str]) -> "AssignmentDraft | None":

@@ -32,6 +32,7 @@ def margin_of(height: float, starts: dict[str, object]) -> float:
     return min(float(np.degrees(use.margin)) for use in joints)
 
 
+@pytest.mark.slow
 def test_the_least_change_of_one_base_keeps_the_demand_in_every_phase_and_half_of_it_does_not() -> None:
     attempt = Attempt(kind=RemedyKind.LAYOUT, robots=("kuka",), addresses=(HEIGHT,))
 

@@ -47,6 +47,7 @@ def test_a_timed_program_is_not_for_robots_that_wait(run: VerifiedRun) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_programs_of_two_makers_wait_at_the_same_marks(folder: Path) -> None:
     status, _, error = export(folder, "--format val3", "--format urscript", "--promise sequence")
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cellplan.files.cell.load import load_cell
 from cellplan.planning.sequence.stages import program_stages
@@ -11,6 +12,7 @@ from cellplan.runs.plan.sequence import plan_work
 CELL = Path(__file__).resolve().parents[3] / "cells" / "three_tasks_each.yaml"
 
 
+@pytest.mark.slow
 def test_work_is_planned_without_transfers_and_with_every_start() -> None:
     work = plan_work(load_cell(CELL))
     assert [stage.stage.phase.name for stage in work.stages] == [

@@ -93,6 +93,7 @@ def test_rows_are_the_derivatives_of_what_is_measured(
         assert np.quantile(errors, 0.9) <= 0.02 * np.abs(seen[is_seen]).max()
 
 
+@pytest.mark.slow
 def test_times_of_transfers_have_their_derivatives(ready: PreparedSearch, problem: ProgramProblem) -> None:
     point = problem.evaluate(_away(ready, problem), ready.given_start)
     assert point is not None
